@@ -17,7 +17,7 @@ from accelstudy.api.given import IN_MEMORY, for_programs, of_type, path_of, pyth
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.sources import open_source
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html
 
@@ -61,7 +61,8 @@ def read_log(
     Parameters
     ----------
     log : path or DataFrame
-        Text (CSV or columns, perhaps .gz), MATLAB or Parquet, or a table in memory.
+        Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS, a ULog of
+        PX4, or a table in memory.
     rate : float, Hz, optional
         Samples per second, where there is no column of time.
     columns : mapping, optional

@@ -92,7 +92,9 @@ class LogLayout(BaseModel):
     time: Place | None = Field(None, description="column of time")
     time_unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of that column")
     rate_hz: Rate | None = Field(None, description="samples per second, without time")
-    variable: str | None = Field(None, description="which array of a MATLAB file")
+    variable: str | None = Field(
+        None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
+    )
     unit: Literal["m/s^2", "g", "counts"] = Field("m/s^2", description="unit of the forces")
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
     offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _RANGE = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 
 _SECTIONS = {
-    "The log": ("columns", "sensor", "time", "time_unit", "rate"),
+    "The log": ("columns", "sensor", "time", "time_unit", "rate", "variable"),
     "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
     "The holds": ("threshold", "exclude", "join", "figure"),
     "A log of blocks instead": ("block",),
@@ -55,7 +55,7 @@ _SECTIONS = {
 @click.option("--sensor", multiple=True, help="Columns of one of several sensors: NAME=ax,ay,az.")
 @click.option("--offset", help="For counts: reading at 0 m/s².  [default: from the holds]")
 @click.option("--range", "full_range", help="Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.")
-@click.option("--frame", help="Where x, y, z point: frd, flu (ROS), rfu …  [default: frd]")
+@click.option("--frame", help="Where x, y, z point: frd, flu, rfu …  [default: frd; of ROS flu]")
 @click.option("--threshold", type=float, help="Largest sd at rest, m/s².  [default: from the log]")
 @click.option(
     "--exclude", multiple=True, help="What to leave out, and why: 13:moved, 120s-135s:moved."
@@ -88,9 +88,10 @@ def import_command(
 ) -> None:
     """Make a campaign of a raw LOG: find its static holds.
 
-    LOG is text (CSV or columns, perhaps .gz), MATLAB or Parquet. Of several files, a folder or a
-    pattern, each file is one position. The noise of the log itself tells what is at rest, unless
-    --threshold does. segmentation.png in the folder shows the holds with their numbers.
+    LOG is text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS 1 or 2 (extra ros) or
+    a ULog of PX4 (extra px4). Of several files, a folder or a pattern, each file is one position.
+    The noise of the log itself tells what is at rest, unless --threshold does. segmentation.png in
+    the folder shows the holds with their numbers.
 
     --sensor, --exclude and --join may be repeated. With --sensor each sensor has a campaign of its
     own in the folder, which is named after the log and the sensor.
@@ -170,7 +171,8 @@ def settings_of(
     if full_range is None:
         return settings
     range_mps2 = _range(full_range, settings)
-    return parse_settings({**settings.model_dump(), "range_mps2": range_mps2}, "--range")
+    given = settings.model_dump(exclude_unset=True)
+    return parse_settings({**given, "range_mps2": range_mps2}, "--range")
 
 
 def files_of(given: Sequence[Path]) -> list[Path]:
@@ -184,9 +186,11 @@ def files_of(given: Sequence[Path]) -> list[Path]:
     InputError
         If there is none.
     """
+    from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
+
     files: list[Path] = []
     for path in given:
-        if path.is_dir():
+        if path.is_dir() and not (path / BAG_OF_FOLDER).is_file():
             inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
         elif glob.has_magic(str(path)) and not path.exists():
             inside = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]

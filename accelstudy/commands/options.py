@@ -187,6 +187,7 @@ def log_options(command: Command) -> Command:
     for name, help_text in {
         "--scale": "For counts: m/s² per count, one number or three.",
         "--unit": "Unit of the readings: m/s^2, g or counts.  [default: m/s^2]",
+        "--variable": "Array of a MATLAB file, topic of a bag or instance of a ULog.",
         "--rate": "Samples per second, where there is no time.",
         "--time-unit": "Unit of the time: s, ms, us or ns.  [default: s]",
         "--time": "Column of the time, by name or number.",

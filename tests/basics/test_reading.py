@@ -8,7 +8,7 @@ import pytest
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
-from accelstudy.campaign.importing.sources import open_source
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.files import reading
 from accelstudy.files.parquet import read_parquet
 from accelstudy.files.reading import read_layer

@@ -256,7 +256,7 @@ def test_a_bad_log_is_one_line(calibrations, tmp_path):
     for content, words in (
         (None, "no such file"),
         ("", "the file is empty"),
-        ("fx,fy\n1,2\n", "which column is fz"),
+        ("fx,fy\n1,2\n", "two axes"),
         ("fx,fy,fz\n1,2,x\n", "line 2, column fz (fz): 'x'"),
     ):
         if content is not None:

@@ -12,14 +12,20 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import UNITS
 from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.campaign.calibration.export import campaign_conversion, mending
 from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.recording import AXES, locate
-from accelstudy.campaign.importing.sources import CHUNK, Source, open_source
+from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.recording import (
+    AXES,
+    locate,
+    nanoseconds_beside,
+    time_factor_of,
+)
+from accelstudy.campaign.importing.sources import CHUNK, Source, nanoseconds
 from accelstudy.effects import Course, HoldConditions
+from accelstudy.files.reading import overlay
 from accelstudy.files.validation import checked
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import Frame
@@ -75,6 +81,8 @@ class Readings:
             values = {key: self._numbers(table[names[place]], place) for key, place in places}
             forces = np.column_stack([values[axis] for axis in AXES])
             time = values.get("time")
+            if time is not None and "nanoseconds" in values:
+                time = time + 1e-9 * values["nanoseconds"]
             if self.rate is not None:
                 time = self.start + np.arange(row, row + len(table)) / self.rate
             elif time is not None:
@@ -101,6 +109,8 @@ class Readings:
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> Array:
         kind = column.type
+        if place in self.source.dates:
+            return 1e-9 * nanoseconds(column.to_pandas())
         if not (
             pa.types.is_string(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
         ):
@@ -141,6 +151,7 @@ def readings_of(
         raise InputError(f"{log}: give the rate or the column of time, not both")
     layout = _layout(calibration, given)
     source = open_source(log, layout.variable)
+    layout = _layout(calibration, _with_format(source, calibration, given))
     try:
         places = _places(source, layout, calibration, {*given, *given.get("columns", {})})
     except InputError as error:
@@ -163,7 +174,7 @@ def readings_of(
                 f"give it by {OPTIONS[condition]}"
             )
     unit = layout.unit
-    if calibration.log is None and "unit" not in given:
+    if calibration.log is None and "unit" not in given and "unit" not in source.layout:
         unit = calibration.content["unit"]
     # What the user says of this log is right, whatever was wrong with the campaign.
     option_of = {"unit_error": "unit", "axis_error": "frame"}
@@ -171,15 +182,27 @@ def readings_of(
     mends = mended is None or option_of.get(mended["error"]) not in given
     return Readings(
         source,
-        places,
+        places | nanoseconds_beside(source, places),
         layout.rate_hz,
-        UNITS["s"][layout.time_unit],
+        time_factor_of(source, places, layout.time_unit),
         start,
         unit,
         _conversion(calibration, layout, unit),
         layout.axes,
         mending(calibration.content) if mends else np.eye(3),
     )
+
+
+def _with_format(
+    source: Source, calibration: Calibration, given: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    """What the format of a log says, overlaid with `given`, unless the campaign's is like it."""
+    own = {**source.layout}
+    if calibration.log is not None and calibration.log.columns.get("fx") in source.names:
+        return given
+    if "rate_hz" in given:
+        own.pop("time", None)
+    return overlay(own, given)
 
 
 def _layout(calibration: Calibration, given: Mapping[str, Any]) -> LogLayout:

@@ -26,7 +26,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing.sources import (
     CHUNK,
-    MatlabSource,
+    ArraySource,
     ParquetSource,
     Source,
     TextSource,
@@ -63,7 +63,7 @@ def read_chunks(source: Source, chunk_size: int = CHUNK, typed: bool = False) ->
         return _with_types(read) if typed else read()
     if isinstance(source, ParquetSource):
         return _parquet_chunks(source, names, chunk_size)
-    assert isinstance(source, MatlabSource)
+    assert isinstance(source, ArraySource)
     values = source.values
     starts = range(0, len(values), chunk_size)
     return (pa.table(list(values[i : i + chunk_size].T), names=names) for i in starts)

@@ -8,7 +8,7 @@ over τ for noise of any colour. For white noise both agree.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,6 +68,10 @@ class AllanMoments:
     terms: NDArray[np.int_]
     independent: NDArray[np.int_]
 
+    def turned(self, matrix: Array) -> AllanMoments:
+        """Moments of other channels, samples @ matrix, for a matrix (c, d)."""
+        return replace(self, squares=matrix.T @ self.squares @ matrix)
+
     def up_to(self, factor: float) -> AllanMoments:
         """Return the contributions of the shorter averages; the shortest one always stays."""
         k = max(1, int(np.searchsorted(self.factors, factor, side="right")))
@@ -115,8 +119,8 @@ def pooled_deviation(
     terms, independent = np.zeros((2, len(factors)), dtype=int)
     for i, record in enumerate(records):
         k = len(record.factors)
-        turned = record.squares if frames is None else frames[i].T @ record.squares @ frames[i]
-        squares[:k] += np.diagonal(turned, axis1=1, axis2=2)
+        turned = record if frames is None else record.turned(frames[i])
+        squares[:k] += np.diagonal(turned.squares, axis1=1, axis2=2)
         terms[:k] += record.terms
         independent[:k] += record.independent
     deviation = np.sqrt(squares / terms[:, None])

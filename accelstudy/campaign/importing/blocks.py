@@ -1,4 +1,4 @@
-"""Logs of equal blocks: so many samples of each position, without the moves between them.
+"""Logs of blocks: so many samples, or a whole file, of each position, without the moves.
 
 Nothing has to be found in them. But a block in which the sensor moved is no position.
 """
@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.recording import Log
+from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
 from accelstudy.campaign.importing.segments import Envelope, GrowingHold, Segment, Segmentation
 from accelstudy.campaign.importing.windows import (
     Survey,
     Threshold,
     given_threshold,
     survey_log,
-    windows,
 )
 
 Array = NDArray[np.float64]
@@ -32,14 +31,16 @@ moves: a hand that trembles makes some five of it, a turn by a few degrees dozen
 
 
 def segment_blocks(
-    log: Log, size: int, threshold: float | None, full_range: float
+    log: Log | LogSeries, size: int | None, threshold: float | None, full_range: float
 ) -> tuple[Survey, Threshold, Segmentation]:
     """Make each block of a log a position; those in which the sensor moves are to be left out.
 
+    The blocks have so many samples, or are the parts of the log.
+
     Parameters
     ----------
-    log : Log
-    size : int, samples of each position
+    log : Log or LogSeries
+    size : int, samples of each position; None if each part of a LogSeries is one
     threshold : float, m/s², scatter of the parts of a block up to which it is at rest; chosen from
         the data if None
     full_range : float, m/s², the sensor measures ± this
@@ -49,15 +50,21 @@ def segment_blocks(
     InputError
         If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
-    survey = survey_log(log, (size // 2) | 1)
+    parts = log.parts if isinstance(log, LogSeries) else ()
+    least = size or min(sum(len(rows.time) for rows in part.chunks()) for part in parts)
+    if least < PARTS:
+        raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
+    survey = survey_log(log, (least // 2) | 1)
     envelope = Envelope(survey.span, survey.total)
-    for _ in envelope.along(windows(log, survey.width)):
+    for _ in envelope.along(survey.kept.again()):
         pass
     segments: dict[int, Segment] = {}
     left_out, scatter = {}, {}
-    for number, rows in enumerate(_blocks(log, size), 1):
-        block = GrowingHold((number - 1) * size, 0, survey.extremes, full_range, 0)
+    start = 0
+    for number, rows in enumerate(_files(log) if size is None else _blocks(log, size), 1):
+        block = GrowingHold(start, 0, survey.extremes, full_range, 0)
         block.keep(rows)
+        start += len(rows)
         segments[number] = block.finish()
         if block.saturated():
             left_out[number] = "the sensor is saturated"
@@ -65,7 +72,7 @@ def segment_blocks(
         means = [part.mean(axis=0) for part in np.array_split(rows[:, 1:4], PARTS)]
         scatter[number] = float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
     if not scatter:
-        raise InputError(f"{log.path}: the sensor is saturated in all blocks of {size} samples")
+        raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
     if threshold is None:
         usual = float(np.median([*scatter.values()]))
         reason = f"{RESTLESS:g} times the scatter of the {PARTS} parts of a typical block"
@@ -75,10 +82,21 @@ def segment_blocks(
     for number, each in scatter.items():
         if each > chosen.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return survey, chosen, Segmentation(segments, 0, 0, 0, envelope, left_out, size)
+    return survey, chosen, Segmentation(segments, 0, 0, 0, envelope, left_out, least)
 
 
-def _blocks(log: Log, size: int) -> Iterator[Array]:
+def _files(log: Recording) -> Iterator[Array]:
+    """Samples of each part of a log, as those of a block."""
+    held: list[Array] = []
+    for rows in log.chunks():
+        if rows.anew and held:
+            yield np.concatenate(held)
+            held = []
+        held.append(np.column_stack([rows.time, rows.forces, rows.conditions]))
+    yield np.concatenate(held)
+
+
+def _blocks(log: Recording, size: int) -> Iterator[Array]:
     """Samples of each block: time, forces, conditions."""
     left, total = np.empty((0, 4 + len(log.conditions))), 0
     for rows in log.chunks():

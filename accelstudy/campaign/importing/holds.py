@@ -88,7 +88,7 @@ class DetectedHolds:
     step : float, s, usual time between samples; 1 where the log does not tell it
     envelope : Envelope, of the log, for its figure
     warnings : tuple of str
-    size : int, samples of each block, if the log consists of blocks
+    size : int, samples of each block, or of the shortest, if the log consists of blocks
     """
 
     segments: Mapping[int, Segment]
@@ -166,7 +166,7 @@ def detected_holds(
         if segmentation.size is not None:
             return InputError(
                 f"{log.path}: blocks of {segmentation.size} samples are no positions: {why}; is "
-                "the number of samples (--block) right?"
+                "the number of samples (--block) right, or does a file hold a move?"
             )
         return InputError(
             f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "

@@ -14,6 +14,7 @@ from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
 from accelstudy.campaign.importing.segments import segment_logs
 from accelstudy.campaign.importing.settings import (
@@ -22,25 +23,39 @@ from accelstudy.campaign.importing.settings import (
     named_after,
     parse_selection,
 )
-from accelstudy.campaign.importing.windows import surveyed
+from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.session import Campaign
+from accelstudy.files.reading import overlay
 
 
-def log_of(path: str | Path, settings: ImportSettings) -> Log:
-    """Open a log by the settings."""
+def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) -> Log:
+    """Open a log by the settings; see `open_log` for `untimed`."""
+    source = open_source(path, settings.variable)
+    settings = as_its_format(settings, source)
     return open_log(
         path,
         columns=settings.columns,
         time=settings.time,
         rate=settings.rate_hz,
-        untimed=settings.block is not None,
+        untimed=untimed or settings.block is not None,
         unit=settings.unit,
         scale=settings.scale,
         offset=settings.offset,
         time_unit=settings.time_unit,
         variable=settings.variable,
         frame=settings.axes,
+        source=source,
     )
+
+
+def as_its_format(settings: ImportSettings, source: Source) -> ImportSettings:
+    """Settings with what the format of a log says, where they do not say it."""
+    given = settings.model_dump(exclude_unset=True)
+    own = {**source.layout}
+    if "rate_hz" in given:
+        own.pop("time", None)
+    return ImportSettings.model_validate(overlay(own, given))
 
 
 def import_log(
@@ -92,8 +107,13 @@ def import_sensors(
     """
     chosen = _settings_of_sensors(named_after(settings, paths))
     if settings.block is not None:
-        return _import_blocks(paths, settings.block, chosen)
+        if len(paths) > 1:
+            raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
+        return _import_blocks(paths, chosen)
     logs = {name: _recording(paths, each) for name, each in chosen.items()}
+    chosen = {name: as_its_format(each, _source(logs[name])) for name, each in chosen.items()}
+    if any(isinstance(log, LogSeries) and _whole_files(log, settings) for log in logs.values()):
+        return _import_blocks(paths, chosen)
     detected = find_joint_holds(
         list(logs.values()),
         window=settings.window_s,
@@ -111,19 +131,18 @@ def import_sensors(
 
 
 def _import_blocks(
-    paths: Sequence[str | Path], size: int, chosen: Mapping[str, ImportSettings]
+    paths: Sequence[str | Path], chosen: Mapping[str, ImportSettings]
 ) -> dict[str, tuple[Campaign, ImportReport]]:
-    """Make each block of so many samples a position of each sensor."""
-    if len(paths) > 1:
-        raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
+    """Make each block of so many samples, or each of several files, a position of each sensor."""
     result = {}
     for name, each in chosen.items():
-        log = log_of(paths[0], each)
+        log = _recording(paths, each)
+        each = as_its_format(each, _source(log))
         selection = parse_selection(each.exclude, each.join)
-        if "time" not in log.places and (selection.spans or selection.joined_spans):
+        if "time" not in _parts(log)[0].places and (selection.spans or selection.joined_spans):
             raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
         survey, threshold, blocks = segment_blocks(
-            log, size, each.threshold_mps2, _full_range(each)
+            log, each.block, each.threshold_mps2, _full_range(each)
         )
         window = survey.width * log.step
         holds = detected_holds(log, survey, threshold, blocks, selection, window, 0.0)
@@ -131,10 +150,20 @@ def _import_blocks(
     return result
 
 
+def _whole_files(log: LogSeries, settings: ImportSettings) -> bool:
+    """Whether files of one position each have no rate, or all are too short to find a hold in."""
+    if settings.rate_hz is None and any("time" not in part.places for part in log.parts):
+        return True
+    window = settings.window_s or usual_window(log)
+    least = window + 2 * settings.trim_s + settings.shortest_s
+    firsts = (next(part.chunks(), None) for part in log.parts)
+    return all(rows is not None and len(rows.time) * log.step < least for rows in firsts)
+
+
 def find_joint_holds(
     logs: Sequence[Recording],
     *,
-    window: float = 1.0,
+    window: float | None = None,
     threshold: float | None = None,
     trim: float = 0.2,
     shortest: float = 1.0,
@@ -150,8 +179,8 @@ def find_joint_holds(
     Parameters
     ----------
     logs : sequence of Recording, one for each sensor, of simultaneous samples
-    window : float, s, length of the sliding window; a hold begins and ends half a window inside
-        the samples at rest
+    window : float, s, length of the sliding window, see `usual_window`; a hold begins and ends half
+        a window inside the samples at rest
     threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
         the data of each sensor if omitted
     trim : float, s, cut off in addition at both ends of a hold
@@ -172,6 +201,7 @@ def find_joint_holds(
         If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
         was never still.
     """
+    window = window or usual_window(logs[0])
     surveys = surveyed(logs, window, threshold)
     segmentations = segment_logs(logs, surveys, trim, shortest, full_range, one_each)
     return [
@@ -241,11 +271,19 @@ def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     }
 
 
-def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Recording:
-    parts = [log_of(path, settings) for path in paths]
+def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Log | LogSeries:
+    parts = [log_of(path, settings, untimed=len(paths) > 1) for path in paths]
     if len(parts) == 1:
         return parts[0]
     return LogSeries([replace(part, lively=False) for part in parts])
+
+
+def _parts(log: Log | LogSeries) -> Sequence[Log]:
+    return log.parts if isinstance(log, LogSeries) else [log]
+
+
+def _source(log: Log | LogSeries) -> Source:
+    return _parts(log)[0].source
 
 
 def _full_range(settings: ImportSettings) -> float:

@@ -64,9 +64,11 @@ class ImportReport:
         log = f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second"
         found = f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s"
         if holds.size is not None:
-            mean = f"{holds.size} samples"
-            log = f"log: {len(holds) * holds.size} samples"
-            found = f"blocks: {len(holds)}, of {mean}, each a position"
+            counts = holds.n_samples
+            mean = f"{accuracy.duration / holds.step:.0f} samples"
+            each = mean if counts.min() == counts.max() else f"{counts.min()} to {counts.max()}"
+            log = f"log: {counts.sum()} samples"
+            found = f"blocks: {len(holds)}, of {each}, each a position"
         lines = [
             log,
             *self.notes,
@@ -109,8 +111,13 @@ def campaign_of_holds(
     if isinstance(log, LogSeries):
         first = log.parts[0]
         notes.append(
-            f"files: {len(log.parts)}, with the longest hold of each as one position; what is "
-            "before and after it does not count"
+            f"files: {len(log.parts)}, "
+            + (
+                "with the longest hold of each as one position; what is before and after it does "
+                "not count"
+                if holds.size is None
+                else "each as a whole one position"
+            )
             + ("" if log.timed else "; the times of the files do not tell that of a position")
         )
         missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
@@ -272,5 +279,5 @@ def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) ->
 
     layout = settings.model_dump(include=set(LogLayout.model_fields))
     time = column("time") if "time" in places else None
-    columns = {key: column(key) for key in places if key != "time"}
+    columns = {key: column(key) for key in places if key not in ("time", "nanoseconds")}
     return LogLayout.model_validate({**layout, "columns": columns, "time": time})

@@ -17,9 +17,10 @@ from accelstudy.campaign.importing.making import (
     far_from_gravity,
     imported_campaign,
 )
+from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, locate
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import Source, open_source, read_columns
+from accelstudy.campaign.importing.sources import Source, read_columns
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 

@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, UNITS
 from accelstudy.basics.wording import short_list
-from accelstudy.campaign.importing.sources import CHUNK, Source, check_numbers, open_source
+from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.sources import CHUNK, Source, check_numbers
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 
@@ -35,12 +36,13 @@ CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
 GAP = 5.0
 """A step of time that is this many times the usual one is a gap."""
+_OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
 _KNOWN_NAMES = {
-    "fx": r"f_?x|a_?x|acc?_?x|acc?el_?x|accelerationx|acceleration_x|x",
-    "fy": r"f_?y|a_?y|acc?_?y|acc?el_?y|accelerationy|acceleration_y|y",
-    "fz": r"f_?z|a_?z|acc?_?z|acc?el_?z|accelerationz|acceleration_z|z",
+    "fx": rf"f_?x|a_?x|acc?_?x|acc?el_?x|accelerationx|{_OF_ROS}acceleration_x|x",
+    "fy": rf"f_?y|a_?y|acc?_?y|acc?el_?y|accelerationy|{_OF_ROS}acceleration_y|y",
+    "fz": rf"f_?z|a_?z|acc?_?z|acc?el_?z|accelerationz|{_OF_ROS}acceleration_z|z",
     "time": r"t|time|time_m?u?n?s|timestamp|seconds",
-    "temperature": r"temp|temperature|temp(erature)?_(deg_?)?c",
+    "temperature": r"_?(field_)?(temp|temperature)|temp(erature)?_(deg_?)?c",
     "vibration": r"vibration|vibration_mps2",
     "n_samples": r"n|n_samples|count",
     "sd_fx": r"sd_?f?x|s_?x|sd_a_?x",
@@ -50,6 +52,12 @@ _KNOWN_NAMES = {
     "pitch": r"pitch|pitch_robot(_gon)?",
     "yaw": r"yaw|yaw_robot(_gon)?",
 }
+_SECONDS = r"(.*_)?secs?"
+_NANOSECONDS = re.compile(r"(.*?)n(ano)?(secs?)", re.IGNORECASE)
+"""Whole seconds of a stamp of ROS, where there is no other time, and the rest of it."""
+_TIME_OR_CONDITION = re.compile(
+    r".*(time|date|stamp|secs?|seq|index|temp|vibration|status).*|t|n|id", re.IGNORECASE
+)
 _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
@@ -112,12 +120,13 @@ def open_log(
     variable: str | None = None,
     frame: Frame = FRD,
     chunk_size: int = CHUNK,
+    source: Source | None = None,
 ) -> Log:
     """Find out how a log is laid out.
 
     Parameters
     ----------
-    path : file; .parquet, .mat (binary or ASCII), anything else is text, perhaps gzipped
+    path : file, of any kind that `open_source` reads
     columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
         in the header if omitted, or the only three columns there are. The last two may be absent.
     time : column of time; by its name in the header if omitted
@@ -126,9 +135,10 @@ def open_log(
     unit : "m/s^2", "g" or "counts"
     scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
     time_unit : "s", "ms", "us" or "ns"
-    variable : str, which array of a MATLAB file
+    variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
     frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
+    source : Source, the file if it is open already
 
     Raises
     ------
@@ -142,7 +152,7 @@ def open_log(
         raise InputError(f"{path}: give the rate or the column of time, not both")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: the rate must be positive, not {rate:g}")
-    source = open_source(path, variable)
+    source = source or open_source(path, variable)
     given = dict(columns or {})
     for key in given:
         if key not in (*AXES, *CONDITIONS):
@@ -157,7 +167,8 @@ def open_log(
                 raise
             if not untimed:
                 raise InputError(
-                    f"{error}; give the column of time (--time), or the rate (--rate)"
+                    f"{error}; give the column of time (--time), or the rate (--rate), or, for a "
+                    "log without the moves between positions, the samples of each (--block)"
                 ) from None
             rate = 1.0
     for key in CONDITIONS:
@@ -170,9 +181,9 @@ def open_log(
     return Log(
         path=Path(path),
         source=source,
-        places=places,
+        places=places | nanoseconds_beside(source, places),
         rate=rate,
-        time_factor=UNITS["s"][time_unit],
+        time_factor=time_factor_of(source, places, time_unit),
         conversion=conversion,
         frame=frame,
         chunk_size=chunk_size,
@@ -194,18 +205,27 @@ def locate(
             raise UnknownNameError("column", key, wanted)
     places = {key: _place(source, key, column) for key, column in given.items()}
     for key in wanted:
-        if key not in places:
-            pattern = _KNOWN_NAMES.get(key, re.escape(key))
+        patterns = [_KNOWN_NAMES.get(key, re.escape(key)), *([_SECONDS] if key == "time" else [])]
+        for pattern in patterns:
             matches = [
                 i
                 for i, name in enumerate(source.names)
-                if re.fullmatch(pattern, re.sub(r"[\s.\-]+", "_", name.strip()), re.IGNORECASE)
+                if re.fullmatch(pattern, re.sub(r"[\s.\-/]+", "_", name.strip()), re.IGNORECASE)
             ]
             if len(matches) == 1:
-                places[key] = matches[0]
+                places.setdefault(key, matches[0])
     if not places and tuple(wanted[:3]) == AXES and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
+    for key, place in places.items():
+        if place in source.dates and key != "time":
+            name = source.names[place]
+            raise InputError(f"{source.path}: column {name} is timestamps, not numbers ({key})")
     missing = [key for key in wanted if key not in places]
+    if needed and set(missing) & set(AXES) and _has_two_axes(source):
+        raise InputError(
+            f"{source.path}: two axes, as of an inclinometer, cannot be calibrated: the length of "
+            "the force is compared with gravity, and that takes all three axes"
+        )
     if needed and missing:
         raise InputError(
             f"{source.path}: which column is {missing[0]}? "
@@ -214,6 +234,39 @@ def locate(
     if len(set(places.values())) < len(places):
         raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
     return places
+
+
+def _has_two_axes(source: Source) -> bool:
+    """Whether a log has two columns besides times and temperatures."""
+    if not source.named:
+        return len(source.names) == 2
+    names = [name for i, name in enumerate(source.names) if i not in source.dates]
+    return sum(not _TIME_OR_CONDITION.fullmatch(name) for name in names) == 2
+
+
+def nanoseconds_beside(source: Source, places: Mapping[str, int]) -> dict[str, int]:
+    """Column of the ns that belong to a time in whole seconds: "stamp.nsecs" to "stamp.secs"."""
+    if "time" not in places:
+        return {}
+    seconds = source.names[places["time"]]
+    parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(source.names))
+    found = [i for i, part in parts if part and part[1] + part[3] == seconds]
+    return {"nanoseconds": found[0]} if len(found) == 1 else {}
+
+
+def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) -> float:
+    """Seconds per unit of the column of time.
+
+    Raises
+    ------
+    InputError
+        If a column of dates, or of seconds beside ns, gets a unit.
+    """
+    known = "nanoseconds" in nanoseconds_beside(source, places)
+    if "time" in places and time_unit != "s" and (known or places["time"] in source.dates):
+        name = source.names[places["time"]]
+        raise InputError(f"{source.path}: column {name} tells its unit; leave --time-unit out")
+    return UNITS["s"][time_unit]
 
 
 def _place(source: Source, key: str, column: Column) -> int:
@@ -242,7 +295,8 @@ class Log:
     ----------
     path : Path
     source : Source, what gives the numbers as they stand in the file
-    places : mapping of "fx", "fy", "fz" and perhaps "time" and `CONDITIONS` to columns
+    places : mapping of "fx", "fy", "fz" and perhaps "time", "nanoseconds" (to be added to a time
+        in whole seconds) and `CONDITIONS` to columns
     rate : float, 1/s; None with a column of time
     time_factor : float, s per unit of that column
     conversion : Conversion, of forces to m/s², in the axes of the log
@@ -286,8 +340,9 @@ class Log:
         """Time of the first sample as written in the file, s; NaN without a column of time."""
         if self.rate is not None:
             return np.nan
-        first = next(self.source.read([self.places["time"]], 1), np.full((1, 1), np.nan))
-        return float(first[0, 0]) * self.time_factor
+        places = [self.places[key] for key in ("time", "nanoseconds") if key in self.places]
+        first = next(self.source.read(places, 1), np.full((1, 2), np.nan))[0]
+        return float(first[0] * self.time_factor + 1e-9 * first[1:].sum())
 
     def likely_unit(self) -> str:
         """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
@@ -318,13 +373,17 @@ class Log:
         row, last = 0, -np.inf
         lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
         clock = self.places.get("time")
+        start = None
         for raw in self.source.read(list(self.places.values()), self.chunk_size, clock):
             if clock is not None:
                 raw[:, keys.index("time")] *= self.time_factor
+            if "nanoseconds" in keys:
+                raw[:, keys.index("time")] += 1e-9 * raw[:, keys.index("nanoseconds")]
             check_numbers(self.source, self.places, raw, row, self.conditions)
             forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
             if clock is not None:
-                time = raw[:, keys.index("time")]
+                start = raw[0, keys.index("time")] if start is None else start
+                time = raw[:, keys.index("time")] - start
                 self._check_order(time, last, row)
                 last = time[-1]
             else:

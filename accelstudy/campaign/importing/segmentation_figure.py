@@ -49,9 +49,10 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
             label = f"threshold {holds.threshold.sd:.2g} m/s²"
             below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
         for ax in (above, below):
-            for start, end, used in zip(holds.t0, holds.t1, holds.used, strict=True):
-                look = {"color": _SHADE} if used else _LEFT_OUT
-                ax.axvspan(start, end, linewidth=0, zorder=0.5, **look)
+            for shaded, look in ((holds.used, {"color": _SHADE}), (~holds.used, _LEFT_OUT)):
+                spans = np.column_stack([holds.t0, holds.t1 - holds.t0])[shaded]
+                whole = ax.get_xaxis_transform()
+                ax.broken_barh(spans, (0, 1), transform=whole, linewidth=0, zorder=0.5, **look)
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         what = "time / s" if holds.size is None else "sample"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.allan import AllanMoments, allan_moments
 from accelstudy.campaign.importing.recording import Recording
-from accelstudy.campaign.importing.windows import Survey, Threshold, Windows, windows
+from accelstudy.campaign.importing.windows import Survey, Threshold, Windows
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Segmentation:
         turns slowly, or they are too short
     envelope : Envelope, of the log, for its figure
     left_out : mapping of int to str, segments that are no positions, and why
-    size : int, samples of each, if the log consists of blocks
+    size : int, samples of each, or of the shortest, if the log consists of blocks
     """
 
     segments: Mapping[int, Segment]
@@ -71,11 +71,12 @@ def segment_logs(
     one_each : bool, whether the logs have several recordings with one position each: the longest
         segment, which gets the number of the recording
     """
-    step, width = logs[0].step, surveys[0][0].width
+    step = logs[0].step
     cut, least = round(trim / step), max(2, round(shortest / step))
     envelopes = [Envelope(survey.span, survey.total) for survey, _ in surveys]
     streams = [
-        envelope.along(windows(log, width)) for envelope, log in zip(envelopes, logs, strict=True)
+        envelope.along(survey.kept.again())
+        for envelope, (survey, _) in zip(envelopes, surveys, strict=True)
     ]
     largest = [threshold.sd**2 for _, threshold in surveys]
     extremes = [survey.extremes for survey, _ in surveys]
@@ -245,7 +246,8 @@ class GrowingHold:
         self._moments: Moments | None = None
         self._conditions = np.zeros((3, 0))
         self._extremes, self._at_extremes = extremes, np.zeros((2, 2, 3), dtype=int)
-        self._range, self._beyond = full_range, np.zeros(3, dtype=int)
+        # Conversion from counts or g rounds.
+        self._range, self._beyond = full_range * (1 - 1e-9), np.zeros(3, dtype=int)
         self._cut, self._to_drop = cut, cut
         self._waiting: list[Array] = []
         self._record: list[Array] = []
@@ -253,7 +255,8 @@ class GrowingHold:
 
     def grow(self, batch: Windows, chosen: slice) -> None:
         """Add the samples that follow, (k, 4 + c): time, forces, conditions."""
-        rows = np.column_stack([batch.time, batch.forces, batch.conditions])[chosen]
+        parts = (batch.time[:, None], batch.forces, batch.conditions)
+        rows = np.hstack([part[chosen] for part in parts])
         dropped = min(self._to_drop, len(rows))
         self._to_drop -= dropped
         rows = np.concatenate([*self._waiting, rows[dropped:]])
@@ -274,9 +277,11 @@ class GrowingHold:
         self._conditions = self._conditions + sums if self.n else sums
         self.n += len(rows)
         forces = rows[:, 1:4]
-        self._at_extremes += np.sum(forces == self._extremes[:, :, None, :], axis=2)
-        # Conversion from counts or g rounds.
-        self._beyond += np.sum(np.abs(forces) >= self._range * (1 - 1e-9), axis=0)
+        low, high = forces.min(axis=0), forces.max(axis=0)
+        if np.any(low <= self._extremes[0, 1]) or np.any(high >= self._extremes[1, 1]):
+            self._at_extremes += np.sum(forces == self._extremes[:, :, None, :], axis=2)
+        if max(high.max(), -low.min()) >= self._range:
+            self._beyond += np.sum(np.abs(forces) >= self._range, axis=0)
         kept = rows[: max(0, LONGEST_RECORD - self._recorded), :4]
         self._record.append(kept.copy())
         self._recorded += len(kept)
@@ -285,9 +290,10 @@ class GrowingHold:
         """Reduce the hold to its sums; the samples of all holds may not fit into memory."""
         assert self._moments is not None
         record, self._record, self._waiting = np.concatenate(self._record), [], []
-        time, forces = record[:, 0], record[:, 1:]
-        slope = self._moments.products[0, 1:] / self._moments.products[0, 0]
-        about_line = forces - (time - time.mean())[:, None] * slope
+        moments = allan_moments(record)
+        forces = np.eye(4)[:, 1:]
+        about_line = forces.copy()
+        about_line[0] = -self._moments.products[0, 1:] / self._moments.products[0, 0]
         return Segment(
             self.start,
             self.start + self.n,
@@ -295,8 +301,8 @@ class GrowingHold:
             self.t1,
             self._moments,
             self._conditions,
-            (allan_moments(forces),),
-            (allan_moments(about_line),),
+            (moments.turned(forces),),
+            (moments.turned(about_line),),
         )
 
     def saturated(self) -> bool:

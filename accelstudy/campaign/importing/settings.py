@@ -66,7 +66,9 @@ class ImportSettings(LogLayout):
     range_mps2: Annotated[Positive, _LARGE] | None = Field(
         None, description="the sensor measures ± this"
     )
-    window_s: Positive = Field(1.0, description="length of the sliding window")
+    window_s: Positive | None = Field(
+        None, description="length of the sliding window; 1 s, or 9 samples if these last longer"
+    )
     threshold_mps2: Annotated[Positive, _LARGE] | None = Field(
         None, description="sd of a window at rest; chosen from the data if absent"
     )

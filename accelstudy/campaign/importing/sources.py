@@ -1,4 +1,4 @@
-"""Files of numbers in columns: text of any layout, MATLAB and Parquet, read a chunk at a time."""
+"""Files of numbers in columns: text of any layout, MATLAB, Parquet, bags and flight logs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 from itertools import islice
@@ -42,6 +42,8 @@ _PREVIEW = 65536  # characters of a text from which its layout is told
 _COMMENTS = "#%"
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
 _BUFFER = 2**20  # bytes of a Parquet column
+_IS_DATE = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?")
+_OF_ROS = re.compile(r"(.*[._/])?linear[_.]acceleration[._/]x", re.IGNORECASE)
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 
 
@@ -53,11 +55,15 @@ class Source(Protocol):
     path : Path
     names : list of str, of the columns; their places, counted from 0, where the file has no names
     named : bool, whether the file has names
+    dates : set of int, places of columns of dates with times, which `read` gives in s
+    layout : mapping, what the format says of the keys of `LogLayout`; empty for a plain table
     """
 
     path: Path
     names: list[str]
     named: bool
+    dates: Set[int]
+    layout: Mapping[str, Any]
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -74,26 +80,17 @@ class Source(Protocol):
         ...
 
 
-def open_source(path: str | Path, variable: str | None = None) -> Source:
-    """Open a file of numbers, by its ending and its first bytes."""
-    path = Path(path)
-    with readable(path), path.open("rb") as file:
-        start = file.read(128)
-    if not start:
-        raise InputError(f"{path}: the file is empty")
-    if path.suffix.lower() in (".parquet", ".pq"):
-        return ParquetSource(path)
-    if start.startswith(GZIP):
-        kind = Path(path.stem).suffix.lower()
-        if kind in (".parquet", ".pq", ".mat"):
-            raise InputError(f"{path}: unpack it first; only text is read from gzip")
-        return TextSource(path)
-    # An ASCII .mat has no zero bytes; every binary one has some in its header.
-    if path.suffix.lower() == ".mat" and 0 in start:
-        return MatlabSource(path, variable)
-    if start.startswith(b"\x89HDF"):
-        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7")
-    return TextSource(path)
+def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None) -> str:
+    """The one that is wanted, or the only one."""
+    if wanted is not None and wanted not in found:
+        raise UnknownNameError(f"{what} in {path}", wanted, found)
+    if wanted is None and len(found) != 1:
+        if not found:
+            raise InputError(f"{path}: no {what}")
+        raise InputError(
+            f"{path}: which {what}? There are {', '.join(found)}; give --variable {min(found)}"
+        )
+    return next(iter(found)) if wanted is None else wanted
 
 
 class TextSource:
@@ -110,6 +107,7 @@ class TextSource:
     quoted : bool, whether numbers stand in quotation marks
     first : int, lines before the data
     width : int, number of columns
+    dates, layout : see `Source`
     """
 
     def __init__(self, path: Path) -> None:
@@ -147,11 +145,14 @@ class TextSource:
         if first is None:
             raise InputError(f"{path}: no line of numbers at the beginning")
         self.first, self.width = first, usual
+        cells = split_line(lines[first], self.delimiter)
+        self.dates: Set[int] = {i for i, cell in enumerate(cells) if _IS_DATE.fullmatch(cell)}
         self.quoted = any('"' in line for line in lines[first:])
         self.comment = next((c for c in _COMMENTS for line in lines if line.lstrip()[:1] == c), "#")
         header = self._header(lines[:first])
         self.named = header is not None
         self.names = header or [str(i) for i in range(usual)]
+        self.layout = layout_by_names(self.names)
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -159,7 +160,6 @@ class TextSource:
         """Rows of some columns; see `Source`."""
         import pandas as pd
 
-        origins: list[Any] = []
         try:
             with (
                 self._readable(),
@@ -179,18 +179,7 @@ class TextSource:
                     chunksize=chunk_size,
                 ) as reader,
             ):
-                for chunk in _chunks(reader):
-                    if not len(chunk):
-                        continue
-                    # A surplus cell ends up in the column after the last.
-                    if chunk[self.width].notna().any():
-                        raise InputError(f"{self.path}: {self._odd_line()}")
-                    columns = [_numbers_of_text(chunk[place]) for place in places]
-                    origins = origins or [
-                        column[0] if place == clock else None
-                        for column, place in zip(columns, places, strict=True)
-                    ]
-                    yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+                yield from self._rows(_chunks(reader), places, clock)
         except InputError:
             raise
         except pd.errors.EmptyDataError:
@@ -199,6 +188,23 @@ class TextSource:
             if "inside string" in str(error):
                 raise InputError(f"{self.path}: a quotation mark opens and never closes") from None
             raise InputError(f"{self.path}: {self._odd_line()}") from None
+
+    def _rows(
+        self, chunks: Iterable[pd.DataFrame], places: Sequence[int], clock: int | None
+    ) -> Iterator[Array]:
+        def columns() -> Iterator[list[NDArray[Any]]]:
+            for chunk in chunks:
+                # A surplus cell ends up in the column after the last.
+                if chunk[self.width].notna().any():
+                    raise InputError(f"{self.path}: {self._odd_line()}")
+                yield [
+                    nanoseconds(chunk[place])
+                    if place in self.dates
+                    else _numbers_of_text(chunk[place])
+                    for place in places
+                ]
+
+        return rows_of(columns(), places, self.dates, clock)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """See `Source`; reads the file again, which only errors need."""
@@ -268,6 +274,11 @@ def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
         yield chunk
 
 
+def layout_by_names(names: Sequence[str]) -> Mapping[str, Any]:
+    """What the names of columns say: those of sensor_msgs/Imu stand for axes in flu (REP 103)."""
+    return {"frame": "flu"} if any(map(_OF_ROS.fullmatch, names)) else {}
+
+
 def split_line(line: str, delimiter: str | None) -> list[str]:
     """Cells of a line, without surrounding blanks and quotation marks."""
     if '"' in line and delimiter is not None:
@@ -315,41 +326,88 @@ def _numbers_of_text(column: pd.Series) -> NDArray[Any]:
     return numbers.to_numpy(dtype=float, na_value=np.nan)
 
 
-class MatlabSource:
-    """An array of a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
+def nanoseconds(column: pd.Series) -> NDArray[Any]:
+    """Dates with times as ns since 1970, NaN where there is none.
 
-    def __init__(self, path: Path, variable: str | None = None) -> None:
-        self.path = path
-        try:
-            with readable(path):
-                self.values = _matlab_array(path, variable)
-        except InputError:
-            raise
-        except NotImplementedError:
-            raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
-        except MemoryError:
-            raise InputError(
-                f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
-            ) from None
-        except Exception as error:  # SciPy's reader fails in many ways on a damaged file
-            raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
-        self.names = [str(i) for i in range(self.values.shape[1])]
-        self.named = False
+    One without a zone is in UTC, so that all of a column go together.
+    """
+    import pandas as pd
+
+    dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
+    numbers = dates.dt.as_unit("ns").astype("int64").to_numpy()
+    return np.where(dates.isna(), np.nan, numbers) if dates.isna().any() else numbers
+
+
+def rows_of(
+    chunks: Iterable[Sequence[NDArray[Any]]],
+    places: Sequence[int],
+    dates: Set[int],
+    clock: int | None,
+) -> Iterator[Array]:
+    """Columns of each chunk as rows of `Source.read`; dates in ns become s."""
+    origins: list[Any] = []
+    for columns in chunks:
+        if not len(columns[0]):
+            continue
+        origins = origins or [
+            column[0] if place == clock else None
+            for column, place in zip(columns, places, strict=True)
+        ]
+        each = zip(columns, origins, places, strict=True)
+        yield beside([since(c, zero) * (1e-9 if i in dates else 1) for c, zero, i in each])
+
+
+class ArraySource:
+    """An array (n, c) in memory, which was read as a whole.
+
+    Attributes
+    ----------
+    path, names, named, dates, layout : see `Source`
+    values : (n, c) array
+    """
+
+    dates: Set[int] = frozenset()
+
+    def __init__(
+        self,
+        path: Path,
+        values: NDArray[Any],
+        names: Sequence[str] = (),
+        layout: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.path, self.values, self.layout = path, values, layout or {}
+        self.named = bool(names)
+        self.names = list(names) or [str(i) for i in range(values.shape[1])]
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
     ) -> Iterator[Array]:
         """Rows of some columns; see `Source`."""
-        origins = [self.values[0, place] if place == clock else None for place in places]
-        for first in range(0, len(self.values), chunk_size):
-            rows = self.values[first : first + chunk_size]
-            yield np.column_stack(
-                [since(rows[:, place], zero) for place, zero in zip(places, origins, strict=True)]
-            )
+        starts = range(0, len(self.values), chunk_size)
+        chunks = (self.values[i : i + chunk_size] for i in starts)
+        columns = ([rows[:, place] for place in places] for rows in chunks)
+        return rows_of(columns, places, self.dates, clock)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
         return f"row {row + 1}", f"{self.values[row, place]:g}"
+
+
+def open_matlab(path: Path, variable: str | None = None) -> ArraySource:
+    """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
+    try:
+        with readable(path):
+            return ArraySource(path, _matlab_array(path, variable))
+    except InputError:
+        raise
+    except NotImplementedError:
+        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
+    except MemoryError:
+        raise InputError(
+            f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
+        ) from None
+    except Exception as error:  # SciPy's reader fails in many ways on a damaged file
+        raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
 
 
 def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
@@ -361,11 +419,7 @@ def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
         for name, shape, kind in whosmat(path)
         if _IS_NUMBER.fullmatch(kind) and len(shape) == 2 and all(shape)
     }
-    if variable is not None and variable not in arrays:
-        raise UnknownNameError(f"array of {path}", variable, arrays)
-    if variable is None and len(arrays) != 1:
-        raise InputError(f"{path}: which array? There are {', '.join(arrays) or 'none'}")
-    name = next(iter(arrays)) if variable is None else variable
+    name = chosen_of(path, "array", arrays, variable)
     array = loadmat(path, variable_names=[name])[name]
     if np.iscomplexobj(array):
         raise InputError(f"{path}: array {name} has complex numbers")
@@ -382,12 +436,22 @@ class ParquetSource:
     """Columns of a Parquet file."""
 
     def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+
         self.path = path
         with open_parquet(path) as file:
             schema = file.schema_arrow
+            first = next(file.iter_batches(1), None)
         self._columns, self._types = schema.names, schema.types
         self.names = [" ".join(name.split()) for name in schema.names]
         self.named = True
+        self.layout = layout_by_names(self.names)
+        self.dates: Set[int] = {
+            i
+            for i, kind in enumerate(schema.types)
+            if pa.types.is_timestamp(kind)
+            or (first and _IS_DATE.fullmatch(str(first.column(i)[0])))
+        }
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -397,22 +461,16 @@ class ParquetSource:
 
         for place in places:
             kind = self._types[place]
-            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+            is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+            if not is_number and place not in self.dates:
                 raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
             if self._columns.count(self._columns[place]) > 1:
                 raise InputError(f"{self.path}: there are several columns {self.names[place]!r}")
         names = [self._columns[place] for place in places]
         with open_parquet(self.path) as file:
-            origins: list[Any] = []
-            for batch in file.iter_batches(chunk_size, columns=names):
-                if not len(batch):
-                    continue
-                columns = [_numbers(batch.column(name)) for name in names]
-                origins = origins or [
-                    column[0] if place == clock else None
-                    for column, place in zip(columns, places, strict=True)
-                ]
-                yield np.column_stack([since(*c) for c in zip(columns, origins, strict=True)])
+            batches = file.iter_batches(chunk_size, columns=names)
+            columns = ([_numbers(batch.column(name)) for name in names] for batch in batches)
+            yield from rows_of(columns, places, self.dates, clock)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
@@ -424,12 +482,20 @@ class ParquetSource:
 
 
 def _numbers(column: pa.Array) -> NDArray[Any]:
-    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
+    """Numbers of a column, dates in ns, NaN where there is none; whole numbers stay integers."""
     import pyarrow as pa
 
+    kind = column.type
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        return nanoseconds(column.to_pandas())
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64(), safe=False)
     return column.to_numpy(zero_copy_only=False)
+
+
+def beside(columns: Sequence[Array]) -> Array:
+    """Columns (k,) as one array (k, c), each of them contiguous, as sums along them are faster."""
+    return np.array(columns).T
 
 
 def since(values: NDArray[Any], zero: Any) -> Array:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from tempfile import SpooledTemporaryFile
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +21,8 @@ from accelstudy.campaign.importing.recording import GAP, Recording
 Array = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 8, 10**6  # samples
+IN_MEMORY = 2**23
+"""Bytes of windows that are kept in memory."""
 FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
 QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
@@ -48,6 +53,11 @@ def surveyed(
     if threshold is not None:
         return [(survey, given_threshold(threshold)) for survey in surveys]
     return [(s, choose_threshold(s, log)) for s, log in zip(surveys, logs, strict=True)]
+
+
+def usual_window(log: Recording) -> float:
+    """Length of a window, s: 1 s, or 9 samples of a slow log if its unit of time is plausible."""
+    return 1.0 if log.likely_unit() else max(1.0, (_SMALLEST + 1) * log.step)
 
 
 def samples_in(log: Recording, window: float) -> int:
@@ -89,13 +99,13 @@ class Windows:
 def windows(log: Recording, width: int) -> Iterator[Windows]:
     """Windows of `width` samples (odd), sliding by one; none spans a gap."""
     half, piece, recording, row = width // 2, 0, 0, 0
-    times, values = np.empty(0), np.empty((0, 3 + len(log.conditions)))
+    times, values = np.empty(0), np.empty((0, 3 + len(log.conditions)), order="F")
     for rows in log.chunks():
         before = times[-1:] if len(times) else rows.time[:1]
         jumps = np.diff(rows.time, prepend=before) > GAP * log.step
         if rows.anew and row > 0:
             jumps[0], recording = True, recording + 1
-        chunk = np.column_stack([rows.forces, rows.conditions])
+        chunk = np.hstack([rows.forces, rows.conditions])
         edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(chunk)})
         for first, end in pairwise(edges):
             if jumps[first]:
@@ -113,8 +123,8 @@ def windows(log: Recording, width: int) -> Iterator[Windows]:
                 recording,
                 row - len(times) + half,
                 times[inside],
-                values[inside, :3],
-                values[inside, 3:],
+                np.asfortranarray(values[inside, :3]),
+                np.asfortranarray(values[inside, 3:]),
                 variance,
                 frozen,
             )
@@ -128,8 +138,11 @@ def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     sums, squares = (_window_sums(values, width) / width for values in (offsets, offsets**2))
     variance = np.maximum(squares - sums**2, 0.0)
     # Rounding may hide a variance of zero, so changes are counted.
-    changes = _window_sums(np.diff(forces, axis=0) != 0, width - 1)
-    return np.sqrt(np.sum(variance**2, axis=1)), np.any(changes == 0, axis=1)
+    changed = np.diff(forces, axis=0) != 0
+    frozen = np.zeros(len(variance), dtype=bool)
+    if not changed.all():
+        frozen = np.any(_window_sums(changed, width - 1) == 0, axis=1)
+    return np.sqrt(np.sum(variance**2, axis=1)), frozen
 
 
 def _window_sums(values: NDArray[Any], width: int) -> NDArray[Any]:
@@ -156,11 +169,45 @@ class Threshold:
     reason: str
 
 
+class KeptWindows:
+    """Windows of a log that are kept for a second reading, since to read text takes long.
+
+    They are kept in memory up to `IN_MEMORY` bytes, beyond that in a temporary file. Where that
+    has no room, the log is read again.
+    """
+
+    def __init__(self, log: Recording, width: int) -> None:
+        self._log, self._width = log, width
+        # It lives as long as the survey, which no block of code does.
+        self._file = SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115
+        finalize(self, self._file.close)
+        self._count = 0
+
+    def first(self) -> Iterator[Windows]:
+        """Read the log, and keep its windows."""
+        for batch in windows(self._log, self._width):
+            if self._count >= 0:
+                try:
+                    pickle.dump(batch, self._file, pickle.HIGHEST_PROTOCOL)
+                    self._count += 1
+                except OSError:
+                    self._count = -1
+            yield batch
+
+    def again(self) -> Iterator[Windows]:
+        """Yield the same windows as in the first reading."""
+        if self._count < 0:
+            yield from windows(self._log, self._width)
+        self._file.seek(0)
+        for _ in range(self._count):
+            yield pickle.load(self._file)
+
+
 class Survey:
     """Noise and extremes of a log, collected in a first pass over windows of `width` samples."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
+    def __init__(self, log: Recording, width: int) -> None:
+        self.width, self.kept = width, KeptWindows(log, width)
         self.counts = np.zeros(len(_BINS) - 1, dtype=int)
         self.total = self.frozen = self.gaps = 0
         self.span = (np.nan, np.nan)
@@ -188,6 +235,8 @@ class Survey:
 
 def _two_lowest(before: Array, forces: Array) -> Array:
     """Lowest value of each axis and the one next to it, (2, 3), with those before."""
+    if (forces.min(axis=0) >= before[1]).all():
+        return before
     candidates = np.vstack([before, forces])
     lowest = candidates.min(axis=0)
     return np.array([lowest, np.where(candidates > lowest, candidates, np.inf).min(axis=0)])
@@ -195,8 +244,8 @@ def _two_lowest(before: Array, forces: Array) -> Array:
 
 def survey_log(log: Recording, width: int) -> Survey:
     """Read a log once, in windows of `width` samples."""
-    survey = Survey(width)
-    for batch in track(windows(log, width), f"noise of {log.path.name}"):
+    survey = Survey(log, width)
+    for batch in track(survey.kept.first(), f"noise of {log.path.name}"):
         survey.add(batch)
     if not survey.total:
         raise InputError(

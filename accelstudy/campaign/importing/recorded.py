@@ -1,0 +1,171 @@
+"""Recordings of robots: bags of ROS 1 and 2, and flight logs of PX4 (ULog).
+
+Their libraries are extras, so they are imported where a file needs them. A recording of one sensor
+is held in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import warn
+from accelstudy.basics.wording import one_line
+from accelstudy.campaign.importing.sources import ArraySource, chosen_of
+from accelstudy.files.reading import readable
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import Connection
+
+Array = NDArray[np.float64]
+
+BAG_OF_FOLDER = "metadata.yaml"
+"""File by which a folder is a bag of ROS 2."""
+
+_IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
+_BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
+_SENSOR = "sensor_accel"
+_FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
+
+
+def open_bag(path: Path, topic: str | None = None) -> ArraySource:
+    """Read the forces of a bag; their frame is flu, or frd where its name ends in _ned (REP 103).
+
+    Parameters
+    ----------
+    path : .bag of ROS 1, folder of ROS 2, or the .db3 or .mcap in such a folder
+    topic : str, which one, if there are several of sensor_msgs/Imu
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, or there is no such topic, or several.
+    """
+    with _needed_for(path, "a bag of ROS", "rosbags", "ros"):
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    within = path.parent if path.suffix in (".db3", ".mcap") else path
+    if path.suffix in (".db3", ".mcap") and not (within / BAG_OF_FOLDER).is_file():
+        raise InputError(f"{path}: a bag of ROS 2 is a folder; {BAG_OF_FOLDER} is missing here")
+    try:
+        with (
+            readable(path),
+            AnyReader([within], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+        ):
+            topics = {c.topic: c for c in reader.connections if c.msgtype == _IMU}
+            name = chosen_of(path, "topic of sensor_msgs/Imu", topics, topic)
+            imu = [c for c in reader.connections if c.topic == name]
+            frame = next((each.header.frame_id for _, each in _messages(reader, imu)), "")
+            rows = _rows(reader, imu, 4, lambda each: _vector(each.linear_acceleration))
+            heat = _thermometer(reader, name)
+            measured = _rows(reader, heat, 2, lambda each: (each.temperature,))
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails in many ways
+        raise InputError(f"{path}: not a whole bag ({one_line(error)})") from None
+    columns = dict(_BAG_COLUMNS)
+    if len(measured):
+        rows = np.column_stack([rows, np.interp(rows[:, 0], *measured.T)])
+        columns["temperature"] = "temperature"
+    layout = {
+        "columns": columns,
+        "time": "time",
+        "unit": "m/s^2",
+        "time_unit": "s",
+        "frame": "frd" if frame.endswith("_ned") else "flu",
+    }
+    return ArraySource(path, rows, ["time", *columns.values()], layout)
+
+
+def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
+    """Messages with their times, s: their stamps, or when they were recorded if these are empty."""
+    for connection, received, raw in reader.messages(connections):
+        message: Any = reader.deserialize(raw, connection.msgtype)
+        stamp = message.header.stamp
+        nanoseconds = stamp.sec * 10**9 + stamp.nanosec or received
+        yield 1e-9 * nanoseconds, message
+
+
+def _rows(
+    reader: AnyReader,
+    connections: Sequence[Connection],
+    width: int,
+    values: Callable[[Any], tuple[float, ...]],
+) -> Array:
+    """Times, s, and values of messages, (n, width); no rows of a topic that is not there."""
+    messages = _messages(reader, connections) if connections else ()
+    rows = ((time, *values(message)) for time, message in messages)
+    return np.fromiter(rows, np.dtype((float, width)))
+
+
+def _vector(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
+    """The only topic of a temperature, or the only one beside the topic of the forces."""
+    found = [c for c in reader.connections if c.msgtype == _TEMPERATURE]
+    beside = [c for c in found if c.topic.rpartition("/")[0] == topic.rpartition("/")[0]]
+    return next((some for some in (found, beside) if len({c.topic for c in some}) == 1), [])
+
+
+def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
+    """Read the forces of a flight log.
+
+    Parameters
+    ----------
+    path : file
+    instance : str, which one, as "0", if several sensors were logged
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, or there is no such sensor, or several.
+    """
+    with _needed_for(path, "a flight log of PX4", "pyulog", "px4"):
+        from pyulog import ULog
+    try:
+        with readable(path), redirect_stdout(StringIO()):  # it prints what it thinks of a file
+            log = ULog(str(path), [_SENSOR])
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails in many ways
+        raise InputError(f"{path}: not a whole flight log ({one_line(error)})") from None
+    if log.file_corruption:
+        warn(f"{path}: parts of the flight log are damaged and left out")
+    sensors = {str(each.multi_id): each.data for each in log.data_list}
+    values = sensors[chosen_of(path, f"instance of {_SENSOR}", sensors, instance)]
+    # Microseconds since the start of the controller; older logs have only the time of the message.
+    time = values.get("timestamp_sample", values["timestamp"])
+    time = time if np.any(time) else values["timestamp"]
+    fields = {key: field for key, field in _FIELDS.items() if field in values}
+    columns = {key: f"{_SENSOR}.{field}" for key, field in fields.items()}
+    layout = {
+        "columns": columns,
+        "time": "time",
+        "unit": "m/s^2",
+        "time_unit": "s",
+        "frame": "frd",
+    }
+    rows = np.column_stack([1e-6 * time, *(values[field] for field in fields.values())])
+    return ArraySource(path, rows, ["time", *columns.values()], layout)
+
+
+@contextmanager
+def _needed_for(path: Path, what: str, library: str, extra: str) -> Iterator[None]:
+    """Import what reads a format; if it is missing, say what to install."""
+    try:
+        yield
+    except ImportError:
+        raise InputError(
+            f"{path}: {what} is read by the library {library}, which is not installed; "
+            f"pip install 'accelstudy[{extra}]'"
+        ) from None
