@@ -15,6 +15,7 @@ from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.plugins import load_plugins
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
@@ -130,6 +131,7 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     writes its base model in this way.
     """
     content = read_layer(path)
+    load_plugins(content, path)
     models: Any = content.get("models") or {}
     if not isinstance(models, Mapping):
         raise InputError(f"{path}: models: must be a mapping of names to lists of effects")
