@@ -24,6 +24,8 @@ from accelstudy.basics.errors import InputError
 PREFIX = "accelstudy."
 """What the groups of entry points begin with; the name of a room follows."""
 NOTHING = "registers nothing; expected a class or a function under @register"
+HOW = "; of a plug-in: name its file with --plugin"
+"""What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json")
 
 _files: dict[str, str] = {}

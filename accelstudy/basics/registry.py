@@ -77,7 +77,7 @@ class Registry(Generic[Item]):
         try:
             return self._all[name]
         except KeyError:
-            more = "" if self._room is None else "; of a plug-in: name its file with --plugin"
+            more = "" if self._room is None else plugins.HOW
             raise UnknownNameError(self.kind, name, self._all, more) from None
 
     def names(self) -> tuple[str, ...]:

@@ -195,7 +195,6 @@ def plugin_option(**options: Any) -> Callable[[Command], Command]:
         "--plugin",
         type=PATH,
         multiple=True,
-        is_eager=True,
         expose_value=False,
         callback=load,
         help="Python file with effects, schemes and the like of your own.",

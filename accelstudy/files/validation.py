@@ -138,7 +138,7 @@ class Block(BaseModel):
 class Configuration(Block):
     """A whole configuration, whose plug-ins are loaded before its other keys are read."""
 
-    plugins: OneOrMore[str] = Field(
+    plugins: Annotated[list[str], _OneOrMore()] = Field(
         default=[],
         description="Python files with effects, schemes and the like of your own, from the folder "
         "in which the workflow runs",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.plugins import HOW
 from accelstudy.basics.registry import Registry
 from accelstudy.positions.scheme import Scheme, Status
 from accelstudy.schemes.files import is_scheme_file, known_scheme, scheme_of_file
@@ -160,7 +161,7 @@ def _unknown(name: str) -> str:
     hint = f" Did you mean {close[0]!r}?" if close else ""
     return (
         f"unknown scheme {name!r}.{hint} Schemes: {', '.join(names)}; "
-        f"families: {', '.join(families)} (N from 1 to 9999)"
+        f"families: {', '.join(families)} (N from 1 to 9999){HOW}"
     )
 
 

@@ -231,7 +231,7 @@ def test_an_edit_of_the_package_runs_what_depends_on_it(single, tmp_path, monkey
 @pytest.mark.parametrize(("words", "config", "parts"), [
     (["--config", "seeed=1"],
      TINY,
-     ["seeed: unknown key; did you mean 'seed'?", "known: study, seed"]),
+     ["seeed: unknown key; did you mean 'seed'?", "known: plugins, study, seed"]),
     ([], {**TINY, "paper": True}, ["paper: true needs the block `sensitivity`"]),
     ([], "study: a\nseed: 1\nstudy: b\n",
      ["not valid YAML: line 3, column 1: the key 'study' stands twice"]),
