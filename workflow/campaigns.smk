@@ -67,6 +67,8 @@ rule public:
         attempt=lambda wildcards: next_attempt(placed(f"{RESULTS}/public/{wildcards.public}.json")),
     message:
         "Download the public data {wildcards.public}"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/public.py"
 
@@ -90,6 +92,8 @@ rule calibrate:
         code=code_of("calibrate"),
     message:
         "Calibrate {wildcards.campaign}"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/calibrate.py"
 
@@ -113,5 +117,7 @@ rule overview:
         code=code_of("overview"),
     message:
         "Summarise the campaigns"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/overview.py"

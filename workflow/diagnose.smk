@@ -42,6 +42,8 @@ rule simulate_campaign:
         code=code_of("simulate_campaign"),
     message:
         "Simulate the campaign"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/simulate_campaign.py"
 
@@ -69,5 +71,7 @@ rule diagnose:
         code=code_of("diagnose"),
     message:
         "Diagnose the campaign"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/diagnose.py"

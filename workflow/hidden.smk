@@ -71,6 +71,8 @@ rule hidden_plan:
         code=code_of("hidden_plan"),
     message:
         "Choose the campaigns to simulate"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_plan.py"
 
@@ -94,6 +96,8 @@ rule hidden_diagnose:
         code=code_of("hidden_diagnose"),
     message:
         "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_diagnose.py"
 
@@ -115,6 +119,8 @@ rule hidden_baselines:
         code=code_of("hidden_baselines"),
     message:
         "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_baselines.py"
 
@@ -142,5 +148,7 @@ rule hidden_score:
         code=code_of("hidden_score"),
     message:
         "Score the diagnoses of all campaigns"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_score.py"

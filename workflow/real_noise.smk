@@ -46,6 +46,8 @@ rule real_noise_log:
         code=code_of("real_noise_log"),
     message:
         "Put effects into {wildcards.log}, and diagnose it"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/real_noise_log.py"
 
@@ -67,5 +69,7 @@ rule real_noise_score:
         code=code_of("real_noise_score"),
     message:
         "Score the diagnoses of all logs"
+    conda:
+        "envs/accelstudy.yaml"
     script:
         "scripts/real_noise_score.py"

@@ -25,5 +25,7 @@ rule designs:
         code=code_of("designs"),
     message:
         "Compare position schemes with optimal designs"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/designs.py"

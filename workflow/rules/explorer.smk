@@ -31,5 +31,7 @@ rule explorer:
         code=code_of("explorer"),
     message:
         "Make the explorer of the study"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/explorer.py"

@@ -23,5 +23,7 @@ rule field:
         code=code_of("field"),
     message:
         "Work out which errors the variance of roll and pitch comes from: {wildcards.case}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/field.py"

@@ -19,6 +19,8 @@ rule figures:
         code=code_of("figures"),
     message:
         "Draw the figures of the calibrations"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/figures.py"
 

@@ -20,6 +20,8 @@ rule sensitivity:
         code=code_of("sensitivity"),
     message:
         "Analyse the sensitivity of roll and pitch"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/sensitivity.py"
 
@@ -50,5 +52,7 @@ rule claims:
         code=code_of("claims"),
     message:
         "Check the paper's claims against the Monte Carlo"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/claims.py"

@@ -26,6 +26,8 @@ rule plan:
         code=code_of("plan"),
     message:
         "Plan the calibration {wildcards.plan}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/plan.py"
 
@@ -49,5 +51,7 @@ rule plan_sensors:
         code=code_of("plan_sensors"),
     message:
         "Compare the sensors"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/plan_sensors.py"

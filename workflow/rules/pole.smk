@@ -29,5 +29,7 @@ rule pole:
         code=code_of("pole"),
     message:
         "Work out the error of the pole's foot: {wildcards.pole}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/pole.py"

@@ -24,6 +24,8 @@ rule sequential_sessions:
         code=code_of("sequential_sessions"),
     message:
         "Simulate sessions that choose their positions: {wildcards.approach}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/sequential_sessions.py"
 
@@ -50,5 +52,7 @@ rule sequential:
         code=code_of("sequential_summary"),
     message:
         "Summarise how many positions the promised accuracy takes, and how often it is reached"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/sequential_summary.py"

@@ -13,6 +13,8 @@ rule simulate:
         code=code_of("simulate"),
     message:
         "Simulate and calibrate batch {wildcards.part}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/simulate.py"
 
@@ -37,5 +39,7 @@ rule rare:
         code=code_of("rare"),
     message:
         "Simulate rare tilt errors of batch {wildcards.batch}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/rare.py"

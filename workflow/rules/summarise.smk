@@ -19,6 +19,8 @@ rule summarise:
         code=code_of("summarise"),
     message:
         "Work out sds, correlations and tilt errors of batch {wildcards.batch}"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/summarise.py"
 
@@ -39,5 +41,7 @@ rule collect:
         code=code_of("collect"),
     message:
         "Join the tables of all batches"
+    conda:
+        "../envs/accelstudy.yaml"
     script:
         "../scripts/collect.py"
