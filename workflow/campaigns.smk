@@ -62,13 +62,13 @@ rule public:
     log:
         f"{RESULTS}/logs/public/{{public}}.log",
     localrule: True
+    conda:
+        "envs/accelstudy.yaml"
     params:
         folder=BATCH.public_folder,
         attempt=lambda wildcards: next_attempt(placed(f"{RESULTS}/public/{wildcards.public}.json")),
     message:
         "Download the public data {wildcards.public}"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/public.py"
 
@@ -82,6 +82,8 @@ rule calibrate:
         f"{RESULTS}/logs/campaigns/{{campaign}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/campaigns/{{campaign}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -92,8 +94,6 @@ rule calibrate:
         code=code_of("calibrate"),
     message:
         "Calibrate {wildcards.campaign}"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/calibrate.py"
 
@@ -109,6 +109,8 @@ rule overview:
         f"{RESULTS}/logs/overview.log",
     benchmark:
         f"{RESULTS}/benchmarks/overview.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -117,7 +119,5 @@ rule overview:
         code=code_of("overview"),
     message:
         "Summarise the campaigns"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/overview.py"

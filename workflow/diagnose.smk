@@ -34,6 +34,8 @@ rule simulate_campaign:
         f"{RESULTS}/logs/simulate_campaign.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate_campaign.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -42,8 +44,6 @@ rule simulate_campaign:
         code=code_of("simulate_campaign"),
     message:
         "Simulate the campaign"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/simulate_campaign.py"
 
@@ -57,6 +57,8 @@ rule diagnose:
         f"{RESULTS}/logs/diagnose.log",
     benchmark:
         f"{RESULTS}/benchmarks/diagnose.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -71,7 +73,5 @@ rule diagnose:
         code=code_of("diagnose"),
     message:
         "Diagnose the campaign"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/diagnose.py"

@@ -63,6 +63,8 @@ rule hidden_plan:
         f"{RESULTS}/logs/plan.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(4000),
@@ -71,8 +73,6 @@ rule hidden_plan:
         code=code_of("hidden_plan"),
     message:
         "Choose the campaigns to simulate"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_plan.py"
 
@@ -88,6 +88,8 @@ rule hidden_diagnose:
         f"{RESULTS}/logs/diagnose/{{chunk}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/diagnose/{{chunk}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -96,8 +98,6 @@ rule hidden_diagnose:
         code=code_of("hidden_diagnose"),
     message:
         "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_diagnose.py"
 
@@ -111,6 +111,8 @@ rule hidden_baselines:
         f"{RESULTS}/logs/baselines/{{chunk}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/baselines/{{chunk}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -119,8 +121,6 @@ rule hidden_baselines:
         code=code_of("hidden_baselines"),
     message:
         "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_baselines.py"
 
@@ -139,6 +139,8 @@ rule hidden_score:
         f"{RESULTS}/logs/score.log",
     benchmark:
         f"{RESULTS}/benchmarks/score.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -148,7 +150,5 @@ rule hidden_score:
         code=code_of("hidden_score"),
     message:
         "Score the diagnoses of all campaigns"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/hidden_score.py"

@@ -38,6 +38,8 @@ rule real_noise_log:
         f"{RESULTS}/logs/{{log}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/{{log}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -46,8 +48,6 @@ rule real_noise_log:
         code=code_of("real_noise_log"),
     message:
         "Put effects into {wildcards.log}, and diagnose it"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/real_noise_log.py"
 
@@ -62,6 +62,8 @@ rule real_noise_score:
         f"{RESULTS}/logs/score.log",
     benchmark:
         f"{RESULTS}/benchmarks/score.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -69,7 +71,5 @@ rule real_noise_score:
         code=code_of("real_noise_score"),
     message:
         "Score the diagnoses of all logs"
-    conda:
-        "envs/accelstudy.yaml"
     script:
         "scripts/real_noise_score.py"

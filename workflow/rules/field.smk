@@ -14,6 +14,8 @@ rule field:
         f"{RESULTS}/logs/field/{{case}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/field/{{case}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -23,7 +25,5 @@ rule field:
         code=code_of("field"),
     message:
         "Work out which errors the variance of roll and pitch comes from: {wildcards.case}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/field.py"

@@ -11,6 +11,8 @@ rule sensitivity:
         f"{RESULTS}/benchmarks/sensitivity.tsv"
     # What waits for it takes longer than all else that is left.
     priority: 2
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -20,8 +22,6 @@ rule sensitivity:
         code=code_of("sensitivity"),
     message:
         "Analyse the sensitivity of roll and pitch"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/sensitivity.py"
 
@@ -45,6 +45,8 @@ rule claims:
         f"{RESULTS}/logs/claims.log",
     benchmark:
         f"{RESULTS}/benchmarks/claims.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -52,7 +54,5 @@ rule claims:
         code=code_of("claims"),
     message:
         "Check the paper's claims against the Monte Carlo"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/claims.py"

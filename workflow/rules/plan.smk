@@ -15,6 +15,8 @@ rule plan:
         f"{RESULTS}/logs/plan/cases/{{plan}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan/cases/{{plan}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -26,8 +28,6 @@ rule plan:
         code=code_of("plan"),
     message:
         "Plan the calibration {wildcards.plan}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/plan.py"
 
@@ -41,6 +41,8 @@ rule plan_sensors:
         f"{RESULTS}/logs/plan/sensors.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan/sensors.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -51,7 +53,5 @@ rule plan_sensors:
         code=code_of("plan_sensors"),
     message:
         "Compare the sensors"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/plan_sensors.py"

@@ -20,6 +20,8 @@ rule pole:
         f"{RESULTS}/logs/pole/{{pole}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/pole/{{pole}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -29,7 +31,5 @@ rule pole:
         code=code_of("pole"),
     message:
         "Work out the error of the pole's foot: {wildcards.pole}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/pole.py"

@@ -15,6 +15,8 @@ rule sequential_sessions:
         f"{RESULTS}/benchmarks/sequential/{{approach}}.tsv"
     wildcard_constraints:
         approach="|".join(SEQUENTIAL.approaches),
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -24,8 +26,6 @@ rule sequential_sessions:
         code=code_of("sequential_sessions"),
     message:
         "Simulate sessions that choose their positions: {wildcards.approach}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/sequential_sessions.py"
 
@@ -43,6 +43,8 @@ rule sequential:
         f"{RESULTS}/logs/sequential/summary.log",
     benchmark:
         f"{RESULTS}/benchmarks/sequential/summary.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -52,7 +54,5 @@ rule sequential:
         code=code_of("sequential_summary"),
     message:
         "Summarise how many positions the promised accuracy takes, and how often it is reached"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/sequential_summary.py"

@@ -5,6 +5,8 @@ rule simulate:
         f"{RESULTS}/logs/simulate/{{part}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),
@@ -13,8 +15,6 @@ rule simulate:
         code=code_of("simulate"),
     message:
         "Simulate and calibrate batch {wildcards.part}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/simulate.py"
 
@@ -26,6 +26,8 @@ rule rare:
         f"{RESULTS}/logs/rare/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/rare/{{batch}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),
@@ -39,7 +41,5 @@ rule rare:
         code=code_of("rare"),
     message:
         "Simulate rare tilt errors of batch {wildcards.batch}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/rare.py"

@@ -7,6 +7,8 @@ rule summarise:
         f"{RESULTS}/logs/summarise/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),
@@ -19,8 +21,6 @@ rule summarise:
         code=code_of("summarise"),
     message:
         "Work out sds, correlations and tilt errors of batch {wildcards.batch}"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/summarise.py"
 
@@ -34,6 +34,8 @@ rule collect:
         f"{RESULTS}/logs/collect.log",
     benchmark:
         f"{RESULTS}/benchmarks/collect.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -41,7 +43,5 @@ rule collect:
         code=code_of("collect"),
     message:
         "Join the tables of all batches"
-    conda:
-        "../envs/accelstudy.yaml"
     script:
         "../scripts/collect.py"
