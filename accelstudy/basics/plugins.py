@@ -24,14 +24,12 @@ from accelstudy.basics.errors import InputError
 PREFIX = "accelstudy."
 """What the groups of entry points begin with; the name of a room follows."""
 NOTHING = "registers nothing; expected a class or a function under @register"
-HOW = "; of a plug-in: name its file with --plugin"
+HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under plugins"
 """What a message adds to the names that are known."""
 _CODE = (".py", ".yaml", ".yml", ".json")
 
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
-_packages: dict[str, str] = {}
-"""Digest by name, of the packages that are loaded."""
 _loading: list[str] = []
 """Names of what is being loaded, the innermost last; empty for accelstudy itself."""
 _sources: dict[tuple[str, str], str] = {}
@@ -109,9 +107,9 @@ def as_a_key() -> dict[str, Any]:
 
 
 def provenance() -> dict[str, Any]:
-    """Digests of all that is loaded, as part of a provenance; empty without any."""
-    loaded = {**_files, **_packages}
-    return {"plugins": loaded} if loaded else {}
+    """Digests of all plug-ins as part of a provenance; empty without any."""
+    found = digests()
+    return {"plugins": found} if found else {}
 
 
 def load_installed(room: str) -> None:
@@ -126,7 +124,6 @@ def load_installed(room: str) -> None:
         if point.module not in sys.modules:
             with one_line(label(point), *_folders(point)), _registering(label(point)):
                 point.load()
-        _packages[label(point)] = _digest_of(point)
 
 
 def installed(room: str) -> list[EntryPoint]:

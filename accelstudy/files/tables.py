@@ -54,7 +54,7 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
 
     `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
     `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added, and digests of
-    the plug-ins that are loaded.
+    the plug-ins that there are.
     """
     return {
         **provenance,

@@ -23,7 +23,7 @@ def forgotten():
     """Forget all that is registered within the block; installed packages are looked for again."""
     rooms = ("effects", "noise_effects", "schemes", "approaches")
     changed = [registry._items for registry in REGISTRIES]
-    changed += [plugins._files, plugins._packages, plugins._sources]
+    changed += [plugins._files, plugins._sources]
     before = [dict(each) for each in changed]
     for registry, room in zip(REGISTRIES, rooms, strict=True):
         registry._room = room
