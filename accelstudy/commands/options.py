@@ -197,7 +197,8 @@ def plugin_option(**options: Any) -> Callable[[Command], Command]:
         multiple=True,
         expose_value=False,
         callback=load,
-        help="Python file with effects, schemes and the like of your own.",
+        help="Python file with effects, schemes and the like of your own; it may also be named "
+        "after the command.",
         **options,
     )
 
