@@ -13,10 +13,10 @@ import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec, module_from_spec
+from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from accelstudy.basics.errors import InputError
@@ -86,7 +86,7 @@ def _load_file(path: Path) -> None:
     if digest in _files.values():
         return
     # Under a name that nobody else has, and without a copy in __pycache__ that may be old.
-    module = module_from_spec(ModuleSpec(f"plugin_{digest}", None, origin=str(path)))
+    module = ModuleType(f"plugin_{digest}")
     module.__file__ = str(path)
     with one_line(str(path), path):
         code = compile(content, str(path), "exec")
