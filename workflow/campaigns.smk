@@ -62,6 +62,8 @@ rule public:
     log:
         f"{RESULTS}/logs/public/{{public}}.log",
     localrule: True
+    conda:
+        "envs/accelstudy.yaml"
     params:
         folder=BATCH.public_folder,
         attempt=lambda wildcards: next_attempt(placed(f"{RESULTS}/public/{wildcards.public}.json")),
@@ -80,6 +82,8 @@ rule calibrate:
         f"{RESULTS}/logs/campaigns/{{campaign}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/campaigns/{{campaign}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -105,6 +109,8 @@ rule overview:
         f"{RESULTS}/logs/overview.log",
     benchmark:
         f"{RESULTS}/benchmarks/overview.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),

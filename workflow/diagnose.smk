@@ -34,6 +34,8 @@ rule simulate_campaign:
         f"{RESULTS}/logs/simulate_campaign.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate_campaign.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -55,6 +57,8 @@ rule diagnose:
         f"{RESULTS}/logs/diagnose.log",
     benchmark:
         f"{RESULTS}/benchmarks/diagnose.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),

@@ -63,6 +63,8 @@ rule hidden_plan:
         f"{RESULTS}/logs/plan.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(4000),
@@ -86,6 +88,8 @@ rule hidden_diagnose:
         f"{RESULTS}/logs/diagnose/{{chunk}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/diagnose/{{chunk}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -107,6 +111,8 @@ rule hidden_baselines:
         f"{RESULTS}/logs/baselines/{{chunk}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/baselines/{{chunk}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -133,6 +139,8 @@ rule hidden_score:
         f"{RESULTS}/logs/score.log",
     benchmark:
         f"{RESULTS}/benchmarks/score.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),

@@ -38,6 +38,8 @@ rule real_noise_log:
         f"{RESULTS}/logs/{{log}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/{{log}}.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -60,6 +62,8 @@ rule real_noise_score:
         f"{RESULTS}/logs/score.log",
     benchmark:
         f"{RESULTS}/benchmarks/score.tsv"
+    conda:
+        "envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),

@@ -38,7 +38,7 @@ class Approach:
         return tuple(a - b for a, b in zip(f, force, strict=True))
 
 
-_registry: Registry[Approach] = Registry("approach")
+_registry: Registry[Approach] = Registry("approach", "approaches")
 get_approach = _registry.get
 approach_names = _registry.names
 register = _registry.register

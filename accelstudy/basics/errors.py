@@ -40,10 +40,10 @@ def shown(value: object) -> str:
 
 
 class UnknownNameError(InputError):
-    """A name that no registry has; the message lists those that there are."""
+    """A name that no registry has; the message lists those that there are, and `more` to know."""
 
-    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: object, known: Iterable[str], more: str = "") -> None:
         known = tuple(known)
         near = difflib.get_close_matches(name[:100] if isinstance(name, str) else "", known, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        super().__init__(f"unknown {kind} {shown(name)}{hint} (known: {', '.join(known)})")
+        super().__init__(f"unknown {kind} {shown(name)}{hint} (known: {', '.join(known)}{more})")

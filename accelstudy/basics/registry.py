@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
+from accelstudy.basics import plugins
 from accelstudy.basics.errors import InputError, UnknownNameError
 
 Item = TypeVar("Item")
@@ -24,22 +25,39 @@ class Registry(Generic[Item]):
     ----------
     kind : str
         What the items are, for messages.
+    room : str, optional
+        Room of the package for which installed packages may have items, too.
+    check : function, optional
+        Raises `InputError` if an item of a plug-in cannot be used.
     """
 
-    def __init__(self, kind: str) -> None:
+    def __init__(
+        self, kind: str, room: str | None = None, check: Callable[[Item], None] | None = None
+    ) -> None:
         self.kind = kind
+        self._room, self._check = room, check
         self._items: dict[str, Item] = {}
         self._unlisted: frozenset[str] = frozenset()
 
     def check_free(self, name: str) -> None:
-        """Raise `ValueError` if the name is taken."""
+        """Raise `InputError` if the name is taken."""
         if name in self._items:
-            raise ValueError(f"{self.kind} {name!r} is registered twice")
+            raise InputError(f"the {self.kind} {name!r} is there already; choose another name")
 
     def add(self, name: str, item: Item) -> None:
-        """Register an item; raise `ValueError` if its name is taken."""
+        """Register an item; raise `InputError` if its name is taken."""
         self.check_free(name)
+        if plugins.registered(self.kind, name) and self._check:
+            self._check(item)
         self._items[name] = item
+
+    @property
+    def _all(self) -> dict[str, Item]:
+        """All items; those of installed packages are looked for when one is first asked for."""
+        if self._room:
+            room, self._room = self._room, ""
+            plugins.load_installed(room)
+        return self._items
 
     def register(self, kind: Kind) -> Kind:
         """Class decorator: enter one object of a class into the registry under its name."""
@@ -52,18 +70,19 @@ class Registry(Generic[Item]):
         return self.register(kind)
 
     def __contains__(self, name: str) -> bool:
-        return name in self._items
+        return name in self._all
 
     def get(self, name: str) -> Item:
         """Return the item of that name; raise `UnknownNameError` if there is none."""
         try:
-            return self._items[name]
+            return self._all[name]
         except KeyError:
-            raise UnknownNameError(self.kind, name, self._items) from None
+            more = "" if self._room is None else plugins.HOW
+            raise UnknownNameError(self.kind, name, self._all, more) from None
 
     def names(self) -> tuple[str, ...]:
         """Names of all items."""
-        return tuple(name for name in self._items if name not in self._unlisted)
+        return tuple(name for name in self._all if name not in self._unlisted)
 
     @contextmanager
     def without(self, names: Collection[str]) -> Iterator[None]:
@@ -166,6 +185,12 @@ ItemWithSettings = TypeVar("ItemWithSettings", bound=WithSettings)
 class RegistryWithSettings(Registry[ItemWithSettings]):
     """Things found by their name, or by their name and settings: ``warm_up(tau=300)``."""
 
+    def add(self, name: str, item: ItemWithSettings) -> None:
+        """Register an item; raise `InputError` if its name is taken or is no word."""
+        if not re.fullmatch(r"\w+", name):
+            raise InputError(f"{self.kind} {name!r}: a name has letters, digits and _ only")
+        super().add(name, item)
+
     def get(self, spec: str) -> ItemWithSettings:
         """Return the item of that name, with the settings that are given.
 
@@ -202,5 +227,6 @@ class RegistryWithSettings(Registry[ItemWithSettings]):
 
 def import_modules(package: str, path: Iterable[str]) -> None:
     """Import all modules of a package, so that what they register is known."""
-    for module in iter_modules(path):
-        import_module(f"{package}.{module.name}")
+    with plugins.loading():
+        for module in iter_modules(path):
+            import_module(f"{package}.{module.name}")

@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 from accelstudy.basics.names import LONGEST
+from accelstudy.basics.plugins import loaded_files
 
 HERE = "calibration.json"
 """Name of a calibration file, as pages mention it."""
@@ -66,4 +67,5 @@ def _of_campaign(
 def _line(*parts: str | Path) -> str:
     """A command; a path that begins with a dash is not to be taken for an option."""
     words = [f"./{p}" if isinstance(p, Path) and str(p).startswith("-") else str(p) for p in parts]
-    return shlex.join(["accelstudy", *words])
+    options = [word for path in loaded_files() for word in ("--plugin", path)]
+    return shlex.join(["accelstudy", *options, *words])

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from accelstudy.basics.plugins import source_of
 from accelstudy.basics.registry import WithSettings
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.campaign.gross_errors import GrossError, get_gross_error, gross_error_names
@@ -67,6 +68,8 @@ def _head(item: WithSettings, equation: str) -> Iterator[str]:
     yield f"{item.name}: {equation}"
     if item.summary:
         yield f"{INDENT}{item.summary}"
+    if source := source_of(item.kind, item.name):
+        yield f"{INDENT}of the plug-in {source}"
 
 
 def _settings(item: WithSettings) -> Iterator[str]:

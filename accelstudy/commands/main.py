@@ -28,7 +28,7 @@ from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
 from accelstudy.commands.lot import lot_command
 from accelstudy.commands.models import models_command
-from accelstudy.commands.options import ANGLE_UNIT
+from accelstudy.commands.options import ANGLE_UNIT, plugin_option
 from accelstudy.commands.plan import plan_command
 from accelstudy.commands.pole import pole_command
 from accelstudy.commands.public import public_command
@@ -114,6 +114,7 @@ class Commands(click.Group):
     show_envvar=True,
     help="Unit in which commands, pages and figures show angles, gon or deg.",
 )
+@plugin_option()
 @click.pass_context
 def main(ctx: click.Context, angle_unit: str) -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
@@ -126,3 +127,8 @@ def main(ctx: click.Context, angle_unit: str) -> None:
     reaches the accuracy or the command was broken off, and 2 if an input or an option is wrong.
     """
     ctx.with_resource(angles_in(angle_unit))
+
+
+# After the command's name it is taken, too, without a line in the help of each.
+for command in main.commands.values():
+    plugin_option(hidden=True)(command)

@@ -182,6 +182,27 @@ def quiet_option(command: Command) -> Command:
     return within  # type: ignore[return-value]
 
 
+def plugin_option(**options: Any) -> Callable[[Command], Command]:
+    """Add --plugin; the files are loaded before anything else of the command is looked at."""
+
+    def load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -> None:
+        if paths and not ctx.resilient_parsing:
+            from accelstudy.basics.plugins import load_files
+
+            load_files(paths)
+
+    return click.option(
+        "--plugin",
+        type=PATH,
+        multiple=True,
+        expose_value=False,
+        callback=load,
+        help="Python file with effects, schemes and the like of your own; it may also be named "
+        "after the command.",
+        **options,
+    )
+
+
 def log_options(command: Command) -> Command:
     """Add the options that say how the numbers of a log are read, in the order of the help."""
     for name, help_text in {

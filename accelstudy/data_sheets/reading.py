@@ -1,4 +1,4 @@
-"""Data sheets from YAML: those of the package, and the user's own."""
+"""Data sheets from YAML: those of the package, of installed packages, and the user's own."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
+from accelstudy.basics.plugins import installed, label, one_line
 from accelstudy.basics.units import parse_quantity
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
 from accelstudy.files.reading import read_layer
@@ -21,10 +22,8 @@ DENSITY = "noise_density"
 
 
 def data_sheet_names() -> tuple[str, ...]:
-    """Names of the sensors of the package."""
-    return tuple(
-        sorted(f.name.removesuffix(".yaml") for f in _folder().iterdir() if ".yaml" in f.name)
-    )
+    """Names of the sensors of this package, and of installed ones that have some."""
+    return tuple(sorted(_files()))
 
 
 def get_data_sheet(name_or_path: str | Path) -> DataSheet:
@@ -42,7 +41,7 @@ def get_data_sheet(name_or_path: str | Path) -> DataSheet:
     text = str(name_or_path)
     if text.endswith((".yaml", ".yml")) or os.sep in text or "/" in text:
         return read_data_sheet(text)
-    if text not in data_sheet_names():
+    if text not in _files():
         raise UnknownNameError("sensor", text, data_sheet_names())
     return _shipped(text)
 
@@ -118,10 +117,25 @@ def _quantity(key: str, given: Any) -> tuple[float, str]:
     return size, where
 
 
-def _folder() -> Any:
-    return files("accelstudy.data_sheets")
+@cache
+def _files() -> dict[str, Path]:
+    """File of each sensor by its name; a package names the folder of its own as entry point."""
+    found = _files_of("accelstudy.data_sheets")
+    for point in installed("data_sheets"):
+        with one_line(label(point)):
+            own = _files_of(point.module)
+            if not own:
+                raise InputError("no data sheet (*.yaml) lies in this package")
+            if taken := own.keys() & found.keys():
+                raise InputError(f"the sensor {min(taken)!r} is there already; choose another name")
+            found |= own
+    return found
+
+
+def _files_of(package: str) -> dict[str, Path]:
+    return {Path(f.name).stem: Path(str(f)) for f in files(package).iterdir() if ".yaml" in f.name}
 
 
 @cache
 def _shipped(name: str) -> DataSheet:
-    return read_data_sheet(str(_folder() / f"{name}.yaml"))
+    return read_data_sheet(_files()[name])

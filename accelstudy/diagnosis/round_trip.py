@@ -18,7 +18,7 @@ from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.config_names import ModelName
-from accelstudy.files.validation import Block, Seed, Sessions, checked
+from accelstudy.files.validation import Configuration, Seed, Sessions, checked
 from accelstudy.sensors.models import get_model
 
 
@@ -33,7 +33,7 @@ def _known_settings(value: Any) -> Any:
 Settings = Annotated[CampaignSettings, BeforeValidator(_known_settings)]
 
 
-class RoundTrip(Block):
+class RoundTrip(Configuration):
     """A simulated campaign and its diagnosis; results go to ``results/<name of the campaign>``."""
 
     campaign: Settings = Field(description="settings of the simulated campaign, SI")

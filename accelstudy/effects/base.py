@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.registry import RegistryWithSettings, WithSettings
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects.components import AXES, ZERO_MATRIX, ZERO_VECTOR, Matrix, Number, Vector
@@ -196,7 +196,33 @@ def _part(kind: type[Effect], kept: tuple[int, ...]) -> type[Effect]:
     return type(kind.__name__, (kind,), content)
 
 
-_registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect")
+def _check(effect: Effect) -> None:
+    """Check an effect of a plug-in as far as its formula tells, as tests do with all others.
+
+    Raises
+    ------
+    InputError
+        If it has a parameter of another effect, a wrong number of components, or a formula that is
+        not linear in its parameters.
+    """
+    name = f"effect {effect.name!r}"
+    for other in map(get_effect, effect_names()):
+        if taken := {p.name for p in effect.parameters} & {p.name for p in other.parameters}:
+            raise InputError(f"{name}: {min(taken)} is a parameter of {other.name!r} already")
+    output, axes, reading = expressions(effect)
+    entries = [entry for row in axes for entry in row]
+    components = {"output": (output, 3), "axes": (entries, 9), "reading": (reading, 2)}
+    for method, (parts, number) in components.items():
+        if len(parts) != number:
+            raise InputError(f"{name}: {method} has {len(parts)} components, not {number}")
+    own = symbols(*(parameter.name for parameter in effect.parameters))
+    zero = dict.fromkeys(own, 0)
+    for part in map(sp.sympify, (*output, *entries, *reading)):
+        if part.xreplace(zero) != 0 or any(part.diff(p).free_symbols & {*own} for p in own):
+            raise InputError(f"{name}: {_text(part)} is not linear in {', '.join(map(str, own))}")
+
+
+_registry: RegistryWithSettings[Effect] = RegistryWithSettings("effect", "effects", _check)
 effect_names = _registry.names
 register = _registry.register
 unlisted = _registry.unlisted

@@ -93,7 +93,8 @@ PLAN = Kind(
 STUDY = Kind(
     "study",
     "Snakefile",
-    ("README.md", "config/config.yaml", "profiles/default/config.yaml"),
+    ("README.md", "config/config.yaml", "sensor.yaml"),
+    ("profiles", "campaigns/example"),
     replaced=False,
 )
 _KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON, LOT)

@@ -138,7 +138,7 @@ def config_hash(config: Mapping[str, Any]) -> str:
     ----------
     config : mapping, the whole configuration with its defaults, as plain data
     """
-    unused = {"angle_unit"} if config.get("schemes") else {"angle_unit", "schemes"}
+    unused = {"angle_unit", "plugins"} | (set() if config.get("schemes") else {"schemes"})
     content = {key: value for key, value in config.items() if key not in unused}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from accelstudy import __version__
+from accelstudy.basics import plugins
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import parquet_file, read_frame, whole_parquet, write_parquet
@@ -52,13 +53,15 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance that is written into each file.
 
     `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
-    `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added.
+    `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added, and digests of
+    the plug-ins that there are.
     """
     return {
         **provenance,
         "version": __version__,
         "commit": git_commit(),
         **{name: _version(name) for name in LIBRARIES},
+        **plugins.provenance(),
     }
 
 

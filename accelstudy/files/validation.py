@@ -15,6 +15,7 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     ValidationError,
+    model_validator,
 )
 from pydantic import GetJsonSchemaHandler as JsonHandler
 from pydantic.fields import FieldInfo
@@ -24,6 +25,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.names import check_path_name
+from accelstudy.basics.plugins import load_plugins
 
 
 def _no_truth_value(value: Any) -> Any:
@@ -131,6 +133,23 @@ class Block(BaseModel):
     """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+
+
+class Configuration(Block):
+    """A whole configuration, whose plug-ins are loaded before its other keys are read."""
+
+    plugins: Annotated[list[str], _OneOrMore()] = Field(
+        default=[],
+        description="Python files with effects, schemes and the like of your own, from the folder "
+        "in which the workflow runs",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _load_plugins(cls, content: Any) -> Any:
+        if isinstance(content, Mapping):
+            load_plugins(content)
+        return content
 
 
 def checked(

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import accelstudy
+from accelstudy.basics import plugins
 
 _FOR_TYPES = re.compile(r"^if \(?\s*TYPE_CHECKING\s*\)?:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
 _FROM = re.compile(r"^[ \t]*from (accelstudy[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
@@ -21,7 +22,7 @@ def code_hash(script: str | Path) -> str:
     """Hash of the package's files on which a script of the workflow depends.
 
     Snakemake notices that a script has changed, but not that a package has. With this hash as a
-    parameter of a rule it does.
+    parameter of a rule it does. What depends on a registry depends on the user's plug-ins, too.
 
     Parameters
     ----------
@@ -29,8 +30,11 @@ def code_hash(script: str | Path) -> str:
     """
     root = Path(accelstudy.__file__).parent
     digest = hashlib.sha256()
-    for path in sorted(code_files(script)):
+    files = sorted(code_files(script))
+    for path in files:
         digest.update(f"{path.relative_to(root).as_posix()} {_read_now(path)[0]}".encode())
+    if any(_read_now(path)[2] for path in files):
+        digest.update("".join(sorted(plugins.digests().values())).encode())
     return digest.hexdigest()[:16]
 
 

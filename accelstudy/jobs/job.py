@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.plugins import load_plugins
 from accelstudy.basics.units import angles_in
 from accelstudy.files.outputs import cannot_write
 from accelstudy.files.reading import config_hash
@@ -110,6 +111,7 @@ def logged(snakemake: Any) -> Iterator[None]:
             level=logging.INFO,
             format="%(asctime)s %(levelname)s %(message)s",
         )
+        load_plugins(snakemake.config)
         with angles_in(snakemake.params.get("angle_unit")):
             yield
     except InputError as error:

@@ -57,7 +57,9 @@ class NoiseEffect(WithSettings):
         return np.ones(3)
 
 
-_registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(NoiseEffect.kind)
+_registry: RegistryWithSettings[NoiseEffect] = RegistryWithSettings(
+    NoiseEffect.kind, "noise_effects"
+)
 noise_effect_names = _registry.names
 register = _registry.register
 

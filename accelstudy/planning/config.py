@@ -10,7 +10,15 @@ from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.data_sheets import data_sheet_names, of_sigma
-from accelstudy.files.validation import Block, OneOrMore, PathName, Replicates, Seed, checked
+from accelstudy.files.validation import (
+    Block,
+    Configuration,
+    OneOrMore,
+    PathName,
+    Replicates,
+    Seed,
+    checked,
+)
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.planning.question import Question, equipment_of, get_sensor
 
@@ -91,7 +99,7 @@ SECTIONS = ("plan", "designs", "sequential", "pole", "field")
 """Each has rules in `workflow/rules/` under its name."""
 
 
-class Example(Block):
+class Example(Configuration):
     """The sections of a run; results go to ``results/<study>``."""
 
     study: PathName = Field(description="name; results go to results/<study>/")

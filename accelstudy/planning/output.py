@@ -12,6 +12,7 @@ import pandas as pd
 import yaml
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.files.outputs import PLAN, result_folder
@@ -100,7 +101,9 @@ def plan_files(
 
     write_table(folder / "plan.parquet", plan_table(answer), provenance)
     head = STUDY_HEAD.format(command=study_again(shown / "study.yaml"))
-    content = yaml.safe_dump({**answer.study, "study": study}, sort_keys=False, allow_unicode=True)
+    content = yaml.safe_dump(
+        {**as_a_key(), **answer.study, "study": study}, sort_keys=False, allow_unicode=True
+    )
     (folder / "study.yaml").write_text(head + content, encoding="utf-8")
     (folder / "plan.md").write_text(plan_page(answer), encoding="utf-8")
     write_positions(answer, folder / "positions.yaml", study)

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.plugins import HOW
+from accelstudy.basics.registry import Registry
 from accelstudy.positions.scheme import Scheme, Status
 from accelstudy.schemes.files import is_scheme_file, known_scheme, scheme_of_file
 
@@ -48,7 +50,7 @@ class _Entry:
 # Without leading zeros, so that a scheme has one name.
 _NUMBERS = {"N": "([1-9][0-9]{0,3})", "SEED": "(0|[1-9][0-9]{0,17})"}
 
-_entries: dict[str, _Entry] = {}
+_registry: Registry[_Entry] = Registry("scheme", "schemes")
 
 
 def register(
@@ -80,15 +82,13 @@ def register(
 
     Raises
     ------
-    ValueError
+    InputError
         If the name is taken.
     """
 
     def decorate(build: AnyBuilder) -> AnyBuilder:
-        if template in _entries:
-            raise ValueError(f"a scheme {template!r} is registered already")
         listed = names if names is not None else () if _is_family(template) else (template,)
-        _entries[template] = _Entry(template, title, status, source, listed, build)
+        _registry.add(template, _Entry(template, title, status, source, listed, build))
         return build
 
     return decorate
@@ -122,7 +122,7 @@ def get_scheme(name: str) -> Scheme:
 @lru_cache
 def _registered(name: str) -> Scheme:
     # A scheme that has exactly this name goes before a family that it fits.
-    for entry in sorted(_entries.values(), key=lambda entry: _is_family(entry.template)):
+    for entry in sorted(_entries(), key=lambda entry: _is_family(entry.template)):
         if scheme := entry.scheme(name):
             return scheme
     raise UnknownSchemeError(_unknown(name))
@@ -133,13 +133,17 @@ def scheme_names() -> tuple[str, ...]:
 
     Families have more members than those listed here.
     """
-    names = {name for entry in _entries.values() for name in entry.names}
+    names = {name for entry in _entries() for name in entry.names}
     return tuple(sorted(names, key=lambda name: (get_scheme(name).n_positions, name)))
 
 
 def scheme_families() -> tuple[str, ...]:
     """Templates of the families, e.g. "fibonacci-N"."""
-    return tuple(sorted(template for template in _entries if _is_family(template)))
+    return tuple(sorted(filter(_is_family, _registry.names())))
+
+
+def _entries() -> list[_Entry]:
+    return [_registry.get(template) for template in _registry.names()]
 
 
 def _is_family(template: str) -> bool:
@@ -157,7 +161,7 @@ def _unknown(name: str) -> str:
     hint = f" Did you mean {close[0]!r}?" if close else ""
     return (
         f"unknown scheme {name!r}.{hint} Schemes: {', '.join(names)}; "
-        f"families: {', '.join(families)} (N from 1 to 9999)"
+        f"families: {', '.join(families)} (N from 1 to 9999){HOW}"
     )
 
 

@@ -15,6 +15,7 @@ from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.plugins import HOW, load_plugins
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
@@ -85,7 +86,8 @@ def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> Se
         if not part:
             raise InputError(f"model {text!r}: a part is empty; write models and effects between +")
         if part not in MODELS and not _is_effect(part):
-            raise UnknownNameError("model or effect", part, (*MODELS, *effect_names()))
+            known = (*MODELS, *effect_names())
+            raise UnknownNameError("model or effect", part, known, HOW)
         specs += MODELS.get(part, (part,))
     return _composed(specs, text)
 
@@ -130,6 +132,7 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     writes its base model in this way.
     """
     content = read_layer(path)
+    load_plugins(content, path)
     models: Any = content.get("models") or {}
     if not isinstance(models, Mapping):
         raise InputError(f"{path}: models: must be a mapping of names to lists of effects")

@@ -1,23 +1,105 @@
-"""The folder of a new study: a Snakefile, a configuration, a profile and a README."""
+"""The folder of a new study: a Snakefile, a configuration, profiles and a README."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.effects import get_effect
 from accelstudy.files.outputs import STUDY, result_folder
 from accelstudy.files.shipped import shipped
 
 TEMPLATE = Path(__file__).with_name("template")
-PROFILE = "profiles/default/config.yaml"
+TEMPLATES = {
+    "study": "A Monte Carlo study of accelerometer calibrations",
+    "campaigns": "A batch of measured campaigns",
+    "diagnose": "A hidden effect, simulated and diagnosed",
+    "plan": "A plan of calibrations for a tilt accuracy",
+}
+"""What may be set up, and what it is."""
+SHEET = "sensor.yaml"
+"""File of the sensor in the new folder."""
+UNITS = {"bias": ("m/s^2", 1.0), "scale": ("ppm", 1e-6), "nonorthogonality": ("mgon", MGON)}
+"""Unit of the true errors in a configuration, and its size in SI."""
+OF_THE_PAPER = {
+    "bias": (0.05, 0.01, 0.03),
+    "scale": (200e-6, 200e-6, 200e-6),
+    "nonorthogonality": (12 * MGON, 12 * MGON, 44 * MGON),
+}
+"""True errors that the paper simulates, SI."""
 
 
-def new_study(folder: Path, force: bool = False) -> str:
+@dataclass(frozen=True)
+class NewSensor:
+    """The sensor of a new study; by default that of the paper. Everything is in SI.
+
+    Attributes
+    ----------
+    sigma, sigma_angle : float, of the mean of a position, and of the robot's angles
+    noise : str, what the first is of
+    gravity : float
+    errors : dict of the name of an effect to the true values of its parameters
+    source : dict of the name of an effect to where its values come from
+    positions : int, of a session
+    approach : str
+    sheet : str, name of its data sheet, or its content as YAML
+    campaign : Path of its campaign, if there is one
+    """
+
+    sigma: float = 0.002
+    sigma_angle: float = 3.2 * MGON
+    noise: str = "of the paper"
+    gravity: float = STANDARD_GRAVITY
+    errors: dict[str, tuple[float, ...]] = field(default_factory=lambda: dict(OF_THE_PAPER))
+    source: dict[str, str] = field(default_factory=dict)
+    positions: int = 36
+    approach: str = "robot"
+    sheet: str = "paper"
+    campaign: Path | None = None
+
+    def shown(self) -> dict[str, Any]:
+        """What templates show of it."""
+        effects = [
+            {
+                "name": name,
+                "parameters": ", ".join(p.name for p in get_effect(name).parameters),
+                "source": self.source.get(name, "of the paper"),
+                "value": f"[{', '.join(_number(v / UNITS[name][1]) for v in values)}]",
+                "unit": UNITS[name][0],
+                "si": ", ".join(map(_number, values)),
+            }
+            for name, values in self.errors.items()
+        ]
+        return {
+            "sigma": _number(self.sigma),
+            "noise": self.noise,
+            "sigma_mgon": _number(self.sigma_angle / MGON),
+            "gravity": _number(self.gravity, 9),
+            "effects": effects,
+            "scheme": f"fibonacci-{self.positions}",
+            "approach": self.approach,
+            "sheet": SHEET if "\n" in self.sheet else self.sheet,
+            "campaign": None if self.campaign is None else str(self.campaign.resolve()),
+        }
+
+
+def new_study(
+    folder: Path, template: str = "study", sensor: NewSensor | None = None, force: bool = False
+) -> str:
     """Write the folder of a new study.
 
     Parameters
     ----------
     folder : Path, made if it is not there
+    template : str, one of `TEMPLATES`
+    sensor : NewSensor, by default that of the paper
     force : bool, whether to replace files of the same names
 
     Returns
@@ -29,15 +111,54 @@ def new_study(folder: Path, force: bool = False) -> str:
     InputError
         If the folder is not empty, or cannot be written.
     """
+    from jinja2 import Environment, StrictUndefined
+
     name = re.sub(r"[^A-Za-z0-9]+", "-", folder.resolve().name).strip("-") or "study"
-    with result_folder(folder, STUDY, force=force) as new:
-        for source in sorted(path for path in TEMPLATE.rglob("*") if path.is_file()):
-            _write(source, new / source.relative_to(TEMPLATE), name)
-        _write(shipped(PROFILE), new / PROFILE, name)
+    sensor = sensor or NewSensor()
+    content = {
+        "name": name,
+        "template": template,
+        "what": TEMPLATES[template],
+        "sensor": sensor.shown(),
+    }
+    jinja = Environment(
+        undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
+    )
+    sources = {
+        "Snakefile": TEMPLATE / f"{template}.smk",
+        "config/config.yaml": TEMPLATE / f"{template}.yaml",
+        "README.md": TEMPLATE / "README.md",
+    }
+    inputs = [] if sensor.campaign is None else [sensor.campaign]
+    with result_folder(folder, STUDY, inputs, force=force) as new:
+        for target, source in sources.items():
+            text = source.read_text(encoding="utf-8")
+            _write(new / target, jinja.from_string(text).render(content))
+        for source in sorted(shipped("profiles").glob("*/*.yaml")):
+            _write(new / "profiles" / source.parent.name / source.name, source.read_text("utf-8"))
+        if template == "plan" and "\n" in sensor.sheet:
+            _write(new / SHEET, sensor.sheet)
+        if template == "campaigns" and sensor.campaign is None:
+            write_campaign(_example(sensor), new / "campaigns" / "example")
     return name
 
 
-def _write(source: Path, target: Path, name: str) -> None:
+def _example(sensor: NewSensor) -> Any:
+    """A campaign that a sensor might have measured, to begin with."""
+    settings = CampaignSettings(
+        name="example",
+        sigma=sensor.sigma,
+        gravity=sensor.gravity,
+        effects=tuple(f"{effect['name']}: {effect['si']}" for effect in sensor.shown()["effects"]),
+    )
+    return simulate_campaign(settings)[0]
+
+
+def _number(value: float, digits: int = 4) -> str:
+    """Write a number without an exponent, which not all readers of YAML take for a number."""
+    return np.format_float_positional(value, digits, unique=False, fractional=False, trim="-")
+
+
+def _write(target: Path, text: str) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    text = source.read_text(encoding="utf-8")
-    target.write_text(text.replace("STUDY", name), encoding="utf-8")
+    target.write_text(text, encoding="utf-8")

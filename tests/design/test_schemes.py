@@ -115,12 +115,12 @@ def test_nothing_is_suggested_for_a_name_like_no_other():
 
 
 def test_a_name_is_registered_once():
-    with pytest.raises(ValueError, match="'mclaren-24' is registered already"):
+    with pytest.raises(ValueError, match="the scheme 'mclaren-24' is there already"):
         register("mclaren-24", title="", status="generated", source="")(mclaren_orbit)
 
 
 def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):
-    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+    monkeypatch.setattr(registry._registry, "_items", dict(registry._registry._all))
 
     @register("test-ring-N", title="ring from {0}", status="generated", source="a test")
     def ring(n):

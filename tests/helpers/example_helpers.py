@@ -20,12 +20,11 @@ from pathlib import Path
 
 from click.testing import CliRunner
 from places import ROOT
+from plugin_helpers import forgotten
 from study_helpers import run_study
 
 from accelstudy.commands.main import main
-from accelstudy.effects import base as effects
 from accelstudy.files.reading import overlay, read_layer
-from accelstudy.schemes import registry as schemes
 
 EXAMPLES = ROOT / "examples"
 SHOWN = ROOT / "docs" / "tutorials" / "shown"
@@ -56,15 +55,20 @@ def run_example(example, folder):
     {section: output}, warnings included
     """
     shutil.copytree(EXAMPLES / example, folder, dirs_exist_ok=True)
-    with contextlib.chdir(folder), only_in(str(folder)):
+    with contextlib.chdir(folder):
         return {
-            name: "".join(output_of(command) for command in commands)
+            name: "".join(output_of(command, str(folder)) for command in commands)
             for name, commands in sections(example).items()
         }
 
 
-def output_of(command):
-    """Run a command that a reader types; what it prints."""
+def output_of(command, folder):
+    """Run a command that a reader types, and forget what it registered; what it prints."""
+    with only_in(folder):
+        return _output_of(command)
+
+
+def _output_of(command):
     program, *arguments = shlex.split(command)
     if program == "cd":
         os.chdir(arguments[0])
@@ -97,17 +101,14 @@ def only_in(folder):
     """Let a script import its neighbours, and forget with it what they registered."""
     import matplotlib.pyplot as plt
 
-    known = effects._registry._items, schemes._entries
-    before = [dict(items) for items in known], set(sys.modules)
+    before = set(sys.modules)
     sys.path.insert(0, folder)
     try:
-        yield
+        with forgotten():
+            yield
     finally:
         sys.path.remove(folder)
-        for items, kept in zip(known, before[0], strict=True):
-            items.clear()
-            items.update(kept)
-        for name in set(sys.modules) - before[1]:
+        for name in set(sys.modules) - before:
             if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
                 del sys.modules[name]
         plt.close("all")

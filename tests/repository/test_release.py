@@ -5,6 +5,8 @@ import subprocess
 import tomllib
 
 import yaml
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 from packaging.version import Version
 from places import ROOT
 
@@ -54,3 +56,27 @@ def test_hooks_run_what_make_lint_runs():
     assert local["repo"] == "local"  # needs no network
     commands = [line.strip() for line in recipe.splitlines()]
     assert [hook["entry"] for hook in local["hooks"]] == [f".venv/bin/{c}" for c in commands]
+
+
+def test_the_environment_file_names_this_version():
+    content = yaml.safe_load((ROOT / "workflow" / "envs" / "accelstudy.yaml").read_text())
+    python, pip, packages = content["dependencies"]
+    requirement = Requirement(packages["pip"][0])
+    assert [requirement.name, pip] == ["accelstudy", "pip"]
+    assert requirement.extras <= PROJECT["optional-dependencies"].keys()
+    assert str(requirement.specifier) == f"=={PROJECT['version']}"
+    assert f"{python.partition('=')[2]}.0" in SpecifierSet(PROJECT["requires-python"])
+
+
+def test_what_the_catalogue_of_workflows_looks_for():
+    """It also checks format and style, as `make lint` and a test of the workflow do."""
+    settings = yaml.safe_load((ROOT / ".snakemake-workflow-catalog.yml").read_text())["usage"]
+    assert settings == {
+        "software-stack-deployment": {"conda": False, "apptainer": False},
+        "report": True,
+    }
+    readme = (ROOT / "README.md").read_text().lower()
+    assert all(word in readme for word in ("snakemake", "workflow"))
+    assert (ROOT / "workflow" / "Snakefile").is_file()
+    assert (ROOT / "config" / "README.md").is_file()
+    assert {path.suffix for path in (ROOT / "workflow" / "rules").iterdir()} == {".smk"}

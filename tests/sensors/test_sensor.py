@@ -226,6 +226,6 @@ def test_an_effect_is_registered_once():
         name = "bias"
         parameters = ()
 
-    with pytest.raises(ValueError, match="effect 'bias' is registered twice"):
+    with pytest.raises(ValueError, match="the effect 'bias' is there already"):
         register(Again)
     assert get_effect("bias").parameters

@@ -161,7 +161,7 @@ def test_every_key_of_config_yaml_is_commented():
 SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
 
 BAD = {
-    "unknown key": ({"seeed": 1}, "seeed: unknown key; did you mean 'seed'? (known: study, seed,"),
+    "unknown key": ({"seeed": 1}, "seeed: unknown key; did you mean 'seed'? (known: plugins, st"),
     "unknown key below": ({"noise": {"sensor": {"sigma": 1}}}, "noise.sensor.sigma: unknown key",
                           "sigma_mps2"),
     "unknown key in a grid": ({"grids": [grid(replicate=3)]},

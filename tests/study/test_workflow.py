@@ -15,28 +15,19 @@ import pytest
 import yaml
 from places import ROOT
 from snakemake_helpers import ENVIRONMENT, SNAKEMAKE, jobs, one_line, remains, snakemake
-from study_helpers import NINE, grid
 
 import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.files import outputs
 from accelstudy.files.outputs import check_writable
-from accelstudy.files.reading import overlay, read_layer
+from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.study import batches
 from accelstudy.study.figures import get_figure
 from accelstudy.study.tables import TABLES
 
-CONFIG = ROOT / "config" / "config.yaml"
-
-# Two models, two schemes, two approaches: eight cells, of which one cannot be estimated.
-TINY = {
-    "study": "tiny", "paper": False, "sensitivity": None, "presets": None,
-    "leveling": {"attitudes": 20}, "rare": {"replicates": 1000},
-    "grids": [
-        grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60, approaches=["gravity", "robot"]),
-    ],
-}  # fmt: skip
+TINY = read_layer(ROOT / ".test" / "config" / "config.yaml")
+"""Eight cells, of which one cannot be estimated."""
 TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
 IN_BATCHES = f"""\
@@ -51,17 +42,29 @@ rule study:
 """The workflow with two batches of four cells."""
 MODULE = """\
 from accelstudy.files.shipped import shipped
-configfile: "study.yaml"
+configfile: "outer.yaml"
 module inner:
-    snakefile: str(shipped("workflow/Snakefile"))
-    config: config
+    snakefile: {snakefile}
+    config: config["inner"]
     prefix: "inner"
 use rule * from inner as inner_*
+rule part:
+    output: "{{part}}.txt"
+    shell: "echo {{wildcards.part}} > {{output}}"
 rule study:
     default_target: True
-    input: rules.inner_all.input
+    input:
+        rules.inner_all.input,
+        table=rules.inner_collect.output.cells,
+        parts=expand("{{part}}.txt", part=config["parts"]),
+    output: report("done.txt", category="Outer")
+    shell: "cp {{input.parts}} {{output}} && test -s {{input.table}}"
 """
 """The workflow as a part of another one, as the guide to configurations has it."""
+SOURCES = {
+    "installed": 'str(shipped("workflow/Snakefile"))',
+    "on GitHub": 'github("someone/accelstudy", path="workflow/Snakefile", branch="main")',
+}
 RETRIED = f"""\
 include: "{ROOT}/workflow/rules/start.smk"
 rule retried:
@@ -74,7 +77,7 @@ rule retried:
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
     path = folder / "tiny.yaml"
     path.write_text(config if isinstance(config, str) else yaml.safe_dump(config))
-    return [*arguments, "--snakefile", snakefile, "--cores", cores, "--configfile", CONFIG, path]
+    return [*arguments, "--snakefile", snakefile, "--cores", cores, "--configfile", path]
 
 
 def command(folder, *arguments, **options):
@@ -231,7 +234,7 @@ def test_an_edit_of_the_package_runs_what_depends_on_it(single, tmp_path, monkey
 @pytest.mark.parametrize(("words", "config", "parts"), [
     (["--config", "seeed=1"],
      TINY,
-     ["seeed: unknown key; did you mean 'seed'?", "known: study, seed"]),
+     ["seeed: unknown key; did you mean 'seed'?", "known: plugins, study, seed"]),
     ([], {**TINY, "paper": True}, ["paper: true needs the block `sensitivity`"]),
     ([], "study: a\nseed: 1\nstudy: b\n",
      ["not valid YAML: line 3, column 1: the key 'study' stands twice"]),
@@ -293,11 +296,10 @@ def test_truncated_estimates(finished):
     ("workflow/real_noise.smk", "real-noise"),
 ])  # fmt: skip
 def test_lint(snakefile, config, tmp_path):
-    """Jobs run where Snakemake does, with the package: no container has it."""
     given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
-    text = snakemake(tmp_path, "--lint", *given).stdout
-    said = re.findall(r"^    \* (.*):$", text, re.MULTILINE)
-    assert set(said) == {"Specify a conda environment or container for each rule."}
+    result = snakemake(tmp_path, "--lint", *given)
+    assert result.returncode == 0, result.stdout
+    assert "Congratulations" in result.stdout
 
 
 def test_every_rule_has_a_name_of_its_own():
@@ -336,16 +338,44 @@ def test_report(single):
     check_report(single, single / "results" / "tiny")
 
 
-def test_a_module_with_a_prefix(single, tmp_path):
+@pytest.fixture
+def on_github(tmp_path, monkeypatch):
+    """Let git take a repository of this machine, with the workflow alone, for one on GitHub."""
+    there = tmp_path / "there" / "accelstudy.git"
+    shutil.copytree(ROOT / "workflow", there / "workflow")
+
+    def git(*arguments):
+        author = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
+        subprocess.run(["git", *author, *arguments], cwd=there, check=True)
+
+    git("init", "--quiet", "--initial-branch", "main")
+    git("add", ".")
+    git("commit", "--quiet", "--message", "the workflow")
+    settings = {
+        "XDG_CACHE_HOME": tmp_path / "cache",
+        "GIT_CONFIG_COUNT": 1,
+        "GIT_CONFIG_KEY_0": f"url.{there.parent}/.insteadOf",
+        "GIT_CONFIG_VALUE_0": "https://github.com/someone/",
+    }
+    for name, value in settings.items():
+        monkeypatch.setitem(ENVIRONMENT, name, str(value))
+
+
+@pytest.mark.usefixtures("on_github")
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_module_with_a_prefix(source, single, tmp_path):
     """All is in the folder of the prefix; a job finds its tables and figures there."""
-    shutil.copytree(single / "results", tmp_path / "inner" / "results")
-    results = tmp_path / "inner" / "results" / "tiny"
-    (results / "explorer.html").unlink()
-    (tmp_path / "Snakefile").write_text(MODULE)
-    (tmp_path / "study.yaml").write_text(yaml.safe_dump(overlay(read_layer(CONFIG), TINY)))
+    outer = tmp_path / "outer"
+    shutil.copytree(single / "results", outer / "inner" / "results")
+    results = outer / "inner" / "results" / "tiny"
+    if source == "installed":
+        (results / "explorer.html").unlink()
+    (outer / "Snakefile").write_text(MODULE.format(snakefile=SOURCES[source]))
+    (outer / "outer.yaml").write_text(yaml.safe_dump({"parts": ["a"], "inner": TINY}))
     for words in ([], ["--report", "report.zip"]):
-        result = snakemake(tmp_path, "--cores", 1, *words)
+        result = snakemake(outer, "--cores", 1, *words)
         assert result.returncode == 0, result.stdout
+    assert (outer / "done.txt").read_text() == "a\n"
     assert linked_figures(results) == {*results.glob("figures/*.svg")}
-    assert not (tmp_path / "results").exists()
-    check_report(tmp_path, results)
+    assert not (outer / "results").exists()
+    check_report(outer, results)

@@ -1,4 +1,7 @@
 from functools import cache
+from pathlib import Path
+
+from snakemake.sourcecache import LocalSourceFile
 
 from accelstudy.study.figures import captions, figure_names, figure_tables, get_figure
 from accelstudy.study.batches import batches
@@ -102,15 +105,24 @@ def parts_of_claims():
 
 
 def in_report(name):
-    """A figure as the report shows it, with the caption that its job writes."""
+    """A figure as the report shows it."""
     entry = get_figure(name)
     return report(
         f"{RESULTS}/figures/{name}.svg",
-        # Snakemake takes any other path from where the rules are.
-        caption=os.path.abspath(placed(f"{RESULTS}/figures/{name}.rst")),
         category=entry.category,
         labels={"content": entry.title},
     )
+
+
+def give_captions(rule):
+    """Give each figure in the report the caption that its job writes beside it.
+
+    As an argument of `report`, Snakemake would look for it where the rules are, such as on GitHub.
+    """
+    for figure in rule.output:
+        if "report" in figure.flags:
+            caption = LocalSourceFile(os.path.abspath(Path(figure).with_suffix(".rst")))
+            figure.flags["report"] = figure.flags["report"]._replace(caption=caption)
 
 
 def files_of_figures(names):

@@ -14,6 +14,8 @@ rule designs:
         f"{RESULTS}/logs/designs/efficiency.log",
     benchmark:
         f"{RESULTS}/benchmarks/designs/efficiency.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

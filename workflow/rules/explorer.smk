@@ -22,6 +22,8 @@ rule explorer:
         f"{RESULTS}/logs/explorer.log",
     benchmark:
         f"{RESULTS}/benchmarks/explorer.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

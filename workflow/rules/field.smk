@@ -14,6 +14,8 @@ rule field:
         f"{RESULTS}/logs/field/{{case}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/field/{{case}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

@@ -10,6 +10,8 @@ rule figures:
     benchmark:
         f"{RESULTS}/benchmarks/figures.tsv"
     priority: 1
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -38,3 +40,7 @@ use rule figures as sensitivity_figures with:
         code=code_of("figures"),
     message:
         "Draw the figures of the sensitivity analysis"
+
+
+give_captions(rules.figures.rule)
+give_captions(rules.sensitivity_figures.rule)

@@ -11,6 +11,8 @@ rule sensitivity:
         f"{RESULTS}/benchmarks/sensitivity.tsv"
     # What waits for it takes longer than all else that is left.
     priority: 2
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -43,6 +45,8 @@ rule claims:
         f"{RESULTS}/logs/claims.log",
     benchmark:
         f"{RESULTS}/benchmarks/claims.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

@@ -15,6 +15,8 @@ rule plan:
         f"{RESULTS}/logs/plan/cases/{{plan}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan/cases/{{plan}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),
@@ -39,6 +41,8 @@ rule plan_sensors:
         f"{RESULTS}/logs/plan/sensors.log",
     benchmark:
         f"{RESULTS}/benchmarks/plan/sensors.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(2000),

@@ -20,6 +20,8 @@ rule pole:
         f"{RESULTS}/logs/pole/{{pole}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/pole/{{pole}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

@@ -15,6 +15,8 @@ rule sequential_sessions:
         f"{RESULTS}/benchmarks/sequential/{{approach}}.tsv"
     wildcard_constraints:
         approach="|".join(SEQUENTIAL.approaches),
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),
@@ -41,6 +43,8 @@ rule sequential:
         f"{RESULTS}/logs/sequential/summary.log",
     benchmark:
         f"{RESULTS}/benchmarks/sequential/summary.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

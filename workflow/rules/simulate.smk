@@ -5,6 +5,8 @@ rule simulate:
         f"{RESULTS}/logs/simulate/{{part}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),
@@ -24,6 +26,8 @@ rule rare:
         f"{RESULTS}/logs/rare/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/rare/{{batch}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),

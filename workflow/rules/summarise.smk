@@ -7,6 +7,8 @@ rule summarise:
         f"{RESULTS}/logs/summarise/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/summarise/{{batch}}.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(MEMORY),
@@ -32,6 +34,8 @@ rule collect:
         f"{RESULTS}/logs/collect.log",
     benchmark:
         f"{RESULTS}/benchmarks/collect.tsv"
+    conda:
+        "../envs/accelstudy.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000),

@@ -20,7 +20,7 @@ from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import ModelName
 from accelstudy.files.reading import config_hash, overlay
-from accelstudy.files.validation import Block, PathName, checked
+from accelstudy.files.validation import Block, Configuration, PathName, checked
 from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")
@@ -97,7 +97,7 @@ class Task(Block):
         return [str(source)] if self.kind == "log" and source.is_file() else []
 
 
-class BatchConfig(Block):
+class BatchConfig(Configuration):
     """Campaigns that are calibrated and summarised together."""
 
     batch: PathName = Field(description="name; results go to results/<batch>/")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
+from accelstudy.basics import plugins
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.wording import amount, comma_list, words
@@ -409,6 +410,7 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     if d.campaign.sigma_angle is not None:
         noise["robot"] = {"sigma_mgon": d.campaign.sigma_angle / MGON}
     content = {
+        **plugins.as_a_key(),
         "study": study_name(d.campaign.name),
         "gravity_mps2": solution.gravity,
         "noise": noise,

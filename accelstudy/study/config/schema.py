@@ -20,7 +20,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY, to_si
 from accelstudy.effects import get_effect
 from accelstudy.files.reading import config_hash
 from accelstudy.files.validation import (
-    Block,
+    Configuration,
     Gravity,
     OneOrMore,
     Seed,
@@ -50,7 +50,7 @@ CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 
-class StudyConfig(Block):
+class StudyConfig(Configuration):
     """A study."""
 
     study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=LONGEST)] = Field(

@@ -1,0 +1,211 @@
+"""Plug-ins: effects, schemes and the like of the user's own, from a file or an installed package.
+
+Its code registers what it has when it is imported, as the modules of this package do. A file is
+loaded when it is named: `--plugin` of a command, `plugins` of a configuration. A package names its
+modules as entry points of the group ``accelstudy.`` and the room, such as ``accelstudy.effects``;
+they are imported when something of that room is first looked up.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from accelstudy.basics.errors import InputError
+
+PREFIX = "accelstudy."
+"""What the groups of entry points begin with; the name of a room follows."""
+NOTHING = "registers nothing; expected a class or a function under @register"
+HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under plugins"
+"""What a message adds to the names that are known."""
+_CODE = (".py", ".yaml", ".yml", ".json")
+
+_files: dict[str, str] = {}
+"""Digest by name, of the files that are loaded."""
+_loading: list[str] = []
+"""Names of what is being loaded, the innermost last; empty for accelstudy itself."""
+_sources: dict[tuple[str, str], str] = {}
+"""Name of the plug-in by kind and name of what it registered."""
+
+
+def registered(kind: str, name: str) -> bool:
+    """Note what is registered; return whether a plug-in does it."""
+    of_plugin = bool(_loading and _loading[-1])
+    if of_plugin:
+        _sources[kind, name] = _loading[-1]
+    return of_plugin
+
+
+def source_of(kind: str, name: str) -> str:
+    """Return the name of the plug-in that something is of; empty if it is of accelstudy."""
+    return _sources.get((kind, name), "")
+
+
+def load_files(paths: Iterable[str | Path]) -> None:
+    """Load plug-ins from Python files, each content once.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, what is wrong and what would be right.
+    """
+    for path in paths:
+        _load_file(Path(path))
+
+
+def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
+    """Load the plug-ins that a configuration names; raises errors like `load_files`.
+
+    What is no list of texts, the schema of the configuration refuses.
+    """
+    paths = content.get("plugins") or ()
+    paths = [paths] if isinstance(paths, str) else paths
+    if isinstance(paths, list | tuple) and all(isinstance(path, str) for path in paths):
+        try:
+            load_files(paths)
+        except InputError as error:
+            raise InputError(f"{source}: plugins: {error}".removeprefix(": ")) from None
+
+
+def _load_file(path: Path) -> None:
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    digest = hashlib.sha256(content).hexdigest()[:16]
+    if digest in _files.values():
+        return
+    # Under a name that nobody else has, and without a copy in __pycache__ that may be old.
+    module = ModuleType(f"plugin_{digest}")
+    module.__file__ = str(path)
+    with one_line(str(path), path):
+        code = compile(content, str(path), "exec")
+        sys.modules[module.__name__] = module
+        with _registering(str(path)):
+            exec(code, vars(module))
+    _files[str(path)] = digest
+
+
+def loaded_files() -> list[str]:
+    """Files that are loaded, as they were named."""
+    return list(_files)
+
+
+def as_a_key() -> dict[str, Any]:
+    """Content of a configuration that names the loaded files; empty without any."""
+    return {"plugins": loaded_files()} if _files else {}
+
+
+def provenance() -> dict[str, Any]:
+    """Digests of all plug-ins as part of a provenance; empty without any."""
+    found = digests()
+    return {"plugins": found} if found else {}
+
+
+def load_installed(room: str) -> None:
+    """Import what installed packages have for a room, in the order of their names.
+
+    Raises
+    ------
+    InputError
+        One line that names the package, its entry point, and what is wrong.
+    """
+    for point in installed(room):
+        if point.module not in sys.modules:
+            with one_line(label(point), *_folders(point)), _registering(label(point)):
+                point.load()
+
+
+def installed(room: str) -> list[EntryPoint]:
+    """Entry points of installed packages for a room."""
+    return sorted(entry_points(group=PREFIX + room), key=lambda point: (label(point), point.name))
+
+
+def label(point: EntryPoint) -> str:
+    """Name of an entry point for people: its package, with the version, and the module."""
+    package = f"{point.dist.name} {point.dist.version}" if point.dist else "a package"
+    return f"{package} ({point.value})"
+
+
+def digests() -> dict[str, str]:
+    """Digest of the content of each plug-in: files that are loaded, and packages."""
+    found = dict(_files)
+    for group in entry_points().groups:
+        if group.startswith(PREFIX):
+            found |= {label(p): _digest_of(p) for p in installed(group.removeprefix(PREFIX))}
+    return found
+
+
+def _folders(point: EntryPoint) -> list[Path]:
+    """Folders of the package of an entry point, or its one file; it is not imported."""
+    spec = find_spec(point.module.split(".")[0])
+    if spec is None:
+        return []
+    return [Path(folder) for folder in spec.submodule_search_locations or [str(spec.origin)]]
+
+
+def _digest_of(point: EntryPoint) -> str:
+    """Digest of all code of a package."""
+    digest = hashlib.sha256()
+    for folder in _folders(point):
+        for path in sorted(folder.rglob("*")) if folder.is_dir() else [folder]:
+            if path.suffix in _CODE:
+                digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@contextmanager
+def loading(name: str = "") -> Iterator[None]:
+    """Note what is registered as that of a plug-in, or of accelstudy without a name."""
+    _loading.append(name)
+    try:
+        yield
+    finally:
+        _loading.pop()
+
+
+@contextmanager
+def _registering(name: str) -> Iterator[None]:
+    """Load a plug-in, which has to register something."""
+    before = len(_sources)
+    with loading(name):
+        yield
+    if len(_sources) == before:
+        raise InputError(NOTHING)
+
+
+@contextmanager
+def one_line(name: str, *own: Path) -> Iterator[None]:
+    """Turn whatever the code of a plug-in raises into one line.
+
+    Parameters
+    ----------
+    name : str, of the plug-in
+    own : files and folders of its code, of which the line names the last that was reached
+    """
+    try:
+        yield
+    except SyntaxError as error:
+        file = "" if error.filename in (name, None) else f"{Path(error.filename).name}, "
+        raise InputError(
+            f"{name}: {file}line {error.lineno}: not valid Python: {error.msg}"
+        ) from None
+    except (Exception, SystemExit) as error:
+        where = ""
+        for frame in traceback.extract_tb(error.__traceback__):
+            path = Path(frame.filename)
+            if not {path, *path.parents}.isdisjoint(own):
+                where = "" if frame.filename == name else f"{path.name}, "
+                where += f"line {frame.lineno}: "
+        what = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"{name}: {where}{' '.join(what.split())}") from None

@@ -1,0 +1,1 @@
+"""What our sensors do that accelstudy does not know."""

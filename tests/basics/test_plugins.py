@@ -1,0 +1,314 @@
+"""Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
+
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from calling import call, refusal, refused, succeed
+from places import ROOT
+from plugin_helpers import forgotten
+from snakemake_helpers import jobs, snakemake
+
+from accelstudy.basics import plugins
+from accelstudy.data_sheets import data_sheet_names, get_data_sheet
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.files.reading import config_hash
+from accelstudy.files.tables import read_origin
+from accelstudy.jobs.code import code_hash
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.study.config import read_study
+from accelstudy.symbolic.made import key_of
+
+EXAMPLES = ROOT / "examples"
+RIPPLE = EXAMPLES / "effect" / "ripple.py"
+STUDY = {
+    "study": "mine", "seed": 1, "plugins": "ripple.py", "keep": "summary",
+    "sensor": {"ripple": {"value": [0.006, 0.004, 0.005], "unit": "m/s^2"}},
+    "grids": [{
+        "models": ["bias-scale+ripple"], "schemes": ["fibonacci-24"], "approaches": ["gravity"],
+        "replicates": 20,
+    }],
+}  # fmt: skip
+
+HEAD = """\
+import math
+from accelstudy.effects.base import Effect, per_axis, register
+
+class Base(Effect):
+    name = "mine"
+    parameters = per_axis("q", "1", "q_%")
+    def output(self, f, p, g, hold, xp):
+        return tuple(a * x for a, x in zip(p, f, strict=True))
+
+@register
+class Mine(Base):
+"""
+BAD = {
+    "syntax": ("x = (", "line 1: not valid Python: '(' was never closed"),
+    "raises": ("x = 1\ny = x / 0", "line 2: ZeroDivisionError: division by zero"),
+    "exits": ("raise SystemExit(3)", "line 1: SystemExit: 3"),
+    "import": ("import no_such_thing", "line 1: ModuleNotFoundError: No module named"),
+    "nothing": ("x = 1", "registers nothing; expected a class or a function under @register"),
+    "unregistered": (f"{HEAD}    pass".replace("@register", ""), "registers nothing"),
+    "twice": (f"{HEAD}    name = 'bias'", "the effect 'bias' is there already; choose another"),
+    "words": (f"{HEAD}    name = 'my own'", "'my own': a name has letters, digits and _ only"),
+    "parameter": (
+        f"{HEAD}    parameters = per_axis('b', 'm/s^2', 'b')",
+        "effect 'mine': b_x is a parameter of 'bias' already",
+    ),
+    "squares": (
+        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return p[0] ** 2, 0, 0",
+        "effect 'mine': q_x**2 is not linear in q_x, q_y, q_z",
+    ),
+    "constant": (
+        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return p[0] + 1, 0, 0",
+        "effect 'mine': q_x + 1 is not linear in",
+    ),
+    "components": (
+        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return p[:2]",
+        "effect 'mine': output has 2 components, not 3",
+    ),
+    "no symbols": (
+        f"{HEAD}    def output(self, f, p, g, hold, xp):\n        return math.exp(f[0]), 0, 0",
+        "line 13: TypeError: ",
+    ),
+    "scheme": (
+        "from accelstudy.schemes import register\n"
+        "@register('mclaren-24', title='', status='generated', source='')\n"
+        "def mine():\n    return []",
+        "the scheme 'mclaren-24' is there already",
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path, monkeypatch):
+    """A folder with the plug-in of the tutorial; all plug-ins are forgotten at the end."""
+    shutil.copy(RIPPLE, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    with forgotten():
+        yield
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", [
+    ("--plugin", "ripple.py", "effects"),
+    ("effects", "--plugin", "ripple.py"),
+])  # fmt: skip
+def test_the_catalogue_shows_it_and_whose_it_is(words):
+    text = succeed(*words).stdout
+    assert "\nripple: a_i sin(2π f_i / P)\n" in text
+    assert text.count("of the plug-in ") == text.count("of the plug-in ripple.py") == 1
+
+
+def test_without_it_one_line_says_how_to_name_it():
+    line = refusal("calibrate", "nowhere", "--model", "bias-scale+ripple", "--out", "new")
+    assert "unknown model or effect 'ripple'" in line
+    assert "name its file with --plugin" in line
+
+
+def test_what_a_page_suggests_names_it_too():
+    hidden = ("--effect", "ripple: 0.006, -0.004, 0.005")
+    succeed("simulate-campaign", "--plugin", "ripple.py", "--out", "mine", *hidden)
+    result = succeed("calibrate", "mine", "--model", "bias-scale+ripple", "--out", "new")
+    assert ": accelstudy --plugin ripple.py " in result.stdout
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_one_is_one_line(case):
+    content, reason = BAD[case]
+    Path("bad.py").write_text(content)
+    line = refusal("--plugin", "bad.py", "effects")
+    assert line.startswith("error: bad.py: ")
+    assert reason in line
+
+
+def test_each_kind_of_thing_can_be_a_plug_in():
+    """The files that contributors are shown, as they stand."""
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    files = re.findall(r"`accelstudy/(\w+)/\w+\.py`:\n\n```python\n(.*?)```", page, re.DOTALL)
+    for room, text in files:
+        Path(f"{room}.py").write_text(text, encoding="utf-8")
+    plugins.load_files(f"{room}.py" for room, _ in files)
+    found = {
+        "effects.py": plugins.source_of("effect", "dead_zone"),
+        "noise_effects.py": plugins.source_of("noise effect", "shared_noise"),
+        "schemes.py": plugins.source_of("scheme", "cones-N"),
+        "approaches.py": plugins.source_of("approach", "turntable"),
+    }
+    assert found == {name: name for name in found}
+    assert [f"{room}.py" for room, _ in files] == [*found]
+    words = ("--model", "bias-scale+dead_zone(width=2)", "--approach", "turntable")
+    assert "cones-18" in succeed("schemes", "cones-18", *words).stdout
+
+
+def test_one_that_is_no_file_is_one_line():
+    assert refusal("--plugin", "no.py", "effects") == "error: no.py: no such file\n"
+    assert refusal("--plugin", ".", "effects") == "error: .: cannot be read: Is a directory\n"
+
+
+def test_what_does_not_use_it_stays_the_same():
+    words = ("simulate-campaign", "--effect", "warm_up", "--noise-effect", "heavy_tails")
+    succeed(*words, "--out", "without")
+    succeed(*words, "--plugin", "ripple.py", "--out", "with")
+    tables = [Path(folder, "positions.csv").read_bytes() for folder in ("without", "with")]
+    assert tables[0] == tables[1]
+
+
+def test_the_help_loads_none():
+    Path("bad.py").write_text("x = (")
+    assert call("--plugin", "bad.py", "--help").exit_code == 0
+
+
+def test_a_file_is_loaded_once_wherever_it_is_named():
+    shutil.copy("ripple.py", "copy.py")
+    plugins.load_files(["ripple.py", "ripple.py", Path("ripple.py").resolve(), "copy.py"])
+    assert plugins.loaded_files() == ["ripple.py"]
+
+
+def test_nothing_made_of_its_formulas_is_kept_on_disk():
+    """What is kept has a key of the code that made it, and that of a plug-in may be anything."""
+    plugins.load_files(["ripple.py"])
+    assert key_of(type(get_effect("bias"))) is not None
+    assert key_of(type(get_effect("ripple"))) is None
+    assert key_of(type(get_effect("ripple[a_ripple_x]"))) is None
+
+
+# --- configurations ------------------------------------------------------------------------------
+
+
+def written(**changes):
+    Path("study.yaml").write_text(yaml.safe_dump({**STUDY, **changes}))
+    return "study.yaml"
+
+
+def test_a_configuration_names_it():
+    assert "ripple" not in effect_names()
+    study = read_study(written())
+    assert study.plugins == ["ripple.py"]
+    assert "ripple" in effect_names()
+    content = study.model_dump(mode="json")
+    assert config_hash(content) == config_hash({**content, "plugins": ["other/ripple.py"]})
+
+
+@pytest.mark.parametrize(("given", "reason"), [
+    ("no.py", "study.yaml: plugins: no.py: no such file"),
+    (3, "study.yaml: plugins: must be "),
+    ([["ripple.py"]], "study.yaml: plugins.0: must be a text"),
+])  # fmt: skip
+def test_a_bad_key_is_one_line(given, reason):
+    with refused(start=reason):
+        read_study(written(plugins=given))
+
+
+def test_a_model_in_a_file_brings_it():
+    content = {"plugins": ["ripple.py"], "models": {"mine": ["bias", "ripple"]}}
+    Path("model.yaml").write_text(yaml.safe_dump(content))
+    assert get_model("model.yaml").effects[1].name == "ripple"
+
+
+def hashes():
+    scripts = ROOT / "workflow" / "scripts"
+    return {name: code_hash(scripts / f"{name}.py") for name in ("simulate", "collect")}
+
+
+def test_what_can_use_a_registry_depends_on_its_content():
+    before = hashes()
+    plugins.load_files(["ripple.py"])
+    with_it = hashes()
+    assert with_it["simulate"] != before["simulate"]
+    assert with_it["collect"] == before["collect"]
+
+
+def test_jobs_load_it_and_run_again_when_it_changes(tmp_path):
+    table = "results/mine/parts/0000/moments.parquet"
+
+    def run(*words):
+        """As a new process does: nothing is loaded."""
+        given = ("--snakefile", ROOT / "workflow" / "Snakefile", "--configfile", written())
+        with forgotten():
+            result = snakemake(tmp_path, "--cores", 1, *words, *given, "--", table)
+        assert result.returncode == 0, result.stdout
+        return result.stdout
+
+    run()
+    assert [*read_origin(table)["plugins"]] == ["ripple.py"]
+    assert "Nothing to be done" in run()
+    with Path("ripple.py").open("a") as file:
+        file.write("# an edit\n")
+    assert jobs(run("--dry-run")) == {"simulate": 1}
+
+
+# --- packages ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """The package of the tutorial, as an installer lays it down."""
+    site = tmp_path / "site"
+    shutil.copytree(EXAMPLES / "package" / "our_sensors", site / "our_sensors")
+    shutil.copy(RIPPLE, site / "our_sensors")
+    shutil.copy(EXAMPLES / "scheme" / "wedge.py", site / "our_sensors")
+    info = site / "our_sensors-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: our-sensors\nVersion: 1.0\n")
+    text = (EXAMPLES / "package" / "pyproject.toml").read_text(encoding="utf-8")
+    entries = text[text.index("[project.entry-points") :]
+    entries = entries.replace("[project.entry-points.", "[").replace('"', "")
+    (info / "entry_points.txt").write_text(entries)
+    monkeypatch.syspath_prepend(site)
+    yield site / "our_sensors"
+    for name in [name for name in sys.modules if name.split(".")[0] == "our_sensors"]:
+        del sys.modules[name]
+
+
+@pytest.mark.usefixtures("package")
+def test_an_installed_package_is_found_when_it_is_looked_for():
+    assert "our_sensors" not in sys.modules
+    assert get_scheme("wedge-8").n_positions == 16
+    assert "our_sensors.ripple" not in sys.modules
+    assert get_effect("ripple(period=5)").settings == {"period": 5}
+    assert "our-box" in data_sheet_names()
+    assert get_data_sheet("our-box").title == "The sensor in our box"
+    assert "of the plug-in our-sensors 1.0 (our_sensors.ripple)" in succeed("effects").stdout
+
+
+def test_jobs_depend_on_the_content_of_a_package(package):
+    before = hashes()
+    assert "our_sensors" not in sys.modules
+    with (package / "ripple.py").open("a") as file:
+        file.write("# an edit\n")
+    after = hashes()
+    assert after["simulate"] != before["simulate"]
+    assert after["collect"] == before["collect"]
+
+
+@pytest.mark.parametrize(("content", "reason"), [
+    ("x = (", "ripple.py, line 1: not valid Python"),
+    ("x = 1\n1 / 0", "ripple.py, line 2: ZeroDivisionError"),
+    ("x = 1", "registers nothing"),
+    (None, "No module named 'our_sensors.ripple'"),
+])  # fmt: skip
+def test_a_bad_package_is_one_line(package, content, reason):
+    (package / "ripple.py").unlink()
+    if content is not None:
+        (package / "ripple.py").write_text(content)
+    line = refusal("effects")
+    assert line.startswith("error: our-sensors 1.0 (our_sensors.ripple): ")
+    assert reason in line
+
+
+def test_a_bad_data_sheet_of_a_package_is_one_line(package):
+    (package / "sheets" / "our-box.yaml").rename(package / "sheets" / "adxl355.yaml")
+    start = "our-sensors 1.0 (our_sensors.sheets): the sensor 'adxl355' is there already"
+    with refused(start=start):
+        data_sheet_names()
+    (package / "sheets" / "adxl355.yaml").unlink()
+    with refused("no data sheet (*.yaml) lies in this package"):
+        data_sheet_names()

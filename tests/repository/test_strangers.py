@@ -1,0 +1,164 @@
+"""Strangers, with the installed package and nothing else, go from nothing to their last result.
+
+Each types commands into a folder of its own: a geodesist with a table and a CSV, and a maintainer
+with an effect in a package of its own. Commands come from the pages that strangers read.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from places import ROOT
+from walk import page_commands
+
+from accelstudy.basics.units import GON
+from accelstudy.files.tables import read_origin, read_table
+from accelstudy.leveling.angles import roll_pitch
+
+EXAMPLES = ROOT / "examples"
+INSTALL = ("uv", "pip", "install", "--quiet", "--offline", "--no-deps", "--no-build-isolation")
+"""As `pip install`, without a network: what a package needs is there."""
+
+
+class Shell:
+    """Commands in a folder, as they are typed in an environment with the package."""
+
+    def __init__(self, environment, folder):
+        self.python, self.folder = environment / "bin" / "python", folder
+        known = ("HOME", "LANG", "XDG_CACHE_HOME", "OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
+        self.variables = {name: os.environ[name] for name in known if name in os.environ}
+        self.variables["PATH"] = f"{environment / 'bin'}:{os.environ['PATH']}"
+        self.variables["OPENBLAS_NUM_THREADS"] = "1"
+
+    def __call__(self, command):
+        """Run a command, which must end well; return what it prints."""
+        done = subprocess.run(
+            shlex.split(command), cwd=self.folder, env=self.variables,
+            capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+        return done.stdout
+
+    def install(self, source):
+        """Install a wheel, or the folder of a package."""
+        subprocess.run([*INSTALL, "--python", self.python, source], check=True)
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory):
+    """An environment with the package from its wheel; the libraries are those of this one."""
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    (site,) = folder.glob("lib/python*/site-packages")
+    (site / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    command = folder / "bin" / "snakemake"
+    command.write_text(f"#!{folder}/bin/python\nfrom snakemake.cli import main\n\nmain()\n")
+    command.chmod(0o755)
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", folder]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = folder.glob("*.whl")
+    Shell(folder, folder).install(wheel)
+    return folder
+
+
+@pytest.fixture
+def shell(environment, tmp_path):
+    return Shell(environment, tmp_path)
+
+
+def test_it_is_the_installed_package(shell, environment):
+    where = 'python -c "import accelstudy; print(accelstudy.__file__)"'
+    assert Path(shell(where).strip()).is_relative_to(environment)
+
+
+# --- a geodesist with a table and a CSV ----------------------------------------------------------
+
+NOISE = 0.005
+"""Of a sample, m/s²."""
+
+
+def write_log(path, directions):
+    """Write a log of 6 s in each position, with errors of a sensor; return the true forces."""
+    rng = np.random.default_rng(1)
+    forces = -9.80795 * directions
+    parts = []
+    for force in forces:
+        shaken = force + rng.normal(0, 2, (100, 3))
+        parts += [shaken, np.tile(force, (600, 1))]
+    true = np.concatenate(parts)
+    axes = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
+    read = true @ axes.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
+    read += rng.normal(0, NOISE, read.shape)
+    np.savetxt(path, read, "%.5f", delimiter=",")
+    return true
+
+
+def test_a_geodesist_levels_a_log(shell):
+    """By the commands of the page, with the best positions and gravity as it tells to give it."""
+    typed = page_commands(ROOT / "docs" / "start" / "geodesist.md")
+    commands = [line for line in typed if line.startswith("accelstudy ")]
+    design, imported, calibrate, apply, advise = commands
+    shell(design)
+    positions = yaml.safe_load((shell.folder / "my-positions.yaml").read_text(encoding="utf-8"))
+    true = write_log(shell.folder / "log.csv", np.array(positions["directions"]))
+    assert "campaign: my-campaign (18 positions)" in shell(f"{imported} --gravity 9.80795")
+    said = shell(calibrate)
+    assert "ACCEPTED" in said
+    promised = [float(x) for x in re.findall(r"([\d.]+) mgon in (?:roll|pitch)", said)]
+    shell(apply)
+    leveled = pd.read_csv(shell.folder / "leveled.csv")
+    rested = (np.arange(len(true)) % 700 >= 100) & (leveled["near_pole"] == 0)
+    angles = np.stack(roll_pitch(tuple(true[rested].T)), axis=1) / GON
+    errors = leveled.loc[rested, ["roll_gon", "pitch_gon"]].to_numpy() - angles
+    errors = (errors + 200) % 400 - 200
+    positioned = np.repeat(np.arange(18), 600)[: len(errors)]
+    flat = np.abs(angles).max(axis=1) < 50.01
+    means = pd.DataFrame(errors[flat]).groupby(positioned[flat]).mean()
+    assert 1e3 * np.sqrt((means**2).mean()).max() < 3 * max(promised) < 10
+    assert "YOU CAN STOP" in shell(advise)
+    assert (shell.folder / "calibrated" / "report.html").is_file()
+
+
+# --- a maintainer with an effect of a package of its own -----------------------------------------
+
+
+def test_a_maintainer_studies_an_effect_of_a_package(shell):
+    """The package of the tutorial, from its installation to the tables of a study."""
+    package = shutil.copytree(EXAMPLES / "package", shell.folder / "package")
+    for source in ("effect/ripple.py", "scheme/wedge.py"):
+        shutil.copy(EXAMPLES / source, package / "our_sensors")
+    shell.install(package)
+    assert "of the plug-in our-sensors 1.0 (our_sensors.ripple)" in shell("accelstudy effects")
+    model = "bias-scale-nonorthogonality+ripple(period=5)"
+    shell(
+        "accelstudy simulate-campaign --scheme fibonacci-40 --out session "
+        '--effect "ripple(period=5): 0.006, -0.004, 0.005"'
+    )
+    said = shell(f'accelstudy calibrate session --model "{model}" --approach robot --out mine')
+    assert "ACCEPTED" in said
+    value, sigma = map(float, re.search(r"a_ripple_x = +([\d.]+) ± ([\d.]+) mm", said).groups())
+    assert abs(value - 6) < 4 * sigma < 4
+
+    shell("accelstudy init my-study --sensor session")
+    config = shell.folder / "my-study" / "config" / "config.yaml"
+    text = config.read_text(encoding="utf-8")
+    text = text.replace("models: bias-scale-nonorthogonality", f'models: ["{model}"]')
+    text = text.replace("[fibonacci-12, fibonacci-24, fibonacci-48]", "[wedge-sides-8]")
+    text = text.replace("replicates: 1000", "replicates: 100")
+    config.write_text(text, encoding="utf-8")
+    table = "results/my-study/summary.parquet"
+    shell(f"snakemake --cores 2 --directory my-study --snakefile my-study/Snakefile -- {table}")
+    summary = read_table(shell.folder / "my-study" / table)
+    assert {"a_ripple_x", "a_ripple_y", "a_ripple_z"} < {*summary["parameter"]}
+    assert {*summary["cell"].map(str).str.split("/").str[1]} == {"wedge-sides-8"}
+    plugins = read_origin(shell.folder / "my-study" / table)["plugins"]
+    assert "our-sensors 1.0 (our_sensors.ripple)" in plugins
