@@ -1,7 +1,8 @@
 """Strangers, with the installed package and nothing else, go from nothing to their last result.
 
-Each types commands into a folder of its own: a geodesist with a table and a CSV, and a maintainer
-with an effect in a package of its own. Commands come from the pages that strangers read.
+Each types commands into a folder of its own: a geodesist with a table and a CSV, a robotics
+engineer with a bag and a controller, and a maintainer with an effect in a package of its own.
+Commands come from the pages that strangers read.
 """
 
 import os
@@ -18,11 +19,13 @@ import pandas as pd
 import pytest
 import yaml
 from places import ROOT
+from recorded import write_bag
 from walk import page_commands
 
 from accelstudy.basics.units import GON
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.angles import roll_pitch
+from accelstudy.schemes import get_scheme
 
 EXAMPLES = ROOT / "examples"
 INSTALL = ("uv", "pip", "install", "--quiet", "--offline", "--no-deps", "--no-build-isolation")
@@ -126,6 +129,57 @@ def test_a_geodesist_levels_a_log(shell):
     assert 1e3 * np.sqrt((means**2).mean()).max() < 3 * max(promised) < 10
     assert "YOU CAN STOP" in shell(advise)
     assert (shell.folder / "calibrated" / "report.html").is_file()
+
+
+# --- a robotics engineer with a bag and a controller ----------------------------------------------
+
+CONTROLLER = """
+#include <stdio.h>
+#include "calibration.h"
+
+int main(void)
+{
+    float reading[3], force[3], angle[2], sigma[2];
+    while (scanf("%f %f %f", reading, reading + 1, reading + 2) == 3) {
+        accel_calibrate(reading, force);
+        accel_level(reading, 0.0f, angle, sigma);
+        printf("%.7f %.7f %.7f %.7f %.7f\\n", force[0], force[1], force[2], angle[0], angle[1]);
+    }
+    return 0;
+}
+"""
+
+
+def test_a_robotics_engineer_takes_a_bag_to_a_controller(shell):
+    """A bag of rests in ROS axes, and C that is compiled and gets the readings of the sensor."""
+    rng, rate = np.random.default_rng(2), 50
+    forces = -9.80795 * get_scheme("fibonacci-24").directions
+    steps = [(rng.normal(0, 2, (50, 3)), np.tile(force, (300, 1))) for force in forces]
+    true = np.concatenate([part for shaken, rest in steps for part in (shaken + rest[:1], rest)])
+    axes = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
+
+    def read(force):
+        return force @ axes.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
+
+    flu = np.array([1, -1, -1])  # x forward, y left, z up, as in ROS
+    logged = (read(true) + rng.normal(0, NOISE, true.shape)) * flu
+    write_bag(shell.folder / "session.bag", np.arange(len(true)) / rate, {"/imu/data": logged})
+    said = shell("accelstudy import session.bag --gravity 9.80795 --out arm")
+    assert "campaign: arm (24 positions)" in said
+    assert "ACCEPTED" in shell("accelstudy calibrate arm --out calibrated")
+    header = shell("accelstudy export calibrated/calibration.json --form c --level")
+    (shell.folder / "calibration.h").write_text(header, encoding="utf-8")
+    (shell.folder / "controller.c").write_text(CONTROLLER, encoding="utf-8")
+    shell("cc -std=c99 -Wall -Wextra -Werror controller.c -o controller -lm")
+    tilted = -9.80795 * get_scheme("mclaren-24").directions
+    lines = "\n".join(" ".join(map(repr, row)) for row in (read(tilted) * flu).tolist())
+    done = subprocess.run([shell.folder / "controller"], input=lines, capture_output=True,
+                          text=True, check=True)  # fmt: skip
+    given = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    np.testing.assert_allclose(given[:, :3] * flu, tilted, atol=0.005)
+    pitch = np.arctan2(-tilted[:, 0] * flu[0], np.hypot(*tilted[:, 1:].T))
+    low = np.abs(pitch) < 1.2
+    assert np.abs(given[low, 4] - pitch[low]).max() < 1e-3
 
 
 # --- a maintainer with an effect of a package of its own -----------------------------------------
