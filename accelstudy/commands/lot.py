@@ -37,10 +37,12 @@ def lot_command(
     one campaign alone cannot show, many show together: whether anything is missing in the lot, at
     one level for all, in how many of the sensors, how large it is, and which sensor is odd.
 
-    The folder of results gets report.html, lot.json and a figure.
+    The folder of results gets report.html, lot.json, a figure and, if effects are missing,
+    model.yaml with them, which `--model` takes.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.basics.errors import InputError
+    from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import LOT, result_folder
     from accelstudy.lots.evidence import sensor_evidence
@@ -59,6 +61,8 @@ def lot_command(
                 for i, one in enumerate(track(measured, "evidence of the sensors", len(measured)))
             )
         )
-        content = write_lot(lot, with_sizes(lot, measured, *chosen), folder)
+        found = with_sizes(lot, measured, *chosen)
+        of_first = chosen[1] or usual_approach(measured[0])
+        content = write_lot(lot, found, chosen[0], of_first, folder, out)
     click.echo(content["verdict"])
     say(f"report: {out / 'report.html'}")

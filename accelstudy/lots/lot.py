@@ -18,7 +18,6 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, TAILS
-from accelstudy.effects import effect_names
 from accelstudy.lots.evidence import DRAWS, SensorEvidence, is_noise, lot_classes
 from accelstudy.lots.mixture import Mixture, lot_odds
 from accelstudy.sensors.models import compose, composition_name
@@ -226,6 +225,12 @@ def _weight(name: str) -> float:
     return 1.0
 
 
+def type_model(lot: Lot, model: SensorModel) -> SensorModel:
+    """Model with all effects that the lot lacks."""
+    effects = (*(effect.spec for effect in model.effects), *_specs(lot).values())
+    return compose(composition_name(compose("type", effects).effects), effects)
+
+
 def with_sizes(
     lot: Lot, campaigns: Sequence[Campaign], model: SensorModel, approach: Approach | None = None
 ) -> list[Found]:
@@ -238,13 +243,9 @@ def with_sizes(
     model : SensorModel, of the diagnosis
     approach : Approach, as in `sensor_evidence`
     """
-    specs = {k: _spec(lot, k, found) for k, found in lot.found if found.names[0] in effect_names()}
-    if not specs:
-        return [found for _, found in lot.found]
-    effects = (*(effect.spec for effect in model.effects), *specs.values())
-    extended = compose(composition_name(compose("type", effects).effects), effects)
+    specs, extended = _specs(lot), type_model(lot, model)
     values, sigmas = np.full((2, len(campaigns), extended.n_parameters), np.nan)
-    for i, campaign in enumerate(campaigns):
+    for i, campaign in enumerate(campaigns if specs else ()):
         with suppress(InputError):  # the campaign cannot show all of it
             fit = fit_campaign(campaign, extended, approach or usual_approach(campaign))
             values[i], sigmas[i] = fit.parameters, np.sqrt(np.diag(fit.covariance))
@@ -260,14 +261,17 @@ def with_sizes(
     return [replace(found, sizes=results.get(k, ())) for k, found in lot.found]
 
 
-def _spec(lot: Lot, k: int, found: Found) -> str:
-    """Setting of an effect that most sensors that lack it have as their best."""
-    weights = lot.mixture.lacking(k)
-    counted: dict[str, float] = {}
-    for each, weight in zip(lot.sensors, weights, strict=True):
-        if (spec := each.specs.get(found.names[0])) is not None:
-            counted[spec] = counted.get(spec, 0.0) + float(weight)
-    return max(counted, key=lambda spec: counted[spec])
+def _specs(lot: Lot) -> dict[int, str]:
+    """Effects that were found, each in the setting that most sensors that lack it have as best."""
+    specs = {}
+    for k, found in lot.found:
+        counted: dict[str, float] = {}
+        for each, weight in zip(lot.sensors, lot.mixture.lacking(k), strict=True):
+            if (spec := each.specs.get(found.names[0])) is not None:
+                counted[spec] = counted.get(spec, 0.0) + float(weight)
+        if counted:
+            specs[k] = max(counted, key=lambda spec: counted[spec])
+    return specs
 
 
 def random_effects(values: Array, variances: Array) -> tuple[float, float, float]:

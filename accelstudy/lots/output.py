@@ -1,4 +1,4 @@
-"""What a lot writes: JSON, a figure and a page."""
+"""What a lot writes: JSON, the model of the type, a figure and a page."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from matplotlib.figure import Figure
 
+from accelstudy.approaches import Approach
+from accelstudy.basics import suggested
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability, words
 from accelstudy.campaign.calibration.document import json_number, json_text
@@ -24,8 +27,10 @@ from accelstudy.drawing.style import (
     symbol,
 )
 from accelstudy.files.outputs import whole_file
-from accelstudy.lots.lot import LEVEL, Found, Lot
+from accelstudy.lots.lot import LEVEL, Found, Lot, type_model
 from accelstudy.pages import lines, write_page
+from accelstudy.sensors.models import MODEL_FILE
+from accelstudy.sensors.sensor import SensorModel
 
 ODD = "#D55E00"
 
@@ -89,9 +94,38 @@ def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write_lot(lot: Lot, found: Sequence[Found], folder: str | Path) -> dict[str, Any]:
-    """Write lot.json, report.html and the figure into a folder; returns the content."""
+def write_lot(
+    lot: Lot,
+    found: Sequence[Found],
+    model: SensorModel,
+    approach: Approach,
+    folder: str | Path,
+    place: str | Path = "",
+) -> dict[str, Any]:
+    """Write lot.json, model.yaml, report.html and the figure into a folder.
+
+    Parameters
+    ----------
+    lot : Lot
+    found : of `with_sizes`
+    model : SensorModel, of the diagnosis
+    approach : Approach, of the first campaign
+    folder : path, to write to
+    place : path of the results, for the commands that the page gives
+
+    Returns
+    -------
+    dict
+        The content of lot.json.
+    """
     folder, content = Path(folder), lot_document(lot, found)
+    whole, steps = type_model(lot, model), []
+    if len(whole.effects) > len(model.effects):
+        effects = [effect.spec for effect in whole.effects]
+        with whole_file(folder / MODEL_FILE) as path:
+            path.write_text(yaml.safe_dump({"models": {"type": effects}}), encoding="utf-8")
+        command = suggested.calibrate("CAMPAIGN", Path(place) / MODEL_FILE, approach.name)
+        steps.append(("Calibrate a sensor with the model of the type", command))
     drawn = save_all({"sensors": lambda: sensors_figure(lot, found)}, folder / "figures")
     sentences = said(lot, found)
     state = "no_effect" if not lot.missing else "named" if found else "unknown"
@@ -103,6 +137,7 @@ def write_lot(lot: Lot, found: Sequence[Found], folder: str | Path) -> dict[str,
         state=state,
         lines=sentences,
         figures=drawn,
+        next_steps=steps,
     )
     with whole_file(folder / "lot.json") as path:
         path.write_text(json_text(content), encoding="utf-8")

@@ -169,5 +169,9 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     page = (tmp_path / "lot/report.html").read_text(encoding="utf-8")
     assert_sound(page)
     assert "A lot of 9 sensors" in text_of(page)
+    model = tmp_path / "lot/model.yaml"
+    said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
+    assert "ACCEPTED" in said
+    assert "b_T_x" in said
     line = refusal("lot", folders[0], "--out", tmp_path / "one")
     assert "two sensors or more" in line
