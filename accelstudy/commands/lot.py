@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from glob import glob
 from pathlib import Path
 
 import click
 
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, track
 from accelstudy.commands.options import (
     PATH,
@@ -33,15 +35,15 @@ def lot_command(
 ) -> None:
     """Say what sensors of one type lack together.
 
-    CAMPAIGN are folders, one per sensor. They may differ in positions, columns and approach. What
-    one campaign alone cannot show, many show together: whether anything is missing in the lot, at
-    one level for all, in how many of the sensors, how large it is, and which sensor is odd.
+    CAMPAIGN are folders, one per sensor, or patterns such as 'sensor-*'. They may differ in
+    positions, columns and approach. What one campaign alone cannot show, many show together:
+    whether anything is missing in the lot, at one level for all, in how many of the sensors, how
+    large it is, and which sensor is odd.
 
     The folder of results gets report.html, lot.json, a figure and, if effects are missing,
     model.yaml with them, which `--model` takes.
     """
     from accelstudy.approaches import get_approach
-    from accelstudy.basics.errors import InputError
     from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import LOT, result_folder
@@ -50,11 +52,15 @@ def lot_command(
     from accelstudy.lots.output import write_lot
     from accelstudy.sensors.models import get_model
 
-    if len(campaigns) < 2:
+    folders = [path for given in campaigns for path in _folders(given)]
+    if len(folders) < 2:
         raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+    for i, folder in enumerate(folders):
+        if folder.resolve() in [other.resolve() for other in folders[:i]]:
+            raise InputError(f"{folder}: is given twice; each sensor counts once")
     chosen = get_model(model), None if approach is None else get_approach(approach)
-    with result_folder(out, LOT, campaigns, force) as folder:
-        measured = [read_campaign(campaign) for campaign in campaigns]
+    with result_folder(out, LOT, folders, force) as results:
+        measured = [read_campaign(folder) for folder in folders]
         lot = Lot(
             tuple(
                 sensor_evidence(one, *chosen, seed=seed + i)
@@ -63,6 +69,16 @@ def lot_command(
         )
         found = with_sizes(lot, measured, *chosen)
         of_first = chosen[1] or usual_approach(measured[0])
-        content = write_lot(lot, found, chosen[0], of_first, folder, out)
+        content = write_lot(lot, found, chosen[0], of_first, results, out)
     click.echo(content["verdict"])
     say(f"report: {out / 'report.html'}")
+
+
+def _folders(given: Path) -> list[Path]:
+    """Folders that a pattern stands for, by name; anything else stands for itself."""
+    if given.exists() or not any(sign in str(given) for sign in "*?["):
+        return [given]
+    found = sorted(path for path in map(Path, glob(str(given))) if path.is_dir())
+    if not found:
+        raise InputError(f"{given}: no folder has such a name")
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
+from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.posterior import weigh
@@ -111,6 +112,13 @@ def sensor_evidence(
 def called(place: tuple[str, str]) -> str:
     """Name of something without a name that is a function of a coordinate, in a target."""
     return f"{UNKNOWN}({place[0]} → {place[1]})"
+
+
+def shown(name: str) -> str:
+    """Name in words."""
+    if not name.startswith(UNKNOWN):
+        return words(name)
+    return f"something without a name {name.removeprefix(UNKNOWN)}"
 
 
 def is_noise(name: str) -> bool:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggested
 from accelstudy.basics.units import shown_unit, to_display
-from accelstudy.basics.wording import probability, words
+from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.document import json_number, json_text
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
@@ -27,6 +27,7 @@ from accelstudy.drawing.style import (
     symbol,
 )
 from accelstudy.files.outputs import whole_file
+from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import LEVEL, Found, Lot, type_model
 from accelstudy.pages import lines, write_page
 from accelstudy.sensors.models import MODEL_FILE
@@ -38,7 +39,7 @@ ODD = "#D55E00"
 def said(lot: Lot, found: Sequence[Found]) -> list[str]:
     """Say what the lot lacks, and which of its sensors are odd; the verdict comes first."""
     alternatives = [
-        f"{' or '.join(map(words, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
+        f"{' or '.join(map(shown, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
     ]
     top = [max(each.odds, key=lambda name, e=each: e.odds[name]) for each in lot.sensors]  # type: ignore[misc]
     single = sum(name in found[0].names for name in top) if found else 0
@@ -46,6 +47,7 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
         "lots/wording.txt.j2",
         "verdict",
         lot,
+        shown,
         found,
         alternatives,
         lot.odd,
@@ -83,7 +85,7 @@ def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
         "alternatives": [{"names": list(n), "posterior": p} for n, p in lot.alternatives],
         "odd": [
             {"campaign": o.campaign, "posterior": o.posterior, "names": list(o.names),
-             "reason": f"it shows {' or '.join(map(words, o.names))}, and the others do not"}
+             "reason": f"it shows {' or '.join(map(shown, o.names))}, and the others do not"}
             for o in lot.odd
         ],
         "each": [
@@ -136,6 +138,7 @@ def write_lot(
         doc=content,
         state=state,
         lines=sentences,
+        shown=shown,
         figures=drawn,
         next_steps=steps,
     )

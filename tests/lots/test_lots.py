@@ -156,7 +156,7 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
         )  # fmt: skip
         write_campaign(simulate_campaign(settings)[0], tmp_path / f"sensor-{i}")
     folders = sorted(tmp_path.glob("sensor-*"))
-    told = succeed("lot", *folders, "--out", tmp_path / "lot").stdout
+    told = succeed("lot", tmp_path / "sensor-*", "--out", tmp_path / "lot").stdout
     content = json.loads((tmp_path / "lot/lot.json").read_text(encoding="utf-8"))
     assert content["anything"]["missing"]
     (effect,) = content["effects"]
@@ -173,5 +173,9 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
     assert "ACCEPTED" in said
     assert "b_T_x" in said
-    line = refusal("lot", folders[0], "--out", tmp_path / "one")
-    assert "two sensors or more" in line
+    for given, said in (
+        ((folders[0],), "two sensors or more"),
+        ((folders[0], folders[1], folders[0]), "is given twice"),
+        ((tmp_path / "other-*",), "no folder has such a name"),
+    ):
+        assert said in refusal("lot", *given, "--out", tmp_path / "one")
