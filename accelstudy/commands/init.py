@@ -93,18 +93,16 @@ def _sensor(given: str | None) -> NewSensor | None:
 
 def _sensor_of_campaign(folder: Path) -> NewSensor:
     """Calibrate a campaign, and take what was found for the truth."""
-    from accelstudy.approaches import get_approach
-    from accelstudy.campaign.calibration.fit import fit_campaign
+    from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.data_sheets.measured import sheet_of_campaign, yaml_of
     from accelstudy.sensors.models import get_model
     from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
 
     sheet, campaign = sheet_of_campaign(folder), read_campaign(folder)
-    approach = "gravity" if campaign.angles is None else "robot"
-    model = get_model("bias-scale-nonorthogonality")
-    fit = fit_campaign(campaign, model, get_approach(approach))
-    found = dict(zip(model.parameter_names, fit.adjustment.parameters[0].tolist(), strict=False))
+    approach, model = usual_approach(campaign), get_model("bias-scale-nonorthogonality")
+    fit = fit_campaign(campaign, model, approach)
+    found = dict(zip(model.parameter_names, fit.parameters.tolist(), strict=True))
     errors = {
         effect.name: tuple(found[parameter.name] for parameter in effect.parameters)
         for effect in model.effects
@@ -117,7 +115,7 @@ def _sensor_of_campaign(folder: Path) -> NewSensor:
         errors=errors,
         source=dict.fromkeys(OF_THE_PAPER, f"as the calibration of {campaign.name} finds them"),
         positions=campaign.n_positions,
-        approach=approach,
+        approach=approach.name,
         sheet=yaml_of(sheet),
         campaign=folder,
         **robot,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glob import glob
+from glob import glob, has_magic
 from pathlib import Path
 
 import click
@@ -76,7 +76,7 @@ def lot_command(
 
 def _folders(given: Path) -> list[Path]:
     """Folders that a pattern stands for, by name; anything else stands for itself."""
-    if given.exists() or not any(sign in str(given) for sign in "*?["):
+    if given.exists() or not has_magic(str(given)):
         return [given]
     found = sorted(path for path in map(Path, glob(str(given))) if path.is_dir())
     if not found:

@@ -31,6 +31,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
+    all_pairs,
     classes_of,
     equivalents,
     weigh_singles,
@@ -173,7 +174,10 @@ def _chosen_alike(
     chosen, credible = finding.chosen, finding.alternatives
     if len(chosen) > 1:
         members = equivalents(part.examined, singles)
-        pairs = weigh_pairs(part, singles, members, classes_of(singles, members))
+        classes, together = classes_of(singles, members), []
+        if len(classes) > 1:
+            together = all_pairs(singles.shapes, part.residuals, part.evidence)
+        pairs = weigh_pairs(together, singles, members, classes)
         pairs = [one for one in pairs if len(one.best) == len(chosen)]
         best = max(pairs, key=lambda one: one.log_weight, default=None)
         same = [one for one in credible if best and _same(one.classes, best.names)]

@@ -116,8 +116,8 @@ class Epochs:
 
     def _explains_most(self, left: Sequence[int]) -> int:
         """Place of the parameter without which the others are the most congruent."""
-        rest = [self.of([i for i in left if i != one]).test() for one in left]
-        return first_best([t.statistic * t.dof[0] / (1 + rest[0].statistic) for t in rest], ALIKE)
+        rest = [self.of([i for i in left if i != one]).test().statistic for one in left]
+        return first_best(rest, ALIKE * rest[0])
 
 
 def noncentrality(p: int, nu: float) -> float:

@@ -16,7 +16,6 @@ from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import all_pairs
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.sensors.sensor import SensorModel
@@ -87,7 +86,7 @@ def sensor_evidence(
             for place, log in unknown.by_place(problem.evidence, z).items()
         }
     pairs = {}
-    for together in all_pairs(weighing.singles.shapes, problem.residuals, problem.evidence):
+    for together in weighing.together:
         names = tuple(sorted(h.name for h in together.best))
         if len(names) == 2 and OUTLIER not in names:
             pairs[names[0], names[1]] = together.log_density - nothing

@@ -17,7 +17,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.noise_tests import AXES, TAILS
+from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.lots.evidence import DRAWS, SensorEvidence, is_noise, lot_classes
 from accelstudy.lots.mixture import Mixture, lot_odds
 from accelstudy.sensors.models import compose, composition_name
@@ -31,6 +31,15 @@ FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 FEW = 2
 """Sensors that have to lack the same, or it is no matter of the lot."""
+EFFECT = "effect"
+WEIGHTS = {
+    EFFECT: 1.0,
+    UNKNOWN: priors.UNKNOWN,
+    **dict.fromkeys(NOISES, priors.COLOUR),
+    AXES: priors.AXES,
+    TAILS: priors.TAILS,
+}
+"""Prior weights of what a lot may lack, relative to one effect of the catalogue."""
 HAS = 0.5
 """Posterior probability from which a sensor counts among those that lack an effect."""
 
@@ -114,13 +123,8 @@ class Lot:
                 if first != second:
                     logs = pairs.setdefault((first, second), np.full(len(self.sensors), np.nan))
                     logs[i] = np.fmax(logs[i], log)
-        prior = np.array([_weight(members[0]) for members in self.classes])
-        places = sum(members[0].startswith(UNKNOWN) for members in self.classes)
-        named = sum(w == 1 for w in prior)
-        prior = np.array([
-            w / named if w == 1 else w / places if members[0].startswith(UNKNOWN) else w
-            for w, members in zip(prior, self.classes, strict=True)
-        ])  # fmt: skip
+        kinds = [_kind(members[0]) for members in self.classes]
+        prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
         return Mixture.of(np.array(odds), pairs, prior / prior.sum())
 
     @cached_property
@@ -149,7 +153,7 @@ class Lot:
         """Posterior probability that the lot lacks anything, or that a sensor is odd."""
         mixture = self.mixture
         nothing = 1 - mixture.missing
-        none_odd = np.prod(1 - mixture.odd_in(())) if nothing > 0 else 1.0
+        none_odd = np.prod(1 - mixture.sensors_under(())[1]) if nothing > 0 else 1.0
         return float(max(1 - nothing * none_odd, 1e-300))
 
     @cached_property
@@ -216,13 +220,11 @@ class Lot:
         return rows
 
 
-def _weight(name: str) -> float:
-    """Prior weight of what a lot may lack, relative to one effect of the catalogue."""
+def _kind(name: str) -> str:
+    """Which of `WEIGHTS` something has; things of one kind share it evenly."""
     if name.startswith(UNKNOWN):
-        return priors.UNKNOWN
-    if is_noise(name):
-        return {AXES: priors.AXES, TAILS: priors.TAILS}.get(name, priors.COLOUR)
-    return 1.0
+        return UNKNOWN
+    return name if is_noise(name) else EFFECT
 
 
 def type_model(lot: Lot, model: SensorModel) -> SensorModel:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations
 
 import numpy as np
@@ -139,22 +139,22 @@ class Mixture:
         for one, p in zip(self.sets, self.probabilities, strict=True):
             if p < LEAST:
                 continue
-            _, weights = self._posterior(one.names)
-            parts, strange = self._parts(one.names)
-            total = np.logaddexp.reduce([*parts.values(), strange])
-            for subset, log in parts.items():
-                mass = np.exp(log - total).reshape(n, -1) @ weights.ravel()
+            of_set, odd_in_set = self.sensors_under(one.names)
+            for subset, mass in of_set.items():
                 lacks[subset] = lacks.get(subset, np.zeros(n)) + p * mass
-            odd += p * np.exp(strange - total).reshape(n, -1) @ weights.ravel()
+            odd += p * odd_in_set
         return lacks, odd
 
-    def odd_in(self, names: Names) -> Array:
-        """Posterior of each sensor to be odd, (n,), if the lot lacks some effects."""
+    def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
+        """Return what `sensors` has, if the lot lacks some effects."""
         _, weights = self._posterior(names)
         parts, strange = self._parts(names)
         total = np.logaddexp.reduce([*parts.values(), strange])
-        odd = np.exp(strange - total).reshape(len(self.odds), -1) @ np.atleast_1d(weights).ravel()
-        return np.asarray(odd)
+
+        def mass(log: Array) -> Array:
+            return np.asarray(np.exp(log - total).reshape(len(log), -1) @ np.ravel(weights))
+
+        return {subset: mass(log) for subset, log in parts.items()}, mass(strange)
 
     def lacking(self, k: int) -> Array:
         """Posterior of each sensor to lack an effect, (n,)."""
@@ -205,6 +205,7 @@ class Mixture:
         return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
 
 
+@cache
 def _nodes(size: int) -> tuple[Array, Array]:
     """Nodes and weights of the integral over a share."""
     if not size:
@@ -213,6 +214,7 @@ def _nodes(size: int) -> tuple[Array, Array]:
     return (nodes + 1) / 2, weights / 2
 
 
+@cache
 def _log_weights(size: int) -> Array:
     weights = np.ones(())
     for _ in range(size):

@@ -15,6 +15,7 @@ from accelstudy.basics import suggested
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.document import json_number, json_text
+from accelstudy.campaign.calibration.output import SUSPECT
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
     FULL,
@@ -32,8 +33,6 @@ from accelstudy.lots.lot import LEVEL, Found, Lot, type_model
 from accelstudy.pages import lines, write_page
 from accelstudy.sensors.models import MODEL_FILE
 from accelstudy.sensors.sensor import SensorModel
-
-ODD = "#D55E00"
 
 
 def said(lot: Lot, found: Sequence[Found]) -> list[str]:
@@ -167,7 +166,7 @@ def sensors_figure(lot: Lot, found: Sequence[Found]) -> Figure:
         ax.axhline(0, color=INK, linewidth=0.8)
         ax.errorbar(places, each, 1.96 * sigma, fmt="o", color=colour, capsize=2)
         ax.plot(places[strange], each[strange], "o", markersize=9, markerfacecolor="none",
-                color=ODD)  # fmt: skip
+                color=SUSPECT)  # fmt: skip
         ax.set_ylabel(f"{symbol(size.name)} / ({shown_unit(size.unit)})")
     panels[-1].set_xlabel("sensor")
     figure.suptitle("Each sensor with its 95 % interval; band: the type, ± 2 scatter; circle: odd")

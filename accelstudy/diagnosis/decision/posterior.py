@@ -22,6 +22,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
+    Together,
     all_pairs,
     classes_of,
     equivalents,
@@ -218,6 +219,7 @@ class Weighing:
     singles : Singles, the evidence for each candidate by itself
     members : dict of candidate to the names that mean the same
     classes : list of Class, candidates that mean the same together, strongest evidence first
+    together : list of Together, the evidence for all pairs of candidates
     alone : list of Weighed, one effect, one bumped position, or something unknown
     pairs : list of Weighed, two of them or with bumped positions three, or one of them beside
         something unknown
@@ -229,6 +231,7 @@ class Weighing:
     singles: Singles
     members: Mapping[str, tuple[str, ...]]
     classes: list[Class]
+    together: list[Together]
     alone: list[Weighed]
     pairs: list[Weighed]
     noises: list[Weighed]
@@ -256,15 +259,16 @@ def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
     unknown = detection.densities.get(UNKNOWN)
     if unknown is not None:
         alone.append(Weighed((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(priors.UNKNOWN)))
-    pairs = weigh_pairs(problem, singles, members, classes)
+    together = all_pairs(singles.shapes, problem.residuals, problem.evidence)
+    pairs = weigh_pairs(together, singles, members, classes)
     pairs += weigh_beside(problem, singles, classes)
     noises, slow = _noises(problem, detection, chance)
     posterior = Posterior.of([*alone, *pairs, *noises])
-    return Weighing(singles, members, classes, alone, pairs, noises, slow, posterior)
+    return Weighing(singles, members, classes, together, alone, pairs, noises, slow, posterior)
 
 
 def weigh_pairs(
-    problem: Problem,
+    together: Iterable[Together],
     singles: Singles,
     members: Mapping[str, tuple[str, ...]],
     classes: Sequence[Class],
@@ -275,22 +279,20 @@ def weigh_pairs(
 
     Parameters
     ----------
-    problem : Problem
-    singles, members, classes : as in `Weighing`
+    together, singles, members, classes : as in `Weighing`
     """
     k = len(classes)
     if k < 2:
         return []
     each = np.log(priors.TWO) - np.log(k * (k + 1) / 2)
     called = {name: best.name for best, names in classes for name in names}
-    residuals, evidence, densities = problem.residuals, problem.evidence, singles.densities
     weighed = []
-    for together in all_pairs(singles.shapes, residuals, evidence):
-        best = tuple(sorted(together.best, key=lambda h: -densities[h.name]))
+    for one in together:
+        best = tuple(sorted(one.best, key=lambda h: -singles.densities[h.name]))
         alike = tuple(members[h.name] for h in best)
         if len(best) > 2 or alike[0] != alike[1] or best[0].effect is None:
             names = tuple(called.get(h.name, h.name) for h in best)
-            weight = together.log_density + each + (len(best) - 2) * np.log(priors.TWO)
+            weight = one.log_density + each + (len(best) - 2) * np.log(priors.TWO)
             weighed.append(Weighed(names, alike, weight, best))
     return weighed
 

@@ -108,9 +108,9 @@ class Controlled:
         plain, low, high = self.plain.quantile([p, p - wide, p + wide])
         slope = (high - low) / (2 * wide)
         # Too few values have no density: their error is unknown.
-        variance = p * (1 - p) / self.count * (slope**2 if self.count >= LEAST else np.nan)
-        known = np.full(len(p), np.nan) if self.known is None else self.known[chosen]
         few = self.count < LEAST
+        variance = p * (1 - p) / self.count * (np.nan if few else slope**2)
+        known = np.full(len(p), np.nan) if self.known is None else self.known[chosen]
         if few or self.linear is None or self.apart is None or not np.isfinite(known).all():
             return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
         linear, low, high = self.linear.quantile([p, p - wide, p + wide])
