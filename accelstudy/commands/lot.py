@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import say, track
+from accelstudy.basics.progress import say
 from accelstudy.commands.options import (
     PATH,
     angle_unit_option,
@@ -47,8 +47,7 @@ def lot_command(
     from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import LOT, result_folder
-    from accelstudy.lots.evidence import sensor_evidence
-    from accelstudy.lots.lot import Lot, with_sizes
+    from accelstudy.lots.lot import weigh_lot, with_sizes
     from accelstudy.lots.output import write_lot
     from accelstudy.sensors.models import get_model
 
@@ -61,12 +60,7 @@ def lot_command(
     chosen = get_model(model), None if approach is None else get_approach(approach)
     with result_folder(out, LOT, folders, force) as results:
         measured = [read_campaign(folder) for folder in folders]
-        lot = Lot(
-            tuple(
-                sensor_evidence(one, *chosen, seed=seed + i)
-                for i, one in enumerate(track(measured, "evidence of the sensors", len(measured)))
-            )
-        )
+        lot = weigh_lot(measured, *chosen, seed=seed)
         found = with_sizes(lot, measured, *chosen)
         of_first = chosen[1] or usual_approach(measured[0])
         content = write_lot(lot, found, chosen[0], of_first, results, out)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize, stats
 
+from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -17,13 +19,78 @@ from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
+LEVEL_OF_NOISE = "noise_level"
+"""Name of a noise that is larger or smaller than that of the others."""
+LEAST_SIGMA = 1e-9
+"""m/s², of readings that are their own model."""
 DRAWS = 1000
 """Sets of residuals without any effect, of each campaign."""
+
+
+FREEDOMS = (AS_GIVEN, 60.0, 20.0, 8.0, DOUBTED)
+"""ν of a type, the most first."""
+ALIKE = 1.0
+"""Difference of log likelihoods that says nothing."""
+ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
+"""Share of sensors whose variance may be anything, and ν of these."""
+
+
+@dataclass(frozen=True)
+class LotNoise:
+    """The noise of a type: variances of its sensors are σ² times an inverse-gamma(ν/2, ν/2).
+
+    Attributes
+    ----------
+    sigma : float, m/s², of a position mean
+    freedom : float, ν: few where sensors differ in noise
+    doubt : float, prior probability that a sensor has a noise of its own
+    """
+
+    sigma: float
+    freedom: float
+    doubt: float = 0.02
+
+    @classmethod
+    def of(cls, sigmas: Array, redundancies: Array) -> LotNoise:
+        """Of the variances s² of calibrations, of which s²/σ² is of F(r, ν), but for odd ones.
+
+        Of the ν that explain them equally well the largest one is taken.
+
+        Parameters
+        ----------
+        sigmas, redundancies : (n,) arrays, s in m/s² and r, of the sensors
+        """
+        squares, of_each = np.square(sigmas), redundancies
+
+        def less_likely(log: float, freedom: float) -> float:
+            ratios = squares / np.exp(log)
+            usual, odd = (stats.f.logpdf(ratios, of_each, nu) for nu in (freedom, ODD_FREEDOM))
+            usual, odd = usual + np.log(1 - ODD_SHARE), odd + np.log(ODD_SHARE)
+            return float(len(squares) * log - np.sum(np.logaddexp(usual, odd)))
+
+        middle = float(np.median(np.log(squares)))
+        best = [
+            optimize.minimize_scalar(less_likely, (middle - 0.2, middle + 0.2), args=(nu,))
+            for nu in FREEDOMS
+        ]
+        least = min(one.fun for one in best)
+        log, freedom = next(
+            (one.x, nu) for one, nu in zip(best, FREEDOMS, strict=True) if one.fun < least + ALIKE
+        )
+        return cls(float(np.exp(log / 2)), freedom)
+
+    @property
+    def level(self) -> Level:
+        """What a campaign knows of its noise by that of the others."""
+        if not self.doubt:
+            return Level((1.0,), (self.freedom,), known=True)
+        return Level((1 - self.doubt, self.doubt), (self.freedom, DOUBTED), known=True)
 
 
 @dataclass(frozen=True)
@@ -42,6 +109,9 @@ class SensorEvidence:
     by_chance : (s, K) array, log odds of `tested` in noise alone
     tested : tuple of str, candidates and the unknown as a whole, K
     observed : (K,) array, their log odds in this campaign
+    sigma : float, m/s², of a position mean by the residuals
+    redundancy : int
+    residuals : (m,) array, m/s², equally uncertain
     """
 
     campaign: str
@@ -53,10 +123,17 @@ class SensorEvidence:
     by_chance: Array
     tested: tuple[str, ...]
     observed: Array
+    sigma: float
+    redundancy: int
+    residuals: Array
 
 
 def sensor_evidence(
-    campaign: Campaign, model: SensorModel, approach: Approach | None = None, seed: int = 1
+    campaign: Campaign,
+    model: SensorModel,
+    approach: Approach | None = None,
+    seed: int = 1,
+    noise: LotNoise | None = None,
 ) -> SensorEvidence:
     """Weigh everything that a model may lack to explain a campaign.
 
@@ -66,19 +143,29 @@ def sensor_evidence(
     model : SensorModel
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     seed : int, of the draws
+    noise : LotNoise, in place of what the campaign says of its noise
 
     Raises
     ------
     InputError
         If the positions do not determine the model, or leave no redundancy.
     """
-    problem = pose(fit_base(campaign, model, approach or usual_approach(campaign)))
+    if noise is not None:
+        campaign = replace(campaign, sigma_force=noise.sigma)
+    base = fit_base(campaign, model, approach or usual_approach(campaign))
+    problem = pose(base if noise is None else replace(base, level=noise.level))
     chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
     detection = detect(problem.field, problem.evidence, problem.residuals, chance)
     weighing = weigh(problem, detection, chance)
     nothing = float(np.logaddexp.reduce(detection.noise))
+    if noise is not None:  # a sensor with a noise of its own is no usual one
+        nothing = float(detection.noise[0])
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
+    if noise is not None:
+        any_level = Evidence(Level((1.0,), (DOUBTED,), known=True), problem.evidence.redundancy)
+        larger = any_level.of_noise(problem.residuals.z @ problem.residuals.z)
+        odds[LEVEL_OF_NOISE] = float(larger[0]) - nothing
     z, unknown = problem.residuals.z, problem.field.unknown
     if unknown is not None:
         odds |= {
@@ -90,7 +177,7 @@ def sensor_evidence(
         names = tuple(sorted(h.name for h in together.best))
         if len(names) == 2 and OUTLIER not in names:
             pairs[names[0], names[1]] = together.log_density - nothing
-    names, by_chance = _by_chance(problem, chance)
+    names, by_chance = _by_chance(problem, chance, noise)
     return SensorEvidence(
         campaign=campaign.name,
         p_value=detection.p_value,
@@ -105,12 +192,88 @@ def sensor_evidence(
         by_chance=by_chance,
         tested=names,
         observed=np.array([detection.densities[name] - nothing for name in names]),
+        sigma=_sigma_of(base.solution),
+        redundancy=base.solution.redundancy,
+        residuals=z * _sigma_stated(base.solution),
     )
+
+
+def _sigma_of(fit: Solution) -> float:
+    """Noise of a position mean by the residuals, m/s²."""
+    return max(_sigma_stated(fit) * float(np.sqrt(fit.omega / fit.redundancy)), LEAST_SIGMA)
+
+
+def _sigma_stated(fit: Solution) -> float:
+    return float(np.mean(np.asarray(fit.observed.sigma_force)))
+
+
+def mean_sensor(
+    campaigns: Sequence[Campaign], sensors: Sequence[SensorEvidence]
+) -> tuple[Campaign, LotNoise] | None:
+    """Average sensors that were in the same positions, in one order.
+
+    What all of them lack is as large in their mean, and the noise is smaller by the root of their
+    number. It is told by their scatter about the mean. None if the positions differ.
+    """
+    first, n = campaigns[0], len(campaigns)
+    if n < 2 or not all(_alike(first, other) for other in campaigns[1:]):
+        return None
+    if len({each.residuals.shape for each in sensors}) > 1:
+        return None
+    table = np.array([each.residuals for each in sensors])
+    freedom = (n - 1) * min(each.redundancy for each in sensors)
+    within = float(np.sum((table - table.mean(axis=0)) ** 2)) / freedom
+    sigma = max(float(np.sqrt(within / n)), LEAST_SIGMA)
+    columns = {
+        name: np.mean([getattr(one, name) for one in campaigns], axis=0)
+        for name in ("forces", *COLUMNS)
+        if getattr(first, name) is not None
+    }
+    angle = None if first.sigma_angle is None else first.sigma_angle / np.sqrt(n)
+    mean = replace(
+        first, name="mean of the lot", sd=None, n_samples=None, slope=None, sd_slope=None,
+        sigma_force=sigma, sigma_angle=angle, **columns,
+    )  # fmt: skip
+    return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
+
+
+COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
+"""What a position has beside its forces."""
+SAME = 0.15
+"""Largest difference of the directions of forces in positions that are the same."""
+
+
+def _alike(one: Campaign, other: Campaign) -> bool:
+    """Whether two campaigns were in the same positions, and have the same columns."""
+    if one.forces.shape != other.forces.shape:
+        return False
+    if any((getattr(one, name) is None) != (getattr(other, name) is None) for name in COLUMNS):
+        return False
+    a, b = (c.forces / np.linalg.norm(c.forces, axis=1, keepdims=True) for c in (one, other))
+    return bool(np.max(abs(a - b)) < SAME)
+
+
+def lot_noise(
+    campaigns: Iterable[Campaign],
+    models: Iterable[SensorModel],
+    approach: Approach | None,
+) -> LotNoise:
+    """Noise of a type by the calibrations of its sensors, each with a model."""
+    fits = [
+        fit_base(campaign, model, approach or usual_approach(campaign)).solution
+        for campaign, model in zip(campaigns, models, strict=True)
+    ]
+    sigmas = np.array([_sigma_of(fit) for fit in fits])
+    return LotNoise.of(sigmas, np.array([fit.redundancy for fit in fits]))
 
 
 def called(place: tuple[str, str]) -> str:
     """Name of something without a name that is a function of a coordinate, in a target."""
     return f"{UNKNOWN}({place[0]} → {place[1]})"
+
+
+COMMON = f"{UNKNOWN}(position → reading)"
+"""Name of what the mean of all sensors shows, whatever it is."""
 
 
 def shown(name: str) -> str:
@@ -125,10 +288,18 @@ def is_noise(name: str) -> bool:
     return name in NOISES
 
 
-def _by_chance(problem: Problem, chance: Chance) -> tuple[tuple[str, ...], Array]:
+def _by_chance(
+    problem: Problem, chance: Chance, noise: LotNoise | None
+) -> tuple[tuple[str, ...], Array]:
+    """Log odds of what is tested in noise alone, whose level is that of a sensor of the lot."""
     field, evidence = problem.field, problem.evidence
+    of_levels = np.random.SeedSequence(chance.seed.entropy, spawn_key=(*chance.seed.spawn_key, 1))
+    rng = np.random.default_rng(of_levels)
 
     def odds(errors: Array) -> Array:
+        if noise is not None:
+            half = noise.freedom / 2
+            errors = errors * np.sqrt(half / rng.gamma(half, size=(len(errors), 1)))
         return field.odds(evidence, field.parts(errors), np.sum(errors**2, axis=-1))
 
     if not field.names:

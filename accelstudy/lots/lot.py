@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,12 +13,24 @@ from scipy import optimize
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import track
 from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
-from accelstudy.lots.evidence import DRAWS, SensorEvidence, is_noise, lot_classes
+from accelstudy.lots.evidence import (
+    COMMON,
+    DRAWS,
+    LEVEL_OF_NOISE,
+    SensorEvidence,
+    is_noise,
+    lot_classes,
+    lot_noise,
+    mean_sensor,
+    sensor_evidence,
+)
 from accelstudy.lots.mixture import Mixture, lot_odds
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -26,7 +38,12 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEVEL = 0.05
-"""Level of the test whether anything is missing in a lot."""
+"""Level of the test whether anything is missing in a lot: half of it by what each campaign says of
+its noise, and half by the noise of the type."""
+LEFT = 0.01
+"""Level of the test whether a lot lacks more than what was found."""
+PASSES = 3
+"""Most times that what was found is added to the model."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 FEW = 2
@@ -35,11 +52,16 @@ EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
     UNKNOWN: priors.UNKNOWN,
+    COMMON: priors.UNKNOWN,
     **dict.fromkeys(NOISES, priors.COLOUR),
     AXES: priors.AXES,
     TAILS: priors.TAILS,
 }
 """Prior weights of what a lot may lack, relative to one effect of the catalogue."""
+ODD = "odd"
+"""Name of what a sensor lacks that the others do not."""
+NEVER = -30.0
+"""Log odds of what cannot be."""
 HAS = 0.5
 """Posterior probability from which a sensor counts among those that lack an effect."""
 
@@ -95,37 +117,64 @@ class Odd:
 
 
 @dataclass(frozen=True, eq=False)
-class Lot:
-    """The evidence of all sensors together.
+class Pass:
+    """The evidence of all sensors together, with one model.
 
     Attributes
     ----------
     sensors : tuple of SensorEvidence
+    mean : SensorEvidence, of their mean; None if they were in different positions
     """
 
     sensors: tuple[SensorEvidence, ...]
+    mean: SensorEvidence | None = None
 
     @cached_property
     def classes(self) -> list[tuple[str, ...]]:
         """Names that mean the same in this lot; the first one stands for them."""
-        return lot_classes(self.sensors)
+        return lot_classes(self.sensors) + ([] if self.mean is None else [(COMMON,)])
 
     @cached_property
     def mixture(self) -> Mixture:
         """Posterior of all sets of effects."""
-        odds = [[each.odds.get(members[0], 0.0) for members in self.classes]
-                for each in self.sensors]  # fmt: skip
-        place = {name: k for k, members in enumerate(self.classes) for name in members}
+        # One sensor alone never shows what has neither a name nor a shape.
+        unseen = [NEVER if members[0] == COMMON else 0.0 for members in self.classes]
+        odds = [
+            [
+                each.odds.get(members[0], no)
+                for members, no in zip(self.classes, unseen, strict=True)
+            ]
+            for each in self.sensors
+        ]
         pairs: dict[tuple[int, int], Array] = {}
         for i, each in enumerate(self.sensors):
-            for (one, other), log in each.pairs.items():
-                first, second = sorted((place[one], place[other]))
-                if first != second:
-                    logs = pairs.setdefault((first, second), np.full(len(self.sensors), np.nan))
-                    logs[i] = np.fmax(logs[i], log)
+            for both, log in self._pairs(each).items():
+                pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        return Mixture.of(np.array(odds), pairs, prior / prior.sum())
+        common: dict[tuple[int, ...], float] = {}
+        if (mean := self.mean) is not None:
+            # What is larger than noise in the mean is no noise.
+            of_mean = {name: log for name, log in mean.odds.items() if not is_noise(name)}
+            of_mean[COMMON] = mean.odds[LEVEL_OF_NOISE]
+            common = {
+                (k,): of_mean[members[0]]
+                for k, members in enumerate(self.classes)
+                if members[0] in of_mean
+            }
+            for both, log in self._pairs(mean).items():
+                common[both] = log
+        return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common)
+
+    def _pairs(self, each: SensorEvidence) -> dict[tuple[int, int], float]:
+        """Log odds of two classes together."""
+        place = {name: k for k, members in enumerate(self.classes) for name in members}
+        pairs: dict[tuple[int, int], float] = {}
+        for (one, other), log in each.pairs.items():
+            if one in place and other in place and place[one] != place[other]:
+                first, second = sorted((place[one], place[other]))
+                pairs[first, second] = max(log, pairs.get((first, second), -np.inf))
+        return pairs
 
     @cached_property
     def p_value(self) -> float:
@@ -144,9 +193,14 @@ class Lot:
         return float((1 + np.sum(by_chance >= seen)) / (DRAWS + 1))
 
     @property
+    def p_mean(self) -> float:
+        """Probability that the mean of sensors without anything missing shows as much."""
+        return 1.0 if self.mean is None else self.mean.p_value
+
+    @property
     def missing(self) -> bool:
         """Whether anything is missing, at one level for the whole lot."""
-        return self.p_value < LEVEL
+        return self.p_value < LEVEL / 2
 
     @cached_property
     def wrong(self) -> float:
@@ -205,31 +259,218 @@ class Lot:
             told.append(Odd(self.sensors[i].campaign, float(alone[i]), self.classes[k]))
         return told
 
-    def each(self) -> list[tuple[str, tuple[str, ...], float]]:
-        """Campaign, names of what it lacks under the lot, and their posterior, for each sensor."""
+    def without_odd(self) -> Pass:
+        """The same without the sensors that are odd."""
+        odd = {one.campaign for one in self.odd}
+        return replace(self, sensors=tuple(e for e in self.sensors if e.campaign not in odd))
+
+    def each(self) -> list[tuple[tuple[str, ...], float]]:
+        """Names of what a sensor lacks under the lot, and their posterior, for each sensor."""
         lacks, odd = self.mixture.sensors
         sets = [*lacks]
         table = np.array([*lacks.values(), odd])
-        best = table.argmax(axis=0)
+        rows = []
+        for i, k in enumerate(table.argmax(axis=0)):
+            names = (ODD,) if k == len(sets) else tuple(self.classes[c][0] for c in sets[k])
+            rows.append((names, float(table[k, i])))
+        return rows
+
+    def specs(self, places: Iterable[int]) -> dict[int, str]:
+        """Effects of some classes, each in the setting that most sensors have as best."""
+        specs = {}
+        for k in places:
+            counted: dict[str, float] = {}
+            for each, weight in zip(self.sensors, self.mixture.lacking(k), strict=True):
+                if (spec := each.specs.get(self.classes[k][0])) is not None:
+                    counted[spec] = counted.get(spec, 0.0) + float(weight)
+            if counted:
+                specs[k] = max(counted, key=lambda spec: counted[spec])
+        return specs
+
+
+@dataclass(frozen=True, eq=False)
+class Lot:
+    """What a lot lacks.
+
+    Attributes
+    ----------
+    passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the type,
+        with the model and all that was found before, until nothing new is found
+    model : SensorModel, with all that was found
+    effects : tuple of (Found, spec or None), in the order in which they were found
+    explained : bool, whether they are all that the lot lacks, but for odd sensors. If not, it lacks
+        something without a name, of which they only come close
+    """
+
+    passes: tuple[Pass, ...]
+    model: SensorModel
+    effects: tuple[tuple[Found, str | None], ...]
+    explained: bool = True
+
+    @property
+    def sensors(self) -> tuple[SensorEvidence, ...]:
+        """Evidence of each campaign by itself."""
+        return self.passes[0].sensors
+
+    @property
+    def p_value(self) -> float:
+        """Probability that sensors without anything missing would show as much evidence."""
+        same = self.passes[:1] if self.passes[0].found else self.passes[:2]
+        return min(2 * min(one.p_value for one in same), 1.0)
+
+    @property
+    def missing(self) -> bool:
+        """Whether anything is missing, at one level for the whole lot."""
+        return self.p_value < LEVEL
+
+    @property
+    def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
+        """The most probable classes of what has no sure name, with their posterior."""
+        return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
+
+    @cached_property
+    def _each(self) -> dict[Pass, list[tuple[tuple[str, ...], float]]]:
+        return {one: one.each() for one in self.passes}
+
+    @property
+    def odd(self) -> list[Odd]:
+        """Odd sensors, with all that was found in the model; the surest first."""
+        return self.passes[-1].odd
+
+    @property
+    def close(self) -> list[tuple[str, ...]]:
+        """Names that come close to what has no name, if something without one is missing."""
+        nameless = [] if self.explained else self.effects
+        return [f.names for f, spec in nameless if spec is not None]
+
+    def each(self) -> list[tuple[str, tuple[str, ...], float]]:
+        """Campaign, names of what it lacks under the lot, and their posterior, for each sensor."""
+        told = {found.names[0] for found, _ in self.effects} if self.explained else set()
         rows = []
         for i, sensor in enumerate(self.sensors):
-            names = ("odd",) if best[i] == len(sets) else tuple(
-                self.classes[k][0] for k in sets[best[i]]
-            )  # fmt: skip
-            rows.append((sensor.campaign, names, float(table[best[i], i])))
+            names, probability = tuple[str, ...](), 1.0
+            for k, one in enumerate(self.passes, start=1):
+                of_pass, posterior = self._each[one][i]
+                kept = {*told, ODD} if k == len(self.passes) else told
+                names += tuple(name for name in of_pass if name in kept)
+                probability *= posterior
+            rows.append((sensor.campaign, names, probability))
         return rows
+
+
+def weigh_lot(
+    campaigns: Sequence[Campaign],
+    model: SensorModel,
+    approach: Approach | None = None,
+    seed: int = 1,
+    first: Sequence[SensorEvidence] | None = None,
+) -> Lot:
+    """Say what sensors of one type lack together.
+
+    Parameters
+    ----------
+    campaigns : of the sensors, two or more
+    model : SensorModel
+    approach : Approach; by default robot-aided where a campaign has the robot's angles
+    seed : int, of the draws
+    first : evidence of each campaign, if it is known
+
+    Raises
+    ------
+    InputError
+        If a campaign does not determine the model, or leaves no redundancy.
+    """
+
+    def weighed(with_: SensorModel, *, by_lot: bool = True) -> Pass:
+        models = [with_ if _shows(one, with_, approach) else model for one in campaigns]
+        noise = lot_noise(campaigns, models, approach) if by_lot else None
+        each = zip(campaigns, models, strict=True)
+        progress = track(each, "evidence of the sensors", len(campaigns))
+        sensors = [
+            sensor_evidence(campaign, own, approach, seed + i, noise)
+            for i, (campaign, own) in enumerate(progress)
+        ]
+        return with_mean(sensors, with_)
+
+    def with_mean(sensors: Sequence[SensorEvidence], with_: SensorModel) -> Pass:
+        odd, mean = {one.campaign for one in Pass(tuple(sensors)).odd}, None
+        usual = [k for k, one in enumerate(sensors) if one.campaign not in odd]
+        of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
+        if of_mean is not None:
+            with suppress(InputError):  # the positions do not determine the model
+                mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
+        return Pass(tuple(sensors), mean)
+
+    now = weighed(model, by_lot=False) if first is None else with_mean(first, model)
+    passes, whole = [now], model
+    effects: list[tuple[Found, str | None]] = []
+    for _ in range(PASSES):
+        found = _new(now, whole, effects)
+        specs = now.specs(k for k, _ in found)
+        effects += [(one, specs.get(k)) for k, one in found]
+        whole = extended(whole, specs.values())
+        now = weighed(whole)
+        passes.append(now)
+        if not _new(now, whole, effects):
+            break
+    nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
+    explained = not nameless and _explained(now, whole, weighed, len(effects))
+    return Lot(tuple(passes), whole, tuple(effects), explained)
+
+
+def _shows(campaign: Campaign, model: SensorModel, approach: Approach | None) -> bool:
+    """Whether a campaign determines a model, with redundancy."""
+    try:
+        fit_base(campaign, model, approach or usual_approach(campaign))
+    except InputError:
+        return False
+    return True
+
+
+def _new(
+    now: Pass, whole: SensorModel, effects: Sequence[tuple[Found, str | None]]
+) -> list[tuple[int, Found]]:
+    """What a pass found that neither the model nor an earlier pass has."""
+    known = {name for found, _ in effects for name in found.names}
+    return [
+        (k, one) for k, one in now.found if not _has(whole, one.names) and not known & {*one.names}
+    ]
+
+
+def _has(model: SensorModel, names: Sequence[str]) -> bool:
+    """Whether a model has one of some effects."""
+    return any(effect.name in names for effect in model.effects)
+
+
+def _explained(
+    now: Pass,
+    whole: SensorModel,
+    weighed: Callable[[SensorModel], Pass],
+    known: int,
+) -> bool:
+    """Whether what was found explains the lot, with the most probable of what is not sure."""
+    while (rest := now.without_odd()).p_value < LEFT or rest.p_mean < LEFT:
+        best = int(np.argmax(rest.given))
+        spec = rest.specs([best])
+        if is_noise(rest.classes[best][0]) or _has(whole, rest.classes[best]):
+            return True
+        if not spec or known >= PASSES:
+            return False
+        whole, known = extended(whole, spec.values()), known + 1
+        now = weighed(whole)
+    return True
 
 
 def _kind(name: str) -> str:
     """Which of `WEIGHTS` something has; things of one kind share it evenly."""
-    if name.startswith(UNKNOWN):
+    if name.startswith(UNKNOWN) and name != COMMON:
         return UNKNOWN
-    return name if is_noise(name) else EFFECT
+    return name if name == COMMON or is_noise(name) else EFFECT
 
 
-def type_model(lot: Lot, model: SensorModel) -> SensorModel:
-    """Model with all effects that the lot lacks."""
-    effects = (*(effect.spec for effect in model.effects), *_specs(lot).values())
+def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
+    """Model with further effects."""
+    effects = (*(effect.spec for effect in model.effects), *specs)
     return compose(composition_name(compose("type", effects).effects), effects)
 
 
@@ -245,35 +486,24 @@ def with_sizes(
     model : SensorModel, of the diagnosis
     approach : Approach, as in `sensor_evidence`
     """
-    specs, extended = _specs(lot), type_model(lot, model)
-    values, sigmas = np.full((2, len(campaigns), extended.n_parameters), np.nan)
-    for i, campaign in enumerate(campaigns if specs else ()):
+    values, sigmas = np.full((2, len(campaigns), lot.model.n_parameters), np.nan)
+    effects = lot.effects if lot.explained else ()
+    known = any(spec for _, spec in effects)
+    for i, campaign in enumerate(campaigns if known else ()):
         with suppress(InputError):  # the campaign cannot show all of it
-            fit = fit_campaign(campaign, extended, approach or usual_approach(campaign))
+            fit = fit_campaign(campaign, lot.model, approach or usual_approach(campaign))
             values[i], sigmas[i] = fit.parameters, np.sqrt(np.diag(fit.covariance))
-    first, results = model.n_parameters, dict[int, tuple[Size, ...]]()
-    for k, spec in specs.items():
-        parameters, rows = compose(spec, (spec,)).parameters, lot.mixture.lacking(k) > HAS
-        results[k] = tuple(
-            Size(p.name, p.unit, *random_effects(values[rows, j], sigmas[rows, j] ** 2),
-                 values[:, j], sigmas[:, j])
-            for j, p in enumerate(parameters, start=first)
-        )  # fmt: skip
-        first += len(parameters)
-    return [replace(found, sizes=results.get(k, ())) for k, found in lot.found]
-
-
-def _specs(lot: Lot) -> dict[int, str]:
-    """Effects that were found, each in the setting that most sensors that lack it have as best."""
-    specs = {}
-    for k, found in lot.found:
-        counted: dict[str, float] = {}
-        for each, weight in zip(lot.sensors, lot.mixture.lacking(k), strict=True):
-            if (spec := each.specs.get(found.names[0])) is not None:
-                counted[spec] = counted.get(spec, 0.0) + float(weight)
-        if counted:
-            specs[k] = max(counted, key=lambda spec: counted[spec])
-    return specs
+    first, results = model.n_parameters, []
+    for found, spec in effects:
+        sizes = []
+        if spec is not None:
+            rows = np.array([found.names[0] in names for _, names, _ in lot.each()])
+            for j, p in enumerate(compose(spec, (spec,)).parameters, start=first):
+                of_type = random_effects(values[rows, j], sigmas[rows, j] ** 2)
+                sizes.append(Size(p.name, p.unit, *of_type, values[:, j], sigmas[:, j]))
+            first += len(sizes)
+        results.append(replace(found, sizes=tuple(sizes)))
+    return results
 
 
 def random_effects(values: Array, variances: Array) -> tuple[float, float, float]:

@@ -1,20 +1,25 @@
 """The mixture of a lot: which effects its sensors lack, how many of them do, and which ones.
 
-An effect k of the lot is missing in each sensor with the probability ρ_k, its share, which is
-uniform a priori. Effects are missing independently of each other. A set Z of effects of the lot has
-the evidence
+An effect k of the lot is missing in each sensor with the probability ρ_k, its share: 1 in every
+second lot a priori, and uniform in the others. Effects are missing independently of each other. A
+set Z of effects of the lot has the evidence
 
     B_Z = ∫ Π_i [(1 − ε) Σ_{s ⊆ Z} Π_{k ∈ s} ρ_k Π_{k ∈ Z∖s} (1 − ρ_k) r_i(s) + ε r̄_i] dρ,
 
 with r_i(s) the odds of the campaign of sensor i for the set s against nothing, and r̄_i their mean
 over all that could be missing: a sensor may be odd, and then lack something of its own. Sets have
 up to three effects, and a sensor lacks up to two of them.
+
+The r_i take the sizes of the sensors for independent. If the sensors were in the same positions,
+one or two effects may as well be the same in all of them: then the evidence is that of their mean,
+and either is equally probable a priori. The mean tells what is missing; in which of the sensors,
+only the sensors themselves do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations
 
@@ -29,14 +34,18 @@ ODD = 0.01
 """Prior probability that a sensor is odd."""
 MISSING = 0.5
 """Prior probability that the lot lacks anything."""
-MORE = 0.15
+ALL = 0.5
+"""Prior probability that an effect of the lot is missing in all of its sensors."""
+ALIKE = 0.5
+"""Prior probability that an effect is equally large in all sensors."""
+MORE = 0.3
 """Prior probability of two effects rather than one, and of three rather than two."""
 STRONGEST, FURTHER = 12, 3
 """Effects of which pairs are tried, and pairs to which a third one is added."""
 LEAST = 1e-6
 """Posterior below which a set does not count."""
 NODES = {1: 64, 2: 24, 3: 12}
-"""Nodes of the integral over each share, by the number of effects."""
+"""Nodes of the integral over each share below 1, by the number of effects."""
 
 
 @dataclass(frozen=True)
@@ -62,18 +71,26 @@ class Mixture:
     odds : (n, K) array, log odds of each sensor for each effect against nothing
     pairs : mapping of two places, in order, to (n,) arrays of log odds of both together
     prior : (K,) array, prior probabilities of the effects, which sum to 1
+    common : mapping of one or two places to the log odds of the mean of the sensors
     sets : list of Weighted, most probable first
     """
 
     odds: Array
     pairs: Mapping[tuple[int, int], Array]
     prior: Array
+    common: Mapping[Names, float]
     sets: list[Weighted]
 
     @classmethod
-    def of(cls, odds: Array, pairs: Mapping[tuple[int, int], Array], prior: Array) -> Mixture:
+    def of(
+        cls,
+        odds: Array,
+        pairs: Mapping[tuple[int, int], Array],
+        prior: Array,
+        common: Mapping[Names, float] | None = None,
+    ) -> Mixture:
         """Weigh the sets of effects, the strongest first."""
-        empty = cls(odds, pairs, prior, [])
+        empty = cls(odds, pairs, prior, common or {}, [])
         k = odds.shape[1]
         found: dict[Names, float] = {(): np.log(1 - MISSING) + empty._evidence(())}
         for i in range(k):
@@ -90,7 +107,7 @@ class Mixture:
                 found[names] = log + empty._evidence(names)
             strongest = sorted(tried, key=lambda s: -found[s])[:FURTHER]
         ordered = sorted(found.items(), key=lambda item: -item[1])
-        return cls(odds, pairs, prior, [Weighted(n, float(w)) for n, w in ordered])
+        return replace(empty, sets=[Weighted(n, float(w)) for n, w in ordered])
 
     @cached_property
     def probabilities(self) -> Array:
@@ -123,11 +140,12 @@ class Mixture:
                     axis=tuple(a for a in range(len(one.names)) if a != place)
                 )  # fmt: skip
                 log = np.log(np.maximum(mass / _nodes(len(one.names))[1], 1e-300))
-                fine = np.exp(np.interp(grid, values, log))
-                density += p * fine / fine.sum()
+                fine = np.exp(np.interp(grid, values[:-1], log[:-1]))
+                density += p * mass[:-1].sum() * fine / fine.sum()
+                density[-1] += p * mass[-1]
         density /= density.sum()
         below = np.cumsum(density)
-        low, high = np.interp([0.025, 0.975], below, grid)
+        low, high = grid[np.minimum(np.searchsorted(below, [0.025, 0.975]), 400)]
         return float(grid @ density), float(low), float(high)
 
     @cached_property
@@ -173,20 +191,21 @@ class Mixture:
         if len(subset) == 1:
             return self.odds[:, subset[0]]
         one, other = subset
-        both = np.maximum(self.odds[:, one], self.odds[:, other])
+        # Two that were not weighed together say no more than the weaker one.
+        both = np.minimum(self.odds[:, one], self.odds[:, other])
         found = self.pairs.get((one, other))
         return both if found is None else np.where(np.isnan(found), both, found)
 
     def _parts(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Log of what each subset, and oddness, contributes: (n, nodes ...) arrays."""
         size = len(names)
-        shape = (len(self.odds), *(NODES[size],) * size) if size else (len(self.odds),)
+        shape = (len(self.odds), *(len(_nodes(size)[0]),) * size) if size else (len(self.odds),)
         rho = np.meshgrid(*[_nodes(size)[0]] * size, indexing="ij") if size else []
         parts = {}
         for subset in (s for r in range(min(size, 2) + 1) for s in combinations(names, r)):
             log = np.full(shape[1:], np.log(1 - ODD))
             for place, i in enumerate(names):
-                log = log + np.log(rho[place] if i in subset else 1 - rho[place])
+                log = log + (np.log(rho[place]) if i in subset else _log_of_rest(rho[place]))
             parts[subset] = self._together(subset).reshape(-1, *[1] * size) + log
         strange = (np.log(ODD) + self._anything).reshape(-1, *[1] * size)
         return parts, np.broadcast_to(strange, shape)
@@ -196,8 +215,15 @@ class Mixture:
         return np.asarray(np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0))
 
     def _evidence(self, names: Names) -> float:
-        logs = self._log_likelihood(names)
-        return float(special.logsumexp(logs + _log_weights(len(names))))
+        return float(np.logaddexp(*self._ways(names))) if names else self._ways(names)[0]
+
+    def _ways(self, names: Names) -> tuple[float, float]:
+        """Log evidence of effects with sizes of each sensor, and of the same one in all."""
+        logs = self._log_likelihood(names) + _log_weights(len(names))
+        each = float(special.logsumexp(logs))
+        if names not in self.common:
+            return each, -np.inf
+        return each + np.log(1 - ALIKE), self.common[names] + np.log(ALIKE)
 
     def _posterior(self, names: Names) -> tuple[list[Array], Array]:
         """Nodes of each share, and their posterior probabilities (nodes ...)."""
@@ -211,7 +237,13 @@ def _nodes(size: int) -> tuple[Array, Array]:
     if not size:
         return np.zeros(0), np.zeros(0)
     nodes, weights = np.polynomial.legendre.leggauss(NODES[size])
-    return (nodes + 1) / 2, weights / 2
+    return np.append((nodes + 1) / 2, 1.0), np.append((1 - ALL) * weights / 2, ALL)
+
+
+def _log_of_rest(share: Array) -> Array:
+    """Log of the share that does not lack an effect, −inf where all do."""
+    with np.errstate(divide="ignore"):
+        return np.log1p(-share)
 
 
 @cache
@@ -237,6 +269,6 @@ def lot_odds(odds: Sequence[Array], prior: Array) -> Array:
     nodes, weights = _nodes(2)
     logs = np.zeros((*odds[0].shape, len(nodes)))
     for each in odds:
-        logs += np.logaddexp(np.log(1 - nodes), each[..., None] + np.log(nodes))
+        logs += np.logaddexp(_log_of_rest(nodes), each[..., None] + np.log(nodes))
     by_effect = special.logsumexp(logs + np.log(weights), axis=-1)
     return np.asarray(special.logsumexp(by_effect + np.log(prior), axis=-1))

@@ -29,7 +29,7 @@ from accelstudy.drawing.style import (
 )
 from accelstudy.files.outputs import whole_file
 from accelstudy.lots.evidence import shown
-from accelstudy.lots.lot import LEVEL, Found, Lot, type_model
+from accelstudy.lots.lot import LEVEL, Found, Lot
 from accelstudy.pages import lines, write_page
 from accelstudy.sensors.models import MODEL_FILE
 from accelstudy.sensors.sensor import SensorModel
@@ -41,6 +41,7 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
         f"{' or '.join(map(shown, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
     ]
     top = [max(each.odds, key=lambda name, e=each: e.odds[name]) for each in lot.sensors]  # type: ignore[misc]
+    close = [" or ".join(map(shown, names[:3])) for names in lot.close]
     single = sum(name in found[0].names for name in top) if found else 0
     return lines(
         "lots/wording.txt.j2",
@@ -53,6 +54,7 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
         len(lot.sensors),
         sum(each.p_value < LEVEL for each in lot.sensors),
         single,
+        close,
     )
 
 
@@ -81,6 +83,8 @@ def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
             }
             for f in found
         ],
+        "explained": lot.explained,
+        "close": [list(names) for names in lot.close],
         "alternatives": [{"names": list(n), "posterior": p} for n, p in lot.alternatives],
         "odd": [
             {"campaign": o.campaign, "posterior": o.posterior, "names": list(o.names),
@@ -120,8 +124,8 @@ def write_lot(
         The content of lot.json.
     """
     folder, content = Path(folder), lot_document(lot, found)
-    whole, steps = type_model(lot, model), []
-    if len(whole.effects) > len(model.effects):
+    whole, steps = lot.model, []
+    if lot.explained and len(whole.effects) > len(model.effects):
         effects = [effect.spec for effect in whole.effects]
         with whole_file(folder / MODEL_FILE) as path:
             path.write_text(yaml.safe_dump({"models": {"type": effects}}), encoding="utf-8")

@@ -30,7 +30,7 @@ from accelstudy.epochs.comparison import compare
 from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
 from accelstudy.lots.evidence import SensorEvidence
-from accelstudy.lots.lot import Lot
+from accelstudy.lots.lot import Lot, Pass
 from accelstudy.lots.output import lot_document
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
@@ -110,11 +110,15 @@ def _lot():
     """Content of lot.json, of sensors that lack the same."""
     name, odds, by_chance = "thermal_bias", np.array([20.0]), np.zeros((1000, 1))
     each = [
-        SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds)
+        SensorEvidence(
+            c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds, 1.0, 9, odds
+        )
         for c in "abc"
     ]
-    lot = Lot(tuple(each))
-    return lot_document(lot, [found for _, found in lot.found])
+    one = Pass(tuple(each))
+    effects = tuple((found, name) for _, found in one.found)
+    lot = Lot((one, one), get_model("bias-scale"), effects)
+    return lot_document(lot, [found for found, _ in effects])
 
 
 def _keys(document):

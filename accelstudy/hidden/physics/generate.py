@@ -121,13 +121,20 @@ ARRIVAL = 5e-4
 """rad, sd of the joints about the attitudes of the design."""
 
 
-def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
+Known = tuple[Cause, tuple[str, ...]]
+"""An effect, and the names that mean the same."""
+
+
+def generate(
+    case: Case, seed: np.random.SeedSequence, given: Mapping[str, Known] | None = None
+) -> tuple[Campaign, Truth]:
     """Simulate a campaign.
 
     Parameters
     ----------
     case : Case
     seed : numpy.random.SeedSequence, from which all that is random follows
+    given : mapping of effects of the case to what they are; the others are drawn
 
     Raises
     ------
@@ -146,7 +153,8 @@ def generate(case: Case, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]
     conditions = Conditions.of(session, case.approach, sensor)
     causes, hidden, classes = [], [], []
     for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
-        cause, same = drawn(name, lam, session, conditions, knowing, rng)
+        of_lot = None if given is None else given.get(name)
+        cause, same = of_lot or drawn(name, lam, session, conditions, knowing, rng)
         classes.append(same)
         causes.append(cause)
         parameters = tuple(cause.parameters[0].tolist())
