@@ -23,6 +23,8 @@ class Observations:
     sigma_force : float or (n, 3) array, m/s²
     angles : (R, n, 2) array, rad, roll and pitch of the robot; None without a robot
     sigma_angle : float or (n, 2) array, rad
+    common : (n, 2, k) array, rad, errors of the angles that all positions share: derivatives by k
+        unknown numbers that are 0 ± 1; None if the errors of the positions are independent
     gravity : float or (R,) array, m/s²; one number where it is held fixed
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : HoldConditions, of the positions
@@ -35,6 +37,7 @@ class Observations:
     sigma_force: ArrayLike
     angles: Array | None = None
     sigma_angle: ArrayLike = 0.0
+    common: Array | None = None
     gravity: ArrayLike = STANDARD_GRAVITY
     sigma_gravity: float = 0.0
     hold: HoldConditions | None = None
@@ -54,6 +57,7 @@ class Observations:
             angles=None if self.angles is None else self.angles[:, positions],
             sigma_force=chosen(self.sigma_force),
             sigma_angle=chosen(self.sigma_angle),
+            common=None if self.common is None else self.common[positions],
             hold=None if self.hold is None else self.hold.take(positions),
             slope=None if self.slope is None else self.slope[positions],
             sd_slope=None if self.sd_slope is None else self.sd_slope[positions],

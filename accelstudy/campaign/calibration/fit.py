@@ -184,11 +184,13 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
     noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
+    sigma_angle, common = angle_errors(campaign, campaign.angles)
     return Observations(
         forces=campaign.forces[None],
         sigma_force=noise.sigma_force,
         angles=None if campaign.angles is None else campaign.angles[None],
-        sigma_angle=noise.sigma_angle,
+        sigma_angle=sigma_angle,
+        common=common,
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
@@ -196,6 +198,16 @@ def campaign_observations(campaign: Campaign) -> Observations:
         slope=campaign.slope if stated else None,
         sd_slope=campaign.sd_slope if stated else None,
     )
+
+
+def angle_errors(
+    campaign: Campaign, angles: Array | None
+) -> tuple[float | Array, Array | None]:
+    """Errors of roll and pitch in attitudes (n, 2), rad: `sigma_angle` and `common`."""
+    reference, gravity = campaign.reference, campaign.gravity
+    if reference is None or angles is None:
+        return campaign.sigma_angle or 0.0, None
+    return reference.sigma(angles, gravity), reference.common(angles, gravity)
 
 
 def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:
@@ -270,7 +282,8 @@ def fit_campaign(
             f"{_cause(campaign, theory, diagnosing)}"
         )
     fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
-    if campaign.sigma_force is None and model.prior_weights.any() and adjustment.redundancy > 0:
+    prior = model.prior_weights.any() or observed.common is not None
+    if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
         # What is known a priori needs a sigma beside it: that of the residuals.
         for _ in range(3):
             sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))
