@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,9 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
+
+
+AngleErrors = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class Observations:
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : HoldConditions, of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    angle_errors : function of angles (k, 2), rad, optional: `sigma_angle` and `common` in other
+        attitudes; the adjustment does not use it
     slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
         deviation, R = 1; the adjustment does not use them
     """
@@ -42,6 +48,7 @@ class Observations:
     sigma_gravity: float = 0.0
     hold: HoldConditions | None = None
     initial: Array | None = None
+    angle_errors: AngleErrors | None = None
     slope: Array | None = None
     sd_slope: Array | None = None
 

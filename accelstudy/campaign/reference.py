@@ -62,28 +62,24 @@ class ReferenceSensor(Block):
         values, vectors = np.linalg.eigh(np.array(self.covariance))
         return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
-    def sigma(self, angles: Array, gravity: float) -> Array:
-        """Standard deviations of roll and pitch by the noise of its readings, (n, 2), rad.
+    def errors(self, angles: Array, gravity: float) -> tuple[Array, Array]:
+        """Errors of roll and pitch in some attitudes.
 
         Parameters
         ----------
         angles : (n, 2) array, rad
         gravity : float, m/s²
-        """
-        by_force = jacobian(_forces(angles, gravity))
-        return np.asarray(self.sigma_mps2 * np.linalg.norm(by_force, axis=-1))
 
-    def common(self, angles: Array, gravity: float) -> Array:
-        """Derivatives J L of roll and pitch by the errors of its calibration, (n, 2, u), rad."""
-        forces = _forces(angles, gravity)
+        Returns
+        -------
+        sigma : (n, 2) array, rad, standard deviations by the noise of its readings
+        common : (n, 2, u) array, rad, derivatives J L by the errors of its calibration
+        """
+        most = np.pi / 2 - NEAREST
+        roll, pitch = angles[:, 0], np.clip(angles[:, 1], -most, most)
+        forces = np.column_stack(specific_force(roll, pitch, gravity))
         own, model, p = self.axes.from_frd(forces), self.model, np.array(self.parameters)
         by_parameters = model.correction_jacobian(model.sense(own, p, gravity), p, gravity)
-        turned = self.axes.matrix @ by_parameters
-        return np.asarray(jacobian(forces) @ turned @ self._root)
-
-
-def _forces(angles: Array, gravity: float) -> Array:
-    """Specific forces (n, 3), m/s², in attitudes (n, 2), not quite at the pole of roll."""
-    most = np.pi / 2 - NEAREST
-    roll, pitch = angles[:, 0], np.clip(angles[:, 1], -most, most)
-    return np.column_stack(specific_force(roll, pitch, gravity))
+        by_force = jacobian(forces)
+        sigma = self.sigma_mps2 * np.linalg.norm(by_force, axis=-1)
+        return sigma, by_force @ self.axes.matrix @ by_parameters @ self._root

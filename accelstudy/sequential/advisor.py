@@ -290,11 +290,12 @@ def next_rows(
 ) -> Array:
     """Rows of the design matrix of each of k attitudes as the next position, (k, c, u')."""
     f_b, hold = -campaign.gravity * directions, next_holds(campaign, directions)
-    sigma_angle, common = angle_errors(campaign, angles_of(f_b))
+    angles, errors = angles_of(f_b), angle_errors(campaign)
+    sigma_angle, common = (noise.sigma_angle, None) if errors is None else errors(angles)
     observed = Observations(
         forces=f_b[None],  # of an ideal sensor, all of whose effects are zero
         sigma_force=noise.sigma_force,
-        angles=angles_of(f_b)[None],
+        angles=angles[None],
         sigma_angle=sigma_angle,
         common=common,
         gravity=campaign.gravity,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
@@ -129,6 +130,20 @@ class CampaignFit:
         return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
 
     @property
+    def by_reference(self) -> Array | None:
+        """Part of `covariance` that the calibration of a reference causes, (u, u), SI.
+
+        It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
+        errors c that all holds share. None where no reference was used.
+        """
+        if self.observed.common is None or not self.approach.uses_angles:
+            return None
+        q, u = self.adjustment.cofactors[0], self.model.n_parameters
+        shared = slice(u, u + self.observed.common.shape[-1])
+        part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
+        return self.variance_factor * part
+
+    @property
     def sigma(self) -> Array:
         """Standard deviations of the parameters to quote, (u,), SI."""
         return np.sqrt(np.diag(self.covariance))
@@ -184,13 +199,17 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
     noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
-    sigma_angle, common = angle_errors(campaign, campaign.angles)
+    errors = angle_errors(campaign)
+    sigma_angle, common = noise.sigma_angle, None
+    if errors is not None and campaign.angles is not None:
+        sigma_angle, common = errors(campaign.angles)
     return Observations(
         forces=campaign.forces[None],
         sigma_force=noise.sigma_force,
         angles=None if campaign.angles is None else campaign.angles[None],
         sigma_angle=sigma_angle,
         common=common,
+        angle_errors=errors,
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
@@ -200,14 +219,11 @@ def campaign_observations(campaign: Campaign) -> Observations:
     )
 
 
-def angle_errors(
-    campaign: Campaign, angles: Array | None
-) -> tuple[float | Array, Array | None]:
-    """Errors of roll and pitch in attitudes (n, 2), rad: `sigma_angle` and `common`."""
-    reference, gravity = campaign.reference, campaign.gravity
-    if reference is None or angles is None:
-        return campaign.sigma_angle or 0.0, None
-    return reference.sigma(angles, gravity), reference.common(angles, gravity)
+def angle_errors(campaign: Campaign) -> AngleErrors | None:
+    """Errors of a reference in any attitude, as of `Observations`; None without a reference."""
+    if campaign.reference is None:
+        return None
+    return partial(campaign.reference.errors, gravity=campaign.gravity)
 
 
 def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:

@@ -196,10 +196,9 @@ class Beside:
             parameters=self.calibration.parameters.tolist(),
             covariance=self.calibration.covariance.tolist(),
         )
-        sigma = reference.sigma(angles, g)
+        sigma, common = reference.errors(angles, g)
         whole = replace(whole, angles=angles, sigma_angle=accuracy.allan / g, reference=reference)
-        common = np.linalg.norm(reference.common(angles, g), axis=-1)
-        poles = near_pole(angles, np.hypot(sigma, common))
+        poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
         why = "the x axis of the reference is too near to the vertical for a roll"
         reasons = {int(n): why for n in whole.positions[poles]}
         warnings = [f"hold {n} left out: {why}" for n in reasons]
