@@ -41,8 +41,9 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     -------
     Adjustment
         Parameters in the order of ``model.parameters``; those of errors that all angles share
-        follow, and gravity is the last if it is observed (``sigma_gravity > 0``). Observations are f_x, f_y, f_z and, with a robot, roll and
-        pitch; variances are absolute, so the variance of unit weight a priori is 1.
+        follow, and gravity is the last if it is observed (``sigma_gravity > 0``). Observations are
+        f_x, f_y, f_z and, with a robot, roll and pitch; variances are absolute, so the variance of
+        unit weight a priori is 1.
 
     Raises
     ------

@@ -27,12 +27,12 @@ class Observations:
     sigma_force : float or (n, 3) array, m/s²
     angles : (R, n, 2) array, rad, roll and pitch of the robot; None without a robot
     sigma_angle : float or (n, 2) array, rad
-    common : (n, 2, k) array, rad, errors of the angles that all positions share: derivatives by k
-        unknown numbers that are 0 ± 1; None if the errors of the positions are independent
     gravity : float or (R,) array, m/s²; one number where it is held fixed
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : HoldConditions, of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    common : (n, 2, k) array, rad, errors of the angles that all positions share: derivatives by k
+        unknown numbers that are 0 ± 1; None if the errors of the positions are independent
     angle_errors : function of angles (k, 2), rad, optional: `sigma_angle` and `common` in other
         attitudes; the adjustment does not use it
     slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
@@ -43,11 +43,11 @@ class Observations:
     sigma_force: ArrayLike
     angles: Array | None = None
     sigma_angle: ArrayLike = 0.0
-    common: Array | None = None
     gravity: ArrayLike = STANDARD_GRAVITY
     sigma_gravity: float = 0.0
     hold: HoldConditions | None = None
     initial: Array | None = None
+    common: Array | None = None
     angle_errors: AngleErrors | None = None
     slope: Array | None = None
     sd_slope: Array | None = None

@@ -76,7 +76,9 @@ _SECTIONS = {
 @click.option("--means", is_flag=True, help="LOG is a table with the mean of each hold.")
 @click.option("--robot-sigma", type=float, help="Sd of the robot's roll and pitch, mgon.")
 @click.option("--robot-unit", help="Unit of the robot's angles: gon, deg, rad.  [default: gon]")
-@click.option("--reference-log", type=PATH, help="Raw log of a calibrated sensor on one plate with it.")
+@click.option(
+    "--reference-log", type=PATH, help="Raw log of a calibrated sensor on one plate with it."
+)
 @click.option("--reference", type=PATH, help="The calibration.json of that sensor.")
 @click.option(
     "--reference-columns",

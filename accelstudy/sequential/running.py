@@ -212,7 +212,15 @@ def _changes(before: Campaign, now: Campaign) -> str:
         if old is not None and new is not None and not np.array_equal(old, new[:n]):
             changed = before.positions[np.any(np.reshape(old != new[:n], (n, -1)), axis=1)]
             return f"position {changed[0]} was changed"
-    header = ("unit", "gravity", "sigma_gravity", "sigma_force", "sigma_angle", "reference", "full_range")
+    header = (
+        "unit",
+        "gravity",
+        "sigma_gravity",
+        "sigma_force",
+        "sigma_angle",
+        "reference",
+        "full_range",
+    )
     if any(getattr(before, name) != getattr(now, name) for name in header):
         return "campaign.yaml was changed"
     return ""

@@ -4,16 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calling import refused
 
 from accelstudy.adjustment import Observations, calibrate
+from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY as G
-from accelstudy.campaign.calibration.fit import campaign_observations
+from accelstudy.campaign.calibration.fit import campaign_observations, fit_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.next_positions import _fit
+from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import get_model
+from accelstudy.sequential.advisor import next_rows
+from accelstudy.sequential.recursion import Recursion
+from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
 TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
@@ -53,15 +61,18 @@ def sessions(covariance, count, seed, frame="frd"):
         reading = reading + NOISE_OF_REFERENCE * rng.standard_normal(forces.shape)
         angles = angles_of(beside.axes.to_frd(NINE.correct(reading, told)))
         measured = TWELVE.sense(forces, truth) + NOISE * rng.standard_normal(forces.shape)
-        yield truth, Campaign(
-            name="beside",
-            positions=np.arange(1, 21),
-            forces=measured,
-            gravity=G,
-            sigma_force=NOISE,
-            angles=angles,
-            sigma_angle=NOISE_OF_REFERENCE / G,
-            reference=beside,
+        yield (
+            truth,
+            Campaign(
+                name="beside",
+                positions=np.arange(1, 21),
+                forces=measured,
+                gravity=G,
+                sigma_force=NOISE,
+                angles=angles,
+                sigma_angle=NOISE_OF_REFERENCE / G,
+                reference=beside,
+            ),
         )
 
 
@@ -79,3 +90,93 @@ def test_sigmas_contain_the_calibration_of_the_reference(known):
     assert np.all(np.abs(np.mean(inside, axis=0) - 0.95) < 0.045)
     assert np.min(np.mean(alone, axis=0)) < 0.85
     assert np.mean(omega) == pytest.approx(1, abs=4 * np.sqrt(2 / result.redundancy / SESSIONS))
+
+
+@pytest.fixture(scope="module")
+def campaign(known):
+    """A campaign beside a reference whose x axis points to the right."""
+    ((_, campaign),) = sessions(known, 1, seed=2, frame="rbd")
+    return campaign
+
+
+def test_common_errors_are_those_of_changed_parameters(campaign):
+    """J L by the package, against roll and pitch with a calibration that is changed a little."""
+    beside, angles = campaign.reference, campaign.angles
+    _, common = beside.errors(angles, G)
+    own = beside.axes.from_frd(G * np.column_stack(_directions(angles)))
+    p = np.array(beside.parameters)
+    reading = NINE.sense(own, p)
+    step = np.cov(np.random.default_rng(1).standard_normal((9, 40)))[0] * 1e-5
+
+    def roll_and_pitch(parameters):
+        return angles_of(beside.axes.to_frd(NINE.correct(reading, parameters)))
+
+    change = (roll_and_pitch(p + step) - roll_and_pitch(p - step)) / 2
+    # A step of the parameters is L c; that of the angles is then J L c.
+    values, vectors = np.linalg.eigh(np.array(beside.covariance))
+    c = (vectors / np.sqrt(values)).T @ step
+    np.testing.assert_allclose(common @ c, change, atol=1e-9)
+
+
+def _directions(angles):
+    roll, pitch = angles.T
+    return np.sin(pitch), -np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll)
+
+
+def test_the_part_of_the_reference_is_what_its_errors_add(known):
+    """What is left is what an adjustment without common errors finds."""
+    ((_, campaign),) = sessions(known, 1, seed=3)
+    fit = fit_campaign(campaign, TWELVE, ROBOT)
+    alone = replace(campaign_observations(campaign), common=None)
+    sigma = calibrate(TWELVE, ROBOT, alone).sigma_priori[0, :12]
+    part = fit.sigma**2 - np.diag(fit.by_reference)
+    assert np.all(fit.sigma > sigma)
+    np.testing.assert_allclose(np.sqrt(part), sigma, rtol=0.05)
+
+
+def test_one_position_after_the_other_is_the_same(campaign):
+    observed = campaign_observations(campaign)
+    together = calibrate(TWELVE, ROBOT, observed)
+    recursion = Recursion(TWELVE, ROBOT, observed)
+    np.testing.assert_allclose(recursion.parameters, together.parameters, rtol=1e-6, atol=1e-9)
+    sigma = np.sqrt(np.diag(recursion.cofactors[0]))
+    np.testing.assert_allclose(sigma, together.sigma_priori[0], rtol=1e-6)
+
+
+def test_the_next_position_shares_the_errors(campaign):
+    """Rows of a candidate are those that it has as a position of the session."""
+    directions = np.array([[0.2, -0.3, 0.93], [0.6, 0.64, -0.48]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    rows = next_rows(campaign, TWELVE, ROBOT, Noise(NOISE), directions)
+    assert rows.shape == (2, 3, 12 + 9)
+    _, common = campaign.reference.errors(angles_of(-G * directions), G)
+    tilt = np.linalg.norm(common[:, 1], axis=-1)  # of pitch, which no cosine stretches
+    assert np.all(np.linalg.norm(rows[..., 12:], axis=(1, 2)) > 0.5 * tilt * G / NOISE)
+
+
+def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
+    solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
+    fitted = _fit(Frame.of(solution), ())
+    sigma, expected = (np.sqrt(np.diag(q)) for q in (fitted.cofactors, solution.cofactors))
+    np.testing.assert_allclose(sigma, expected, rtol=0.05)
+
+
+def test_headers_that_are_wrong(campaign, tmp_path):
+    write_campaign(campaign, tmp_path)
+    header = tmp_path / "campaign.yaml"
+    text = header.read_text()
+    header.write_text(text + "robot:\n  angle_sigma_mgon: 3\n")
+    with refused("campaign.yaml", "goes without reference"):
+        read_campaign(tmp_path)
+    header.write_text(text.replace("  frame: rbd", "  frame: rbu"))
+    with refused("campaign.yaml", "reference.frame", "left-handed"):
+        read_campaign(tmp_path)
+    header.write_text(text.replace("  - scale\n", ""))
+    with refused("campaign.yaml", "expected 6 and 6 by 6 numbers"):
+        read_campaign(tmp_path)
+    header.write_text(text)
+    table = tmp_path / "positions.csv"
+    rows = [line.rsplit(",", 2)[0] for line in table.read_text().splitlines()]
+    table.write_text("\n".join(rows) + "\n")
+    with refused("campaign.yaml: reference: is given", "has no roll_robot_gon"):
+        read_campaign(tmp_path)

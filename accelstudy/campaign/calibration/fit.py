@@ -200,7 +200,8 @@ def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
     noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
     errors = angle_errors(campaign)
-    sigma_angle, common = noise.sigma_angle, None
+    sigma_angle: float | Array = noise.sigma_angle
+    common = None
     if errors is not None and campaign.angles is not None:
         sigma_angle, common = errors(campaign.angles)
     return Observations(

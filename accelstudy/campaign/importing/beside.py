@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.basics.wording import counted
 from accelstudy.campaign.calibration.applying import Calibration, read_calibration
 from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.checks import likely_fault
@@ -257,29 +256,26 @@ class Beside:
 
 def _opened(given: ReferenceLog, calibration: Calibration) -> Log:
     """Open the log of a reference; it is read like that of its calibration."""
-    content, layout = calibration.content, {}
-    if calibration.log is not None:
-        layout = calibration.log.model_dump(exclude_none=True)
-    elif content["nominal"] is not None:
-        layout = {"unit": content["unit"], **content["nominal"]}
-    else:
-        layout = {"unit": content["unit"]}
-    source = open_source(given.log, layout.get("variable"))
-    columns = dict(given.columns)
-    if time := columns.pop("time", None):
-        layout = {**layout, "time": time}
-    if unknown := [key for key in columns if key not in AXES]:
+    content, columns = calibration.content, dict(given.columns)
+    if unknown := [key for key in columns if key not in (*AXES, "time")]:
         raise InputError(
             f"--reference-columns: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
         )
-    layout = LogLayout.model_validate(overlay({**source.layout}, {**layout}))
+    known = {"unit": content["unit"], **(content["nominal"] or {})}
+    if calibration.log is not None:
+        known = calibration.log.model_dump(exclude_none=True)
+    if "time" in columns:
+        known = {**known, "time": columns.pop("time")}
+        known.pop("rate_hz", None)
+    source = open_source(given.log, known.get("variable"))
+    layout = LogLayout.model_validate(overlay({**source.layout}, known))
     own = {key: place for key, place in layout.columns.items() if key in AXES}
     try:
         return open_log(
             given.log,
             columns=columns or own,
             time=layout.time,
-            rate=None if "time" in given.columns else layout.rate_hz,
+            rate=layout.rate_hz,
             unit=layout.unit,
             scale=layout.scale,
             offset=layout.offset,

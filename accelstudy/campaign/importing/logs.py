@@ -76,7 +76,9 @@ def import_all(
     if not settings.means:
         return import_sensors(paths, settings, reference)
     if reference is not None:
-        raise InputError("a table of means (--means) has no holds in time: leave out --reference-log")
+        raise InputError(
+            "a table of means (--means) has no holds in time: leave out --reference-log"
+        )
     if len(paths) > 1 or settings.sensors:
         raise InputError("a table of means is one file of one sensor")
     if settings.block is not None:
@@ -275,7 +277,9 @@ def import_each(
 def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
-        raise InputError("--robot-sigma, --robot-unit: robot's angles go with a table of means (--means)")
+        raise InputError(
+            "--robot-sigma, --robot-unit: robot's angles go with a table of means (--means)"
+        )
     if not settings.sensors:
         return {"": settings}
     if set(AXES) & set(settings.columns):
