@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from accelstudy.basics.errors import InputError
+from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
@@ -28,19 +29,30 @@ class Equipment:
 
     Attributes
     ----------
-    name : "gravity" or "robot", which is also the approach
+    name : "gravity", "robot" or "reference"
     moving : float, s, from the end of a hold to the beginning of the next
     setup : float, s, before the first hold
+    reference : ReferenceSensor, optional, beside the one that is calibrated
     """
 
     name: str
     moving: float
     setup: float
+    reference: ReferenceSensor | None = None
+
+    @property
+    def approach(self) -> str:
+        """Name of the approach."""
+        return "gravity" if self.name == "gravity" else "robot"
 
     @property
     def how(self) -> str:
         """The equipment in words."""
-        return "by hand" if self.name == "gravity" else "with a robot"
+        return {
+            "gravity": "by hand",
+            "robot": "with a robot",
+            "reference": "by hand beside a calibrated sensor",
+        }[self.name]
 
     def seconds(self, positions: int, hold: float) -> float:
         """Time in the field, s."""
@@ -90,6 +102,7 @@ class Question:
     most_seconds : float, s in the field
     most_positions : int
     schemes : tuple of str, names or files of schemes besides those that are always compared
+    beside : Equipment, optional, with a calibrated sensor, by linear theory only
     """
 
     target: float
@@ -102,6 +115,7 @@ class Question:
     most_seconds: float = math.inf
     most_positions: int = 200
     schemes: tuple[str, ...] = ()
+    beside: Equipment | None = None
     sizes: Mapping[str, Size] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -144,6 +158,7 @@ def question_of(
     robot_moving_time: float,
     robot_setup_time: float,
     robot_accuracy: float,
+    reference: str | None = None,
 ) -> Question:
     """Make a question of what the options of `accelstudy plan` say, in SI.
 
@@ -159,10 +174,16 @@ def question_of(
         )
     by_hand = Equipment("gravity", moving_time, 0.0)
     robot = Equipment("robot", robot_moving_time, robot_setup_time)
+    sheet = of_sigma(sigma) if sigma is not None else get_sensor(str(sensor))
+    beside = None
+    if reference is not None:
+        from accelstudy.planning.beside import equipment_beside
+
+        beside = equipment_beside(reference, sheet, moving_time)
     return Question(
         tilt_accuracy,
         tilt_range,
-        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        sheet,
         equipment_of(equipment, by_hand, robot),
         confidence,
         tuple(sorted(set(holds))),
@@ -170,6 +191,7 @@ def question_of(
         math.inf if max_time is None else max_time,
         max_positions,
         tuple(schemes),
+        beside,
     )
 
 

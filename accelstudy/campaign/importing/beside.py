@@ -82,20 +82,7 @@ class Beside:
         InputError
             If its log cannot be read, or its calibration tells no angles with their sigmas.
         """
-        calibration = read_calibration(given.calibration)
-        quality, where = calibration.content["quality"], f"--reference {given.calibration}"
-        if not quality["plausible"]:
-            raise InputError(f"{where}: do not use this calibration: {quality['warnings'][0]}")
-        if not np.isfinite(calibration.covariance).all():
-            raise InputError(
-                f"{where}: it has no covariance matrix, so nothing tells how far its angles can be "
-                "trusted; calibrate it in more positions than its model has parameters"
-            )
-        for effect, condition in calibration.needs:
-            raise InputError(
-                f"{where}: its effect {effect} needs the {condition} of each hold; give a "
-                "calibration with a model that needs the forces only (calibrate --model)"
-            )
+        calibration = usable_reference(given.calibration)
         return cls(given, calibration, _opened(given, calibration))
 
     def averaged(
@@ -187,14 +174,7 @@ class Beside:
         frame = self._frame(whole.forces[used], own[used])
         angles = angles_of(frame.to_frd(own))
         accuracy = hold_noise(segments, self.log.step).accuracy
-        reference = ReferenceSensor(
-            calibration=self.calibration.content["campaign"],
-            frame=frame.name,
-            sigma_mps2=accuracy.allan,
-            effects=[effect.spec for effect in self.calibration.model.effects],
-            parameters=self.calibration.parameters.tolist(),
-            covariance=self.calibration.covariance.tolist(),
-        )
+        reference = ReferenceSensor.of_calibration(self.calibration, accuracy.allan, frame)
         sigma, common = reference.errors(angles, g)
         whole = replace(whole, angles=angles, sigma_angle=accuracy.allan / g, reference=reference)
         poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
@@ -252,6 +232,31 @@ class Beside:
                 "rotation is estimated"
             )
         return best
+
+
+def usable_reference(path: Path) -> Calibration:
+    """Read the calibration of a reference.
+
+    Raises
+    ------
+    InputError
+        If it tells no angles with their sigmas.
+    """
+    calibration, where = read_calibration(path), f"--reference {path}"
+    quality = calibration.content["quality"]
+    if not quality["plausible"]:
+        raise InputError(f"{where}: do not use this calibration: {quality['warnings'][0]}")
+    if not np.isfinite(calibration.covariance).all():
+        raise InputError(
+            f"{where}: it has no covariance matrix, so nothing tells how far its angles can be "
+            "trusted; calibrate it in more positions than its model has parameters"
+        )
+    for effect, condition in calibration.needs:
+        raise InputError(
+            f"{where}: its effect {effect} needs the {condition} of each hold; give a "
+            "calibration with a model that needs the forces only (calibrate --model)"
+        )
+    return calibration
 
 
 def _opened(given: ReferenceLog, calibration: Calibration) -> Log:
