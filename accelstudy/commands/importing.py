@@ -55,7 +55,9 @@ _SECTIONS = {
     cls=Sectioned,
     sections=_SECTIONS,
     epilog=example(
-        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
+        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2",
+        "accelstudy import log.csv --out beside --rate 100 --columns fx=0,fy=1,fz=2 "
+        "--reference-log ref.csv --reference calibrated/calibration.json",
     ),
 )
 @click.argument("log", type=PATH, nargs=-1, required=True)
