@@ -8,7 +8,7 @@ of roll and pitch by the parameters, and unknown numbers c that are 0 ± 1.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,9 @@ from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.files.validation import Block, Finite, SigmaForce
 from accelstudy.leveling.angles import jacobian, specific_force
-from accelstudy.sensors.frames import FRD, Frame, parse_frame
+from accelstudy.sensors.frames import Frame, parse_frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-
-if TYPE_CHECKING:
-    from accelstudy.campaign.calibration.applying import Calibration
 
 Array = NDArray[np.float64]
 
@@ -48,20 +45,6 @@ class ReferenceSensor(Block):
         if {len(self.parameters), len(self.covariance), *map(len, self.covariance)} != {u}:
             raise ValueError(f"parameters, covariance: expected {u} and {u} by {u} numbers")
         return self
-
-    @classmethod
-    def of_calibration(
-        cls, calibration: Calibration, sigma: float, frame: Frame = FRD
-    ) -> ReferenceSensor:
-        """Reference with a calibration, a noise of its means, m/s², and its axes."""
-        return cls(
-            calibration=calibration.content["campaign"],
-            frame=frame.name,
-            sigma_mps2=sigma,
-            effects=[effect.spec for effect in calibration.model.effects],
-            parameters=calibration.parameters.tolist(),
-            covariance=calibration.covariance.tolist(),
-        )
 
     @property
     def model(self) -> SensorModel:

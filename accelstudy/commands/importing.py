@@ -27,7 +27,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.beside import ReferenceLog
+    from accelstudy.campaign.beside import Beside
     from accelstudy.campaign.importing.making import ImportReport
     from accelstudy.campaign.importing.settings import ImportSettings
     from accelstudy.campaign.session import Campaign
@@ -149,9 +149,9 @@ def import_command(
 
 def _reference(
     log: Path | None, calibration: Path | None, columns: str | None, offset: float | None
-) -> ReferenceLog | None:
-    """What the options say of a reference."""
-    from accelstudy.campaign.importing.beside import ReferenceLog
+) -> Beside | None:
+    """A reference, as the options say."""
+    from accelstudy.campaign.beside import Beside, ReferenceLog
 
     if log is None and calibration is None:
         given = {"--reference-columns": columns, "--reference-offset": offset}
@@ -165,7 +165,7 @@ def _reference(
     if offset is not None and not math.isfinite(offset):
         raise InputError(f"--reference-offset: expected a number of seconds, not {offset}")
     places = {} if columns is None else parse_columns(columns, "--reference-columns")
-    return ReferenceLog(log, calibration, places, offset)
+    return Beside.of(ReferenceLog(log, calibration, places, offset))
 
 
 def show_result(campaign: Campaign, report: ImportReport, out: Path, figure: bool = True) -> None:

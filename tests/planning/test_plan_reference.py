@@ -14,9 +14,8 @@ from accelstudy.data_sheets import of_sigma
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.answer import _beside
-from accelstudy.planning.beside import equipment_beside
 from accelstudy.planning.candidates import rows_of
-from accelstudy.planning.question import Question
+from accelstudy.planning.question import Equipment, Question, planned_reference
 from accelstudy.planning.theory import theory_of
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -29,7 +28,7 @@ TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
 
 @pytest.fixture(scope="module")
 def beside():
-    return equipment_beside("alike", of_sigma(SIGMA), 20.0)
+    return Equipment("reference", 20.0, 300.0, planned_reference("alike", of_sigma(SIGMA)))
 
 
 def test_what_is_left_is_what_simulated_sessions_leave(beside):

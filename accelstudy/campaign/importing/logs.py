@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.importing.beside import Beside, ReferenceLog
 from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
-from accelstudy.campaign.importing.segments import segment_logs
+from accelstudy.campaign.importing.segments import Segment, segment_logs
 from accelstudy.campaign.importing.settings import (
     ImportSettings,
     Selection,
@@ -28,6 +28,20 @@ from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
+
+
+class TellsAngles(Protocol):
+    """A sensor beside those of the logs, as `accelstudy.campaign.beside` has it."""
+
+    def averaged(
+        self, log: Log, holds: DetectedHolds, gravity: float
+    ) -> tuple[DetectedHolds, list[Segment]]:
+        """Average its log in the holds; without those that it does not cover."""
+
+    def beside(
+        self, campaign: Campaign, report: ImportReport, segments: list[Segment], log: Log
+    ) -> tuple[Campaign, ImportReport]:
+        """Give a campaign roll and pitch of its holds."""
 
 
 def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) -> Log:
@@ -70,12 +84,12 @@ def import_log(
 def import_all(
     paths: Sequence[str | Path],
     settings: ImportSettings,
-    reference: ReferenceLog | None = None,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import a table of means, or find the static holds of logs; see `import_sensors`."""
     if not settings.means:
-        return import_sensors(paths, settings, reference)
-    if reference is not None:
+        return import_sensors(paths, settings, beside)
+    if beside is not None:
         raise InputError(
             "a table of means (--means) has no holds in time: leave out --reference-log"
         )
@@ -91,7 +105,7 @@ def import_all(
 def import_sensors(
     paths: Sequence[str | Path],
     settings: ImportSettings,
-    reference: ReferenceLog | None = None,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Find the static holds of the sensors in a log, or in logs of one position each.
 
@@ -100,8 +114,8 @@ def import_sensors(
     paths : files with raw logs, see `open_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
-    reference : ReferenceLog, optional, of a calibrated sensor on the same plate, whose roll and
-        pitch the campaigns get
+    beside : TellsAngles, optional, a calibrated sensor on the same plate, whose roll and pitch the
+        campaigns get
 
     Returns
     -------
@@ -117,7 +131,6 @@ def import_sensors(
         If a log cannot be read or has no static hold.
     """
     chosen = _settings_of_sensors(named_after(settings, paths))
-    beside = None if reference is None else Beside.of(reference)
     if beside is not None and (settings.block is not None or len(paths) > 1):
         raise InputError(
             "--reference-log goes with one log that has a time, not with several files or --block"
@@ -246,7 +259,7 @@ def import_each(
     paths: Sequence[str | Path],
     settings: ImportSettings,
     figure: bool = True,
-    reference: ReferenceLog | None = None,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import logs, or a table of means, and write the campaigns to folders.
 
@@ -255,7 +268,7 @@ def import_each(
     Parameters
     ----------
     folders : mapping of the names of the sensors to folders; "" where the settings name none
-    paths, settings, reference : as of `import_sensors`
+    paths, settings, beside : as of `import_sensors`
     figure : bool
 
     Raises
@@ -263,7 +276,7 @@ def import_each(
     InputError
         If a file cannot be read or makes no campaign, or a folder cannot be written.
     """
-    campaigns = import_all(paths, settings, reference)
+    campaigns = import_all(paths, settings, beside)
     for name, (campaign, report) in campaigns.items():
         write_campaign(campaign, folders[name])
         if figure and report.holds is not None:

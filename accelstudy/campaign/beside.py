@@ -25,7 +25,7 @@ from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
 from accelstudy.leveling.angles import angles_of, near_pole
-from accelstudy.sensors.frames import Frame
+from accelstudy.sensors.frames import FRD, Frame
 
 Array = NDArray[np.float64]
 
@@ -174,7 +174,7 @@ class Beside:
         frame = self._frame(whole.forces[used], own[used])
         angles = angles_of(frame.to_frd(own))
         accuracy = hold_noise(segments, self.log.step).accuracy
-        reference = ReferenceSensor.of_calibration(self.calibration, accuracy.allan, frame)
+        reference = reference_sensor(self.calibration, accuracy.allan, frame)
         sigma, common = reference.errors(angles, g)
         whole = replace(whole, angles=angles, sigma_angle=accuracy.allan / g, reference=reference)
         poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
@@ -232,6 +232,18 @@ class Beside:
                 "rotation is estimated"
             )
         return best
+
+
+def reference_sensor(calibration: Calibration, sigma: float, frame: Frame = FRD) -> ReferenceSensor:
+    """Reference with a calibration, a noise of its means, m/s², and its axes."""
+    return ReferenceSensor(
+        calibration=calibration.content["campaign"],
+        frame=frame.name,
+        sigma_mps2=sigma,
+        effects=[effect.spec for effect in calibration.model.effects],
+        parameters=calibration.parameters.tolist(),
+        covariance=calibration.covariance.tolist(),
+    )
 
 
 def usable_reference(path: Path) -> Calibration:
