@@ -23,7 +23,7 @@ from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise, Session, session
+from accelstudy.simulation.sessions import Noise, session, with_angle_errors
 
 Array = NDArray[np.float64]
 
@@ -143,7 +143,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
         size = max(1, POSITIONS // n)
         for first in track(range(0, replicates, size), f"{simulation} simulation"):
             numbers = np.arange(first, min(first + size, replicates))
-            drawn = _as_observed(ideal, ideal.draw(noise, len(numbers), rng), taken, rng).take(kept)
+            drawn = ideal.draw(noise, len(numbers), rng)
+            drawn = with_angle_errors(ideal, drawn, taken.angle_errors, rng).take(kept)
             for calibration in (c for s, c in CASES if s == simulation):
                 table = _session_table(simulated, fits[calibration], drawn, hold)
                 if table is None:
@@ -184,19 +185,6 @@ def _session_table(
             "converged": result.converged,
         }
     )
-
-
-def _as_observed(
-    ideal: Session, drawn: Observations, measured: Observations, rng: np.random.Generator
-) -> Observations:
-    """Sessions whose angles have the errors of those that were measured, beside a reference."""
-    if measured.angle_errors is None or drawn.angles is None:
-        return drawn
-    sigma, common = measured.angle_errors(ideal.angles)
-    noise = (drawn.angles - ideal.angles) * sigma / np.asarray(drawn.sigma_angle)
-    shared = np.einsum("nak,rk->rna", common, rng.standard_normal((len(noise), common.shape[-1])))
-    angles = ideal.angles + noise + shared
-    return replace(drawn, angles=angles, sigma_angle=sigma, common=common)
 
 
 def _calibrated(fit: Solution, observed: Observations) -> Adjustment:

@@ -11,11 +11,12 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.fit import campaign_observations, fit_campaign
+from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.next_positions import _fit
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import get_model
@@ -159,6 +160,22 @@ def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
     fitted = _fit(Frame.of(solution), ())
     sigma, expected = (np.sqrt(np.diag(q)) for q in (fitted.cofactors, solution.cofactors))
     np.testing.assert_allclose(sigma, expected, rtol=0.05)
+
+
+def test_a_reference_has_no_errors_of_a_robot(campaign):
+    solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
+    examined = ExaminedFit.of(Frame.of(solution))
+    of_robot = {"encoder_scale", "encoder_offset", "base_tilt", "axis_nonperpendicularity"}
+    assert of_robot < {*examined.untestable}
+    assert {"quadratic_scale", "bias_drift"} & {*examined.candidates}
+    assert not of_robot & {*examined.candidates}
+
+
+def test_simulated_sessions_confirm_the_sigmas(campaign):
+    """The check by simulation draws the errors that all holds share, too."""
+    table = check_sigmas(fit_campaign(campaign, TWELVE, ROBOT), 500)
+    # Standard deviations of 500 scatter by 3 %.
+    np.testing.assert_allclose(table["ratio"], 1, atol=0.13)
 
 
 def test_headers_that_are_wrong(campaign, tmp_path):
