@@ -290,9 +290,7 @@ def import_each(
 def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
-        raise InputError(
-            "--robot-sigma, --robot-unit: robot's angles go with a table of means (--means)"
-        )
+        raise InputError("robot (--robot-sigma): its angles go with a table of means (--means)")
     if not settings.sensors:
         return {"": settings}
     if set(AXES) & set(settings.columns):
