@@ -173,7 +173,8 @@ class Beside:
         used = np.isin(whole.positions, campaign.positions)
         frame = self._frame(whole.forces[used], own[used])
         angles = angles_of(frame.to_frd(own))
-        accuracy = hold_noise(segments, self.log.step).accuracy
+        resting = [segment for segment, use in zip(segments, used, strict=True) if use]
+        accuracy = hold_noise(resting, self.log.step).accuracy
         reference = reference_sensor(self.calibration, accuracy.allan, frame)
         sigma, common = reference.errors(angles, g)
         whole = replace(whole, angles=angles, sigma_angle=accuracy.allan / g, reference=reference)
@@ -257,7 +258,8 @@ def usable_reference(path: Path) -> Calibration:
     calibration, where = read_calibration(path), f"--reference {path}"
     quality = calibration.content["quality"]
     if not quality["plausible"]:
-        raise InputError(f"{where}: do not use this calibration: {quality['warnings'][0]}")
+        why = "; ".join(quality["warnings"])
+        raise InputError(f"{where}: do not use this calibration: {why}")
     if not np.isfinite(calibration.covariance).all():
         raise InputError(
             f"{where}: it has no covariance matrix, so nothing tells how far its angles can be "
