@@ -20,7 +20,8 @@ from accelstudy.campaign.importing.holds import DetectedHolds, hold_noise
 from accelstudy.campaign.importing.making import ImportReport, shown
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, locate, open_log
-from accelstudy.campaign.importing.segments import GrowingHold, Segment
+from accelstudy.campaign.importing.segments import WANDERING, GrowingHold, Segment
+from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
@@ -29,10 +30,10 @@ from accelstudy.sensors.frames import FRD, Frame
 
 Array = NDArray[np.float64]
 
-MOVING = 5.0
-"""Noise of the reference in a hold, as a multiple of its usual one, from which on it moves."""
 COVERED = 0.5
 """Share of a hold, below which the reference has not enough samples of it."""
+FEWEST = 4
+"""Samples of the reference in a hold, at least."""
 APART = 0.03
 """Misfit of the turns of both sensors, in parts of gravity, that no pair on one plate has."""
 TURNED = 20 * GON
@@ -98,18 +99,37 @@ class Beside:
         Raises
         ------
         InputError
-            If it covers none of them, or its forces are not as large as gravity.
+            If it covers none of them, moves in most, or its forces are not as large as gravity.
         """
-        content, path = self.calibration.content, self.given.log
-        full = content.get("range_mps2") or np.inf
+        segments, lost = self._segments(log, holds)
+        means = np.array([segment.mean for segment in segments.values()])
+        self._check_size(means, gravity)
+        ((_, rest),) = surveyed([self.log], usual_window(self.log), None)
+        moving = [n for n, s in segments.items() if s.variance > (WANDERING * rest.sd) ** 2]
+        if len(moving) > len(segments) / 2:
+            raise InputError(
+                f"--reference-log {self.given.log}: the reference moves in {len(moving)} of "
+                f"{len(segments)} holds; is it on one plate with the sensor, and are its times "
+                "right (--reference-offset)?"
+            )
+        for n in moving:
+            lost[n] = f"the reference moves: its sd is {np.sqrt(segments.pop(n).variance):.2g} m/s²"
+        said = [f"hold {n} left out: {why}" for n, why in lost.items()]
+        others = holds.without(lost)
+        return replace(others, warnings=(*holds.warnings, *said)), list(segments.values())
+
+    def _segments(
+        self, log: Log, holds: DetectedHolds
+    ) -> tuple[dict[int, Segment], dict[int, str]]:
+        """Samples of the reference in the holds of a log, and why there are none in others."""
+        content, shift = self.calibration.content, self._shift(log)
         ends = np.array([[[-np.inf] * 3] * 2, [[np.inf] * 3] * 2])
-        growing = {n: GrowingHold(0, 0, ends, full, 0) for n in holds.segments}
-        shift = self._shift(log)
+        full_range, mended = content.get("range_mps2") or np.inf, mending(content)
+        growing = {n: GrowingHold(0, 0, ends, full_range, 0) for n in holds.segments}
         first, last = np.inf, -np.inf
         for rows in self.log.chunks():
             time = rows.time + shift
-            forces = rows.forces @ mending(content).T
-            samples = np.column_stack([time, forces])
+            samples = np.column_stack([time, rows.forces @ mended.T])
             first, last = min(first, time[0]), time[-1]
             for n, hold in holds.segments.items():
                 inside = slice(*np.searchsorted(time, [hold.t0, hold.t1 + holds.step / 2]))
@@ -117,7 +137,8 @@ class Beside:
                     growing[n].keep(samples[inside])
         segments, lost = {}, {}
         for n, hold in holds.segments.items():
-            if growing[n].n * self.log.step < COVERED * (hold.t1 - hold.t0) or growing[n].n < 4:
+            seconds = growing[n].n * self.log.step
+            if seconds < COVERED * (hold.t1 - hold.t0) or growing[n].n < FEWEST:
                 lost[n] = "the reference log does not cover it"
             elif growing[n].saturated():
                 lost[n] = "the reference is saturated"
@@ -125,27 +146,22 @@ class Beside:
                 segments[n] = growing[n].finish()
         if not segments:
             raise InputError(
-                f"--reference-log {path}: runs from {first:.6g} s to {last:.6g} s of the time of "
-                f"{log.path}, whose holds lie from {holds.t0[0]:.6g} s to {holds.t1[-1]:.6g} s: "
-                f"{next(iter(lost.values()))} in any of them; --reference-offset gives the seconds "
-                "to add to the times of the reference"
+                f"--reference-log {self.given.log}: runs from {first:.6g} s to {last:.6g} s of the "
+                f"time of {log.path}, whose holds lie from {holds.t0[0]:.6g} s to "
+                f"{holds.t1[-1]:.6g} s: all are left out, the first because "
+                f"{next(iter(lost.values()))}; --reference-offset gives the seconds to add to the "
+                "times of the reference"
             )
-        means = np.array([segment.mean for segment in segments.values()])
+        return segments, lost
+
+    def _check_size(self, means: Array, gravity: float) -> None:
         fault = likely_fault(means / self.log.conversion.scale[0], means, "m/s^2", gravity)
         if fault.cause is not None:
             raise InputError(
-                f"--reference-log {path}: at rest the forces are about {fault.given:.3g} "
-                f"{content['unit']}, which is no gravity; it is read in the unit of the log of "
-                "which --reference was made"
+                f"--reference-log {self.given.log}: at rest the forces are about {fault.given:.3g} "
+                f"{self.calibration.content['unit']}, which is no gravity; it is read in the unit "
+                "of the log of which --reference was made"
             )
-        sd = {n: np.sqrt(segment.variance) for n, segment in segments.items()}
-        usual = float(np.median(list(sd.values())))
-        for n in [n for n, size in sd.items() if size > MOVING * usual]:
-            lost[n] = f"the reference moves: its sd is {sd[n]:.2g} m/s² instead of {usual:.2g}"
-            del segments[n]
-        said = [f"hold {n} left out: {why}" for n, why in lost.items()]
-        others = holds.without(lost)
-        return replace(others, warnings=(*holds.warnings, *said)), list(segments.values())
 
     def _shift(self, log: Log) -> float:
         """Time from the first sample of a log to that of the reference, s."""

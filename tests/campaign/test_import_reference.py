@@ -53,7 +53,8 @@ def plate(tmp_path_factory):
     beside = noisy(together @ QUARTER.T, OF_REFERENCE, own, 0.01)
     write(folder / "ref.csv", beside, 1000, names)
     write(folder / "late.csv", beside, 5000, names)
-    write(folder / "shifted.csv", beside, 1021, names)
+    write(folder / "shifted.csv", beside, 1018, names)
+    write(folder / "between.csv", beside, 1003, names)
     write(folder / "in-g.csv", beside / 9.80665, 1000, names)
     write(folder / "other.csv", beside, 1000, "t,p,q,r")
     askew = np.array([[1, -1, 0], [1, 1, 0], [0, 0, 2**0.5]]) / 2**0.5
@@ -113,7 +114,7 @@ def test_other_columns_and_times(plate, tmp_path):
     succeed(*given(plate, tmp_path / "a"))
     columns = ("--reference-columns", "fx=p,fy=q,fz=r,time=t")
     succeed(*given(plate, tmp_path / "b", "other.csv", "ref/calibration.json", *columns))
-    moved = ("--reference-offset", "-21")
+    moved = ("--reference-offset", "-18")
     succeed(*given(plate, tmp_path / "c", "shifted.csv", "ref/calibration.json", *moved))
     first = read_campaign(tmp_path / "a")
     for name in "bc":
@@ -129,6 +130,7 @@ def test_holds_without_the_reference_are_left_out(plate, tmp_path):
 REFUSED = {
     "late.csv": ("--reference-log", "whose holds lie from", "--reference-offset"),
     "shifted.csv": ("--reference-log", "do not turn together", "--reference-offset"),
+    "between.csv": ("--reference-log", "moves in", "--reference-offset"),
     "in-g.csv": ("--reference-log", "about 1 m/s^2", "unit"),
     "other.csv": ("--reference-log", "--reference-columns"),
     "askew.csv": ("--reference-log", "turned by 50 gon", "20 gon"),
