@@ -21,7 +21,7 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-SIGMA, RANGE, SESSIONS = 2e-3, 30 * GON, 300
+SIGMA, RANGE, SESSIONS = 2e-3, 30 * GON, 250
 NINE = get_model("bias-scale-nonorthogonality")
 TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
 
