@@ -40,9 +40,10 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     Returns
     -------
     Adjustment
-        Parameters in the order of ``model.parameters``; gravity follows as the last one if it is
-        observed (``sigma_gravity > 0``). Observations are f_x, f_y, f_z and, with a robot, roll and
-        pitch; variances are absolute, so the variance of unit weight a priori is 1.
+        Parameters in the order of ``model.parameters``; those of errors that all angles share
+        follow, and gravity is the last if it is observed (``sigma_gravity > 0``). Observations are
+        f_x, f_y, f_z and, with a robot, roll and pitch; variances are absolute, so the variance of
+        unit weight a priori is 1.
 
     Raises
     ------
@@ -85,7 +86,8 @@ def whitened_jacobian(
 
     Returns
     -------
-    (m, u') array; AᵀA is the normal matrix. With observed gravity a column and a row are added.
+    (m, u') array; AᵀA is the normal matrix. With errors that all angles share, and with observed
+    gravity, columns and rows are added.
     """
     problem = CalibrationProblem.of(model, approach, observed)
     x = problem.initial[:1].copy()
@@ -103,7 +105,7 @@ class CalibrationProblem:
 
     `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
     `direct` holds what is known of the parameters directly, (R, u), and `weights` (u,) its weights:
-    gravity, and what effects know of their parameters a priori.
+    gravity, what effects know of their parameters a priori, and errors that all angles share.
     """
 
     model: SensorModel
@@ -121,6 +123,7 @@ class CalibrationProblem:
         """Arrange what was observed."""
         forces = np.asarray(observed.forces, dtype=float)
         n = forces.shape[1]
+        common = observed.common if approach.uses_angles else None
         values, sigmas = [forces], [np.broadcast_to(observed.sigma_force, (n, 3))]
         if approach.uses_angles:
             if observed.angles is None:
@@ -130,11 +133,13 @@ class CalibrationProblem:
 
         with_gravity = observed.sigma_gravity > 0
         equations = equations_of(model.trace, approach, with_gravity)
-        initial = np.zeros((len(forces), equations.n_parameters))
-        direct, weights = np.zeros_like(initial), np.zeros(equations.n_parameters)
-        weights[: model.n_parameters] = model.prior_weights
+        u, shared = model.n_parameters, 0 if common is None else common.shape[-1]
+        initial = np.zeros((len(forces), equations.n_parameters + shared))
+        direct, weights = np.zeros_like(initial), np.zeros(initial.shape[1])
+        weights[:u] = model.prior_weights
+        weights[u : u + shared] = 1.0
         if observed.initial is not None:
-            initial[:, : model.n_parameters] = observed.initial
+            initial[:, :u] = observed.initial
         if with_gravity:
             initial[:, -1] = direct[:, -1] = observed.gravity
             weights[-1] = observed.sigma_gravity**-2
@@ -146,7 +151,7 @@ class CalibrationProblem:
             )
         return cls(
             model=model,
-            conditions=equations.at(model.settings, fixed, observed.hold),
+            conditions=equations.at(model.settings, fixed, observed.hold, common),
             observed=tuple(values),
             cofactors=np.concatenate(sigmas, axis=-1) ** 2,
             initial=initial,

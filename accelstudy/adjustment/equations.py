@@ -136,36 +136,55 @@ class CalibrationEquations:
         return sp.Matrix.hstack(sp.Matrix(trace.output) - h, a, b)
 
     def at(
-        self, settings: Array, gravity: ArrayLike, hold: HoldConditions | None
+        self,
+        settings: Array,
+        gravity: ArrayLike,
+        hold: HoldConditions | None,
+        common: Array | None = None,
     ) -> CalibrationConditions:
-        """Return the conditions for settings (s,), gravity (float, where fixed) and holds."""
-        return CalibrationConditions(self, settings, gravity, hold)
+        """Return the conditions for settings (s,), gravity (float, where fixed) and holds.
+
+        `common` (n, 2, k) has the derivatives of errors that the angles of all positions share.
+        """
+        return CalibrationConditions(self, settings, gravity, hold, common)
 
 
 @dataclass(frozen=True)
 class CalibrationConditions:
-    """`CalibrationEquations` with all known quantities, as the adjustment takes them."""
+    """`CalibrationEquations` with all known quantities, as the adjustment takes them.
+
+    Errors that the angles of all positions share are parameters, too: they follow those of the
+    model, and gravity stays the last.
+    """
 
     equations: CalibrationEquations
     settings: Array
     gravity: ArrayLike
     hold: HoldConditions | None
+    common: Array | None = None
 
     def linearise(self, parameters: Array, adjusted: Array, latent: Array) -> Linearisation:
         """Linearise; `latent` is f_a of the iteration before."""
         eq, trace = self.equations, self.equations.trace
-        x, g = parameters, np.asarray(self.gravity, dtype=float)
+        u = trace.n_parameters
+        x, g = parameters[:u], np.asarray(self.gravity, dtype=float)
         if eq.estimates_gravity:
-            x, g = parameters[:-1], parameters[-1]
+            g = parameters[-1]
         forces, angles = adjusted[:3], adjusted[3:]
+        if self.common is not None:
+            shared = parameters[u : u + self.common.shape[-1]]
+            angles = angles - np.einsum("nak,kr->arn", self.common, shared)
         arguments = (x, self.settings, g, self.hold)
         if eq.knows_force:
             f_a = trace.evaluate(eq.sensitive, forces, forces, *arguments, *angles)[:, 0]
         else:
             f_a = latent + trace.evaluate(trace.newton_step, latent, forces, *arguments)[:, 0]
         values = trace.evaluate(eq.linear, f_a, forces, *arguments, *angles)
-        u = len(parameters)
-        return Linearisation(values[:, 0], values[:, 1 : 1 + u], values[:, 1 + u :], f_a)
+        psi, (a, b) = values[:, 0], np.split(values[:, 1:], [eq.n_parameters], axis=1)
+        if self.common is not None:
+            by_shared = -np.einsum("carn,nak->ckrn", b[:, 3:], self.common)
+            a = np.concatenate([a[:, :u], by_shared, a[:, u:]], axis=1)
+        return Linearisation(psi, a, b, f_a)
 
 
 @cache

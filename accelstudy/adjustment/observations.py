@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,9 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 
 Array = NDArray[np.float64]
+
+
+AngleErrors = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,10 @@ class Observations:
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : HoldConditions, of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    common : (n, 2, k) array, rad, errors of the angles that all positions share: derivatives by k
+        unknown numbers that are 0 ± 1; None if the errors of the positions are independent
+    angle_errors : function of angles (k, 2), rad, optional: `sigma_angle` and `common` in other
+        attitudes; the adjustment does not use it
     slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
         deviation, R = 1; the adjustment does not use them
     """
@@ -39,6 +47,8 @@ class Observations:
     sigma_gravity: float = 0.0
     hold: HoldConditions | None = None
     initial: Array | None = None
+    common: Array | None = None
+    angle_errors: AngleErrors | None = None
     slope: Array | None = None
     sd_slope: Array | None = None
 
@@ -54,6 +64,7 @@ class Observations:
             angles=None if self.angles is None else self.angles[:, positions],
             sigma_force=chosen(self.sigma_force),
             sigma_angle=chosen(self.sigma_angle),
+            common=None if self.common is None else self.common[positions],
             hold=None if self.hold is None else self.hold.take(positions),
             slope=None if self.slope is None else self.slope[positions],
             sd_slope=None if self.sd_slope is None else self.sd_slope[positions],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -96,6 +97,7 @@ def plan(
     confidence: float | str | None = None,
     holds: float | str | Sequence[float | str] = (),
     schemes: str | Sequence[str] = (),
+    reference: str | Path | None = None,
     max_positions: int = 200,
     replicates: int = 200,
     seed: int = 1,
@@ -113,6 +115,7 @@ def plan(
         "95%"; None for the rms
     holds : durations of a hold that are tried, in s or with a unit
     schemes : names or files of further schemes
+    reference : path of the calibration.json of a sensor beside it, or "alike"
     max_positions, replicates, seed : int
     quantities
         In SI or with a unit: ``tilt_range``, ``max_time``, ``moving_time``, ``robot_moving_time``,
@@ -142,6 +145,7 @@ def plan(
         confidence=None if confidence is None else confidence_of(str(confidence)),
         holds=[quantity("holds", hold, QUANTITIES["hold"]) for hold in each(holds)],
         schemes=names("schemes", schemes),
+        reference=None if reference is None else str(path_of("reference", reference)),
         max_positions=whole("max_positions", max_positions, Range(*MOST_POSITIONS)),
     )
     whole("seed", seed, bounds.SEED)

@@ -65,9 +65,11 @@ def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
     key = f"{path.with_name(HEADER)}: robot.angle_sigma_mgon"
     if "yaw" in given and "angles" not in given:
         raise InputError(f"{path}: yaw_robot_gon: goes with {roll} and {pitch}, which are missing")
-    if "angles" in given and header.robot is None:
+    if header.reference is not None:
+        key = f"{path.with_name(HEADER)}: reference"
+    elif "angles" in given and header.robot is None:
         raise InputError(f"{key}: missing, but {path.name} has {roll} and {pitch}")
-    if header.robot is not None and "angles" not in given:
+    if (header.robot or header.reference) is not None and "angles" not in given:
         raise InputError(f"{key}: is given, but {path.name} has no {roll} and {pitch}")
 
 

@@ -255,9 +255,9 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
         check(given["forces"], values["forces"], header, path)
         if plausible:
             check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
+        if plausible and "angles" in values:
+            check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
         if header.robot is not None:
-            if plausible:
-                check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
             values.setdefault("yaw", np.zeros(len(labels)))
     for attribute in COUNTING:
         if attribute in values:
@@ -272,7 +272,11 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
 
 def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
     """Make a campaign of a header and of columns in SI, by attribute."""
-    noise, robot = header.sensor_noise, header.robot
+    noise, sigma_angle = header.sensor_noise, None
+    if header.robot is not None:
+        sigma_angle = header.robot.angle_sigma_mgon * MGON
+    elif header.reference is not None:
+        sigma_angle = header.reference.sigma_mps2 / header.gravity.value_mps2
     return Campaign(
         name=header.name,
         sensor=header.sensor,
@@ -280,7 +284,8 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
         gravity=header.gravity.value_mps2,
         sigma_gravity=header.gravity.sigma_mps2,
         sigma_force=None if noise is None else noise.sigma_mps2,
-        sigma_angle=None if robot is None else robot.angle_sigma_mgon * MGON,
+        sigma_angle=sigma_angle,
+        reference=header.reference,
         nominal=None if header.nominal is None else header.conversion("forces"),
         full_range=header.range_mps2,
         log=header.log,
@@ -337,7 +342,9 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         content["excluded"] = campaign.exclusions
     if campaign.log is not None:
         content["log"] = campaign.log.model_dump(exclude_none=True)
-    if campaign.sigma_angle is not None:
+    if campaign.reference is not None:
+        content["reference"] = campaign.reference.model_dump()
+    elif campaign.sigma_angle is not None:
         content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
     return content
 

@@ -19,6 +19,7 @@ from pydantic import (
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON
+from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import (
     Block,
     Finite,
@@ -171,14 +172,17 @@ class Header(Block):
     )
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None
+    reference: ReferenceSensor | None = None
     log: LogLayout | None = None
 
     @model_validator(mode="after")
-    def _nominal_with_counts(self) -> Self:
+    def _consistent(self) -> Self:
         if self.unit == "counts" and self.nominal is None:
             raise ValueError("nominal: missing; unit: counts needs scale and offset of each axis")
         if self.unit != "counts" and self.nominal is not None:
             raise ValueError(f"nominal: goes with unit: counts, not with unit: {self.unit}")
+        if self.robot is not None and self.reference is not None:
+            raise ValueError("robot: goes without reference: the angles are those of one of them")
         return self
 
     def conversion(self, attribute: str) -> Conversion:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import COLUMNS, LogLayout
+from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.conversion import Conversion
 
@@ -35,7 +36,8 @@ class Campaign:
     sensor : str, optional
     sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
     angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
-    sigma_angle : float, rad; None without a robot
+    sigma_angle : float, rad, of a level hold; None without a robot
+    reference : ReferenceSensor, optional, which gave the angles instead of a robot
     n_samples : (n,) int array, optional
     sd : (n, 3) array, m/s², optional, sd of the samples within the holds
     slope, sd_slope : (n, 3) arrays, m/s²/s, optional, slope of the samples within the holds, and
@@ -60,6 +62,7 @@ class Campaign:
     sigma_force: float | None = None
     angles: Array | None = None
     sigma_angle: float | None = None
+    reference: ReferenceSensor | None = None
     n_samples: NDArray[np.int_] | None = None
     sd: Array | None = None
     slope: Array | None = None
@@ -90,8 +93,10 @@ class Campaign:
             if (values := getattr(self, name)) is not None:
                 columns[f"{name} / {unit}"] = values
         table = pd.DataFrame(columns, index=pd.Index(self.positions, name="position"))
-        robot = "without" if self.angles is None else "with"
-        said = f"{counted(self.n_positions, 'position')} {robot} a robot"
+        beside = "without a robot" if self.angles is None else "with a robot"
+        if self.reference is not None:
+            beside = f"beside the sensor of {self.reference.calibration}"
+        said = f"{counted(self.n_positions, 'position')} {beside}"
         return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
 
     @property

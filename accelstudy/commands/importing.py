@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import math
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -26,6 +27,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from accelstudy.campaign.beside import Beside
     from accelstudy.campaign.importing.making import ImportReport
     from accelstudy.campaign.importing.settings import ImportSettings
     from accelstudy.campaign.session import Campaign
@@ -38,6 +40,12 @@ _SECTIONS = {
     "The holds": ("threshold", "exclude", "join", "figure"),
     "A log of blocks instead": ("block",),
     "A table of means instead": ("means", "robot_sigma", "robot_unit"),
+    "A calibrated sensor beside it": (
+        "reference_log",
+        "reference",
+        "reference_columns",
+        "reference_offset",
+    ),
     "The campaign": ("out", "name", "gravity", "settings_path"),
 }
 
@@ -47,7 +55,9 @@ _SECTIONS = {
     cls=Sectioned,
     sections=_SECTIONS,
     epilog=example(
-        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2"
+        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2",
+        "accelstudy import log.csv --out beside --rate 100 --columns fx=0,fy=1,fz=2 "
+        "--reference-log ref.csv --reference calibrated/calibration.json",
     ),
 )
 @click.argument("log", type=PATH, nargs=-1, required=True)
@@ -68,6 +78,19 @@ _SECTIONS = {
 @click.option("--means", is_flag=True, help="LOG is a table with the mean of each hold.")
 @click.option("--robot-sigma", type=float, help="Sd of the robot's roll and pitch, mgon.")
 @click.option("--robot-unit", help="Unit of the robot's angles: gon, deg, rad.  [default: gon]")
+@click.option(
+    "--reference-log", type=PATH, help="Raw log of a calibrated sensor on one plate with it."
+)
+@click.option("--reference", type=PATH, help="The calibration.json of that sensor.")
+@click.option(
+    "--reference-columns",
+    help="Its columns: fx=a,fy=b,fz=c,time=t.  [default: as in the log of its calibration]",
+)
+@click.option(
+    "--reference-offset",
+    type=float,
+    help="Seconds to add to its times.  [default: 0; without times both logs begin together]",
+)
 @click.option("--out", type=PATH, required=True, help="Folder of the campaign.")
 @click.option("--name", help="Name of the campaign.  [default: that of the file]")
 @click.option("--gravity", type=float, help="Local gravity, m/s².  [default: 9.80665]")
@@ -84,6 +107,10 @@ def import_command(
     means: bool,
     figure: bool,
     force: bool,
+    reference_log: Path | None,
+    reference: Path | None,
+    reference_columns: str | None,
+    reference_offset: float | None,
     **options: Any,
 ) -> None:
     """Make a campaign of a raw LOG: find its static holds.
@@ -95,24 +122,50 @@ def import_command(
 
     --sensor, --exclude and --join may be repeated. With --sensor each sensor has a campaign of its
     own in the folder, which is named after the log and the sensor.
+
+    With --reference-log and --reference a calibrated sensor on the same plate takes the place of a
+    robot: it tells roll and pitch of each hold. Its times are of the same clock as those of LOG.
     """
     from accelstudy.campaign.importing.logs import import_each
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 
     settings = settings_of(settings_path, means=means or None, **options)
+    beside = _reference(reference_log, reference, reference_columns, reference_offset)
     files = files_of(log)
     folders = {name: out / name for name in settings.sensors} or {"": out}
-    inputs = [*files, *([] if settings_path is None else [settings_path])]
+    others = (settings_path, reference_log, reference)
+    inputs = [*files, *(path for path in others if path is not None)]
     with ExitStack() as stack:
         campaigns = {
             name: stack.enter_context(result_folder(folder, CAMPAIGN, inputs, force))
             for name, folder in folders.items()
         }
-        imported = import_each(campaigns, files, settings, figure)
+        imported = import_each(campaigns, files, settings, figure, beside)
     for name, result in imported.items():
         if name:
             say(f"sensor {name}")
         show_result(*result, folders[name], figure)
+
+
+def _reference(
+    log: Path | None, calibration: Path | None, columns: str | None, offset: float | None
+) -> Beside | None:
+    """A reference, as the options say."""
+    from accelstudy.campaign.beside import Beside, ReferenceLog
+
+    if log is None and calibration is None:
+        given = {"--reference-columns": columns, "--reference-offset": offset}
+        for option in (option for option, value in given.items() if value is not None):
+            raise InputError(f"{option}: goes with --reference-log and --reference")
+        return None
+    if calibration is None:
+        raise InputError("--reference-log: give the calibration.json of that sensor by --reference")
+    if log is None:
+        raise InputError("--reference: give the raw log of that sensor by --reference-log")
+    if offset is not None and not math.isfinite(offset):
+        raise InputError(f"--reference-offset: expected a number of seconds, not {offset}")
+    places = {} if columns is None else parse_columns(columns, "--reference-columns")
+    return Beside.of(ReferenceLog(log, calibration, places, offset))
 
 
 def show_result(campaign: Campaign, report: ImportReport, out: Path, figure: bool = True) -> None:
@@ -214,11 +267,11 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
 
 
-def parse_columns(text: str) -> dict[str, str]:
+def parse_columns(text: str, option: str = "--columns") -> dict[str, str]:
     """Columns as an option gives them: fx=1,fy=2,fz=3."""
     pairs = [part.split("=", 1) for part in text.split(",")]
     if any(len(pair) != 2 for pair in pairs):
-        raise InputError(f"--columns: expected fx=1,fy=2,fz=3 or names, not {text!r}")
+        raise InputError(f"{option}: expected fx=1,fy=2,fz=3 or names, not {text!r}")
     return {key.strip(): column.strip() for key, column in pairs}
 
 

@@ -47,6 +47,7 @@ _SECTIONS = {
         "sensor",
         "sigma",
         "equipment",
+        "reference",
         "confidence",
     ),
     "What is tried": ("holds", "schemes", "max_time", "max_positions", "replicates", "seed"),
@@ -80,6 +81,11 @@ _SECTIONS = {
     default="both",
     show_default=True,
     help="Positions by hand, with gravity alone, or with a robot that tells roll and pitch.",
+)
+@click.option(
+    "--reference",
+    help="Compare with a calibrated sensor beside it, too: its calibration.json, or alike, for one "
+    "of the same type.",
 )
 @click.option(
     "--confidence",

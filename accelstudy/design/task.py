@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import whitened_jacobian
+from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
@@ -211,6 +212,7 @@ def position_rows(
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
+    errors: AngleErrors | None = None,
 ) -> Array:
     """Rows of the design matrix that each position contributes, at unit weight.
 
@@ -229,6 +231,8 @@ def position_rows(
     gravity : float, m/s²
     hold : HoldConditions, optional
         What else is known of the k positions.
+    errors : function of angles (k, 2), optional
+        `sigma_angle` and `common` of `Observations`; errors that all angles share are parameters.
 
     Returns
     -------
@@ -242,7 +246,11 @@ def position_rows(
     directions = np.asarray(directions, dtype=float)
     at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
     ideal = session(model, at, directions, gravity, hold)
-    rows = whitened_jacobian(model, approach, ideal.observations(noise), at)
+    observed = ideal.observations(noise)
+    if errors is not None:
+        sigma_angle, common = errors(ideal.angles)
+        observed = replace(observed, sigma_angle=sigma_angle, common=common)
+    rows = whitened_jacobian(model, approach, observed, at)
     k, c = len(directions), approach.n_conditions
     return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))
 

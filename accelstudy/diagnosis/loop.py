@@ -23,7 +23,7 @@ from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import Noise, session, with_angle_errors
 
 Array = NDArray[np.float64]
 
@@ -143,7 +143,8 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
         size = max(1, POSITIONS // n)
         for first in track(range(0, replicates, size), f"{simulation} simulation"):
             numbers = np.arange(first, min(first + size, replicates))
-            drawn = ideal.draw(noise, len(numbers), rng).take(kept)
+            drawn = ideal.draw(noise, len(numbers), rng)
+            drawn = with_angle_errors(ideal, drawn, taken.angle_errors, rng).take(kept)
             for calibration in (c for s, c in CASES if s == simulation):
                 table = _session_table(simulated, fits[calibration], drawn, hold)
                 if table is None:

@@ -141,7 +141,7 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
     needed = {*compose(learned.spec, (learned.spec,)).hold_columns}
     attitudes = -g * get_scheme(GRID).directions
     yaws, by_heat = YAWS if "yaw" in needed else np.zeros(1), "temperature" in needed
-    u = model.n_parameters
+    u = model.n_parameters + _shared(frame)
     cofactors, weights = frame.solution.cofactors[:u, :u], np.zeros((u, u))
     own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
     weights[np.ix_(own, own)] = _mean_squares(learned)
@@ -360,28 +360,44 @@ def _fit(frame: Frame, explanation: Explanation) -> Explained:
     residuals = frame.residuals
     shown = _derivatives(frame, explanation, frame.forces, frame.hold)
     rows = residuals.rows(residuals.jac_observations[..., :3] @ shown)
-    inverse = np.linalg.pinv(rows, rcond=1e-10)
-    return Explained(inverse @ residuals.errors, inverse @ inverse.T)
+    # What angles share is known to be 0 ± 1.
+    u, k = frame.solution.model.n_parameters, _shared(frame)
+    known = -np.eye(k, rows.shape[1], u)
+    errors = np.concatenate([residuals.errors, frame.solution.parameters[u : u + k]])
+    inverse = np.linalg.pinv(np.concatenate([rows, known]), rcond=1e-10)
+    return Explained(inverse @ errors, inverse @ inverse.T)
+
+
+def _shared(frame: Frame) -> int:
+    """Number of the errors that the angles of all positions share."""
+    common = frame.solution.observed.common
+    return 0 if common is None or not frame.solution.approach.uses_angles else common.shape[-1]
 
 
 def _derivatives(
     frame: Frame, explanation: Explanation, forces: Array, hold: HoldConditions
 ) -> Array:
-    """Derivatives of the output by the parameters of the model and by those of the effects."""
+    """Derivatives of the output by the parameters of the model and by those of the effects.
+
+    Between them are those by the errors that the angles of all positions share.
+    """
     g, turning = frame.solution.gravity, _force_by_angles(forces, frame.solution.gravity)
     angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
 
     def shown(effect: Effect) -> Signature:
         return signature(effect, forces, angles, g, hold)
 
-    all_of_them = [shown(effect) for effect in frame.solution.model.effects]
+    def in_output(one: Signature) -> Array:
+        return one.force + turning @ one.angles
+
+    columns = [in_output(shown(effect)) for effect in frame.solution.model.effects]
+    errors = frame.solution.observed.angle_errors
+    if errors is not None and _shared(frame):
+        columns.append(-turning @ errors(angles)[1])
     for one in explanation:
         assert one.effect is not None
-        all_of_them.append(shown(one.effect).reduced(one.directions))
-    turned = [np.einsum("nia,nak->nik", turning, one.angles) for one in all_of_them]
-    return np.concatenate(
-        [one.force + change for one, change in zip(all_of_them, turned, strict=True)], axis=2
-    )
+        columns.append(in_output(shown(one.effect).reduced(one.directions)))
+    return np.concatenate(columns, axis=2)
 
 
 def _whitening(frame: Frame, forces: Array) -> Array:
@@ -391,7 +407,11 @@ def _whitening(frame: Frame, forces: Array) -> Array:
     if not frame.solution.approach.uses_angles:
         unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
         return np.asarray(unit[:, None] / force)
-    turning = _force_by_angles(forces, frame.solution.gravity) * sigmas[3:5]
+    of_angles = sigmas[3:5]
+    if (errors := frame.solution.observed.angle_errors) is not None:
+        angles = np.column_stack(roll_pitch(tuple(forces.T)))
+        of_angles = errors(angles)[0][:, None]
+    turning = _force_by_angles(forces, frame.solution.gravity) * of_angles
     noise = force**2 * np.eye(3) + turning @ turning.swapaxes(1, 2)
     return np.linalg.inv(np.linalg.cholesky(noise))
 

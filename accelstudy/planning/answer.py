@@ -53,6 +53,8 @@ class Answer:
     instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
         none reaches the target; None if a robot does not reach it either
     seed, replicates : int, of the simulation
+    beside : Candidate, the cheapest with a calibrated sensor beside it that reaches the target by
+        linear theory, or the most accurate if none does; None if the question has no such sensor
     """
 
     question: Question
@@ -62,6 +64,7 @@ class Answer:
     instead: Candidate | None
     seed: int
     replicates: int
+    beside: Candidate | None = None
 
     @property
     def first(self) -> Ranked:
@@ -100,11 +103,12 @@ def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
             ranked.append(Ranked(candidate))
         elif good := simulation.confirmed(candidate, candidate.equipment.name not in checked):
             ranked.append(good)
+    beside = _beside(question)
     if not any(r.simulated for r in ranked):
         instead = _with_a_robot(question)
-        return Answer(question, compared, [], None, instead, seed, replicates)
+        return Answer(question, compared, [], None, instead, seed, replicates, beside)
     compared += [r.candidate for r in ranked if r.candidate not in compared]
-    plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates)
+    plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates, beside)
     same = replace(question, equipment=(plan.first.candidate.equipment,))
     other = OTHER_CONFIDENCE if question.confidence is None else None
     stricter = [c for c in compared if c.equipment in same.equipment]
@@ -152,6 +156,18 @@ def _with_a_robot(question: Question) -> Candidate | None:
     robot = replace(question, equipment=(ROBOT,))
     good = _good(robot, candidates(robot), question.confidence)
     return cheapest(robot, good, question.confidence) if good else None
+
+
+def _beside(question: Question) -> Candidate | None:
+    """Calibration with a sensor beside it, by linear theory; see `Answer`."""
+    if question.beside is None:
+        return None
+    alone = replace(question, equipment=(question.beside,))
+    compared = candidates(alone)
+    compared += _largest(alone, question.beside, compared, question.confidence)
+    if good := _good(alone, compared, question.confidence):
+        return cheapest(alone, good, question.confidence)
+    return min(compared, key=lambda c: c.accuracy(question.confidence), default=None)
 
 
 def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:

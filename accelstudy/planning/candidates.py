@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.planning.theory import Expected, theory_of
+from accelstudy.planning.theory import Expected, Theory, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -26,6 +27,8 @@ PLANNED_MODELS = (
     f"{NINE}-crossaxis+quadratic_scale",
     f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
 )
+ROTATIONS = {"cross_axis_misalignment", "mounting_rotation"}
+"""Effects that have the rotation of the sensor against what tells its attitude."""
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
@@ -141,13 +144,33 @@ def of_scheme(
                 unit = at_unit[model.name]
                 expected = None if unit is None else unit.with_noise(sigma)
             else:
+                if equipment.reference is not None and not ROTATIONS & {*names_of(model)}:
+                    continue  # the rotation between the sensors is unknown
                 if rows is None:
-                    noise = Noise(sigma, question.sigma_angle)
-                    rows = theory.rows(directions, equipment.name, noise)
+                    rows = rows_of(question, equipment, theory, directions, sigma)
                 expected = theory.expected(rows, model, question.neglectable)
             if expected is None or expected.redundancy < LEAST_REDUNDANCY * expected.conditions:
                 continue
             yield Candidate(equipment, model, scheme, hold, sigma, expected)
+
+
+def rows_of(
+    question: Question, equipment: Equipment, theory: Theory, directions: Array, sigma: float
+) -> Array:
+    """Whitened rows of a calibration, as `Theory.rows` has them."""
+    noise = Noise(sigma, angle_sigma(question, equipment))
+    return theory.rows(directions, equipment.approach, noise, equipment.reference)
+
+
+def angle_sigma(question: Question, equipment: Equipment) -> float:
+    """Noise of roll and pitch, rad, of a level position."""
+    reference = equipment.reference
+    return question.sigma_angle if reference is None else reference.sigma_mps2 / STANDARD_GRAVITY
+
+
+def names_of(model: SensorModel) -> tuple[str, ...]:
+    """Names of the effects of a model."""
+    return tuple(effect.name for effect in model.effects)
 
 
 def sigma_of(question: Question, equipment: Equipment, n: int, hold: float) -> float:

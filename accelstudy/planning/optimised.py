@@ -9,7 +9,13 @@ from functools import cache
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import WorseAngle
-from accelstudy.planning.candidates import LEAST_REDUNDANCY, Candidate, of_scheme, sigma_of
+from accelstudy.planning.candidates import (
+    LEAST_REDUNDANCY,
+    Candidate,
+    angle_sigma,
+    of_scheme,
+    sigma_of,
+)
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import Scheme
@@ -63,11 +69,12 @@ class Sought:
         """Request for the best n positions, as `accelstudy design` takes it."""
         noise = Noise()
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
-            sigma_angle = float(f"{self.question.sigma_angle / MGON:.6g}") * MGON
+            angle = angle_sigma(self.question, self.equipment)
+            sigma_angle = float(f"{angle / MGON:.6g}") * MGON
             noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), sigma_angle)
         tilt_range = float(f"{self.question.tilt_range / GON:.6g}") * GON
         return Request(
-            n, self.model, self.equipment.name, CRITERION, tilt_range, noise, starts=STARTS
+            n, self.model, self.equipment.approach, CRITERION, tilt_range, noise, starts=STARTS
         )
 
     def candidate(self, n: int) -> Candidate | None:

@@ -8,16 +8,31 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
+from accelstudy.adjustment import whitened_jacobian
+from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.beside import reference_sensor, usable_reference
+from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
+MOUNTING = 300.0
+"""s, to mount a sensor beside a reference on one plate."""
+ALIKE = "alike"
+"""A reference of the same type, calibrated by gravity alone in the positions of a scheme, each held
+for the usual time."""
+OF_ALIKE = ("bias-scale-nonorthogonality", "fibonacci-24")
 LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 """Endings of files that are no data sheets, though one can be made of them."""
 
@@ -28,19 +43,30 @@ class Equipment:
 
     Attributes
     ----------
-    name : "gravity" or "robot", which is also the approach
+    name : "gravity", "robot" or "reference"
     moving : float, s, from the end of a hold to the beginning of the next
     setup : float, s, before the first hold
+    reference : ReferenceSensor, optional, beside the one that is calibrated
     """
 
     name: str
     moving: float
     setup: float
+    reference: ReferenceSensor | None = None
+
+    @property
+    def approach(self) -> str:
+        """Name of the approach."""
+        return "gravity" if self.name == "gravity" else "robot"
 
     @property
     def how(self) -> str:
         """The equipment in words."""
-        return "by hand" if self.name == "gravity" else "with a robot"
+        return {
+            "gravity": "by hand",
+            "robot": "with a robot",
+            "reference": "by hand beside a calibrated sensor",
+        }[self.name]
 
     def seconds(self, positions: int, hold: float) -> float:
         """Time in the field, s."""
@@ -90,6 +116,7 @@ class Question:
     most_seconds : float, s in the field
     most_positions : int
     schemes : tuple of str, names or files of schemes besides those that are always compared
+    beside : Equipment, optional, with a calibrated sensor, by linear theory only
     """
 
     target: float
@@ -102,6 +129,7 @@ class Question:
     most_seconds: float = math.inf
     most_positions: int = 200
     schemes: tuple[str, ...] = ()
+    beside: Equipment | None = None
     sizes: Mapping[str, Size] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -144,6 +172,7 @@ def question_of(
     robot_moving_time: float,
     robot_setup_time: float,
     robot_accuracy: float,
+    reference: str | None = None,
 ) -> Question:
     """Make a question of what the options of `accelstudy plan` say, in SI.
 
@@ -159,10 +188,15 @@ def question_of(
         )
     by_hand = Equipment("gravity", moving_time, 0.0)
     robot = Equipment("robot", robot_moving_time, robot_setup_time)
+    sheet = of_sigma(sigma) if sigma is not None else get_sensor(str(sensor))
+    beside = None
+    if reference is not None:
+        sensor_beside = planned_reference(reference, sheet)
+        beside = Equipment("reference", moving_time, MOUNTING, sensor_beside)
     return Question(
         tilt_accuracy,
         tilt_range,
-        of_sigma(sigma) if sigma is not None else get_sensor(str(sensor)),
+        sheet,
         equipment_of(equipment, by_hand, robot),
         confidence,
         tuple(sorted(set(holds))),
@@ -170,6 +204,47 @@ def question_of(
         math.inf if max_time is None else max_time,
         max_positions,
         tuple(schemes),
+        beside,
+    )
+
+
+def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:
+    """Sensor beside the one that is calibrated.
+
+    Parameters
+    ----------
+    text : path of the calibration.json of that sensor, or `ALIKE`
+    sheet : DataSheet, of the sensor that is calibrated
+
+    Raises
+    ------
+    InputError
+        If the calibration tells no angles with their sigmas.
+    """
+    return _alike(sheet) if text == ALIKE else _of_calibration(Path(text))
+
+
+def _of_calibration(path: Path) -> ReferenceSensor:
+    calibration = usable_reference(path)
+    sigma = calibration.content["sigma_position_mps2"]
+    if not sigma:
+        raise InputError(f"--reference {path}: it does not tell the noise of a position")
+    return reference_sensor(calibration, sigma)
+
+
+def _alike(sheet: DataSheet) -> ReferenceSensor:
+    model, scheme = get_model(OF_ALIKE[0]), get_scheme(OF_ALIKE[1])
+    noise = Noise(sheet.sigma_mean(USUAL_HOLD))
+    ideal = np.zeros(model.n_parameters)
+    observed = session(model, ideal, scheme.directions, STANDARD_GRAVITY).observations(noise)
+    rows = whitened_jacobian(model, get_approach("gravity"), observed, ideal)
+    return ReferenceSensor(
+        calibration=ALIKE,
+        frame="frd",
+        sigma_mps2=noise.sigma_force,
+        effects=[effect.spec for effect in model.effects],
+        parameters=ideal.tolist(),
+        covariance=np.linalg.inv(rows.T @ rows).tolist(),
     )
 
 

@@ -14,13 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainc, gammaincinv
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.design.estimability import SINGULAR
 from accelstudy.design.task import position_rows
 from accelstudy.effects import HoldConditions, get_effect
@@ -131,11 +133,30 @@ class Theory:
         """Columns of what a model estimates."""
         return [i for effect in model.effects for i in self.columns[effect.name]]
 
-    def rows(self, directions: Array, approach: str, noise: Noise) -> Array:
-        """Whitened rows of the model with every effect, (conditions, u)."""
-        hold = HoldConditions(yaw=np.zeros(len(directions)))
-        rows = position_rows(self.model, get_approach(approach), noise, directions, hold=hold)
-        return rows.reshape(-1, rows.shape[-1])
+    def rows(
+        self,
+        directions: Array,
+        approach: str,
+        noise: Noise,
+        reference: ReferenceSensor | None = None,
+    ) -> Array:
+        """Whitened rows of the model with every effect, (conditions, u).
+
+        Errors c of a reference, 0 ± 1 and common to all positions, add C c to the noise, so its
+        covariance is I + C Cᵀ. With the singular value decomposition C = U S Vᵀ, the rows are
+        scaled by its inverse root, I − U (I − (I + S²)^(−1/2)) Uᵀ.
+        """
+        hold, errors = HoldConditions(yaw=np.zeros(len(directions))), None
+        if reference is not None:
+            errors = partial(reference.errors, gravity=STANDARD_GRAVITY)
+        rows = position_rows(
+            self.model, get_approach(approach), noise, directions, hold=hold, errors=errors
+        )
+        rows = rows.reshape(-1, rows.shape[-1])
+        u = self.model.n_parameters
+        left, size, _ = np.linalg.svd(rows[:, u:], full_matrices=False)
+        less = 1 - 1 / np.sqrt(1 + size**2)
+        return np.asarray(rows[:, :u] - (left * less) @ (left.T @ rows[:, :u]))
 
     def expected(
         self, rows: Array, model: SensorModel, sizes: Mapping[str, float]

@@ -50,7 +50,8 @@ def how_to(answer: Answer) -> list[str]:
     """Say how to get the positions, and how exactly to measure them."""
     candidate = answer.first.candidate
     command = positions_command(answer.question, candidate)
-    return lines(SENTENCES, "how_to", candidate, command)
+    beside = answer.beside and positions_command(answer.question, answer.beside)
+    return lines(SENTENCES, "how_to", candidate, command, beside)
 
 
 def reason_lines(answer: Answer) -> list[str]:

@@ -11,6 +11,7 @@ from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import (
+    angle_errors,
     campaign_noise,
     campaign_observations,
     check_campaign,
@@ -289,11 +290,14 @@ def next_rows(
 ) -> Array:
     """Rows of the design matrix of each of k attitudes as the next position, (k, c, u')."""
     f_b, hold = -campaign.gravity * directions, next_holds(campaign, directions)
+    angles, errors = angles_of(f_b), angle_errors(campaign)
+    sigma_angle, common = (noise.sigma_angle, None) if errors is None else errors(angles)
     observed = Observations(
         forces=f_b[None],  # of an ideal sensor, all of whose effects are zero
         sigma_force=noise.sigma_force,
-        angles=angles_of(f_b)[None],
-        sigma_angle=noise.sigma_angle,
+        angles=angles[None],
+        sigma_angle=sigma_angle,
+        common=common,
         gravity=campaign.gravity,
         sigma_gravity=noise.sigma_gravity,
         hold=hold,

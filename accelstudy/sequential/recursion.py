@@ -127,7 +127,7 @@ class Recursion:
         problem = CalibrationProblem.of(model, approach, observed.take(np.arange(0)))
         sessions, u = problem.initial.shape
         before, mean = prior.rows_of(model), prior.start(model)
-        # Observed gravity is prior knowledge too.
+        # Observed gravity, and 0 ± 1 of errors that angles share, are prior knowledge, too.
         gravity = np.flatnonzero(problem.weights)
         self._before = np.zeros((len(before) + len(gravity), u))
         self._before[: len(before), : model.n_parameters] = before
@@ -266,7 +266,7 @@ class Recursion:
     def _sensitive(self, problem: CalibrationProblem, chosen: NDArray[np.int_]) -> Array:
         """f_a of sessions at their estimates, (3, R, n)."""
         u, x = self.model.n_parameters, self._x[chosen]
-        g = x[:, -1] if x.shape[1] > u else problem.conditions.gravity
+        g = x[:, -1] if problem.with_gravity else problem.conditions.gravity
         hold = problem.conditions.hold
         f_a = self.model.sensitive_force(problem.observed[0][chosen], x[:, :u], g, hold)
         return np.moveaxis(f_a, -1, 0)

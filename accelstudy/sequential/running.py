@@ -107,7 +107,7 @@ def _split(text: str) -> tuple[str, str]:
 
 def _without_positions(header: Header) -> Campaign:
     values = {"positions": np.zeros(0, dtype=np.int64), "forces": np.zeros((0, 3))}
-    if header.robot is not None:
+    if (header.robot or header.reference) is not None:
         values["angles"] = np.zeros((0, 2))
     return campaign_of(header, values)
 
@@ -212,7 +212,15 @@ def _changes(before: Campaign, now: Campaign) -> str:
         if old is not None and new is not None and not np.array_equal(old, new[:n]):
             changed = before.positions[np.any(np.reshape(old != new[:n], (n, -1)), axis=1)]
             return f"position {changed[0]} was changed"
-    header = ("unit", "gravity", "sigma_gravity", "sigma_force", "sigma_angle", "full_range")
+    header = (
+        "unit",
+        "gravity",
+        "sigma_gravity",
+        "sigma_force",
+        "sigma_angle",
+        "reference",
+        "full_range",
+    )
     if any(getattr(before, name) != getattr(now, name) for name in header):
         return "campaign.yaml was changed"
     return ""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
+from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of
@@ -165,6 +166,27 @@ class Session:
             rng, rest = rng_of(block), replicates - block * size
             errors = self.errors(noise, size, rng, angles)
             yield errors.first(rest), self.disturbed(errors, noise, rng).first(rest)
+
+
+def with_angle_errors(
+    ideal: Session, drawn: Observations, errors: AngleErrors | None, rng: np.random.Generator
+) -> Observations:
+    """Sessions whose angles were told by a reference, instead of a robot.
+
+    Parameters
+    ----------
+    ideal : Session
+    drawn : Observations, sessions that were drawn of it
+    errors : function of angles, as of `Observations`; None leaves the sessions as they are
+    rng : Generator, for the errors that all positions share
+    """
+    if errors is None or drawn.angles is None:
+        return drawn
+    sigma, common = errors(ideal.angles)
+    noise = (drawn.angles - ideal.angles) * sigma / np.asarray(drawn.sigma_angle)
+    shared = rng.standard_normal((len(noise), common.shape[-1]))
+    angles = ideal.angles + noise + np.einsum("nak,rk->rna", common, shared)
+    return replace(drawn, angles=angles, sigma_angle=sigma, common=common)
 
 
 def session(

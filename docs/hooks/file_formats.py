@@ -30,7 +30,7 @@ MEANINGS = {
     "slope": "slopes of the samples within the hold",
     "sd_slope": "standard deviations of the slopes",
     "temperature": "mean temperature",
-    "angles": "attitude that the robot tells",
+    "angles": "attitude that the robot tells, or a reference",
     "yaw": "yaw that the robot tells; 0 if absent",
     "vibration": "rms of the vibration",
 }

@@ -48,9 +48,9 @@ def site(tmp_path_factory):
     return folder
 
 
-def log_csv(path):
+def log_csv(path, seed=1):
     """A log as a logger writes it: three columns without a header; 24 holds, a turn before each."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     rows = []
     forces = -9.81 * get_scheme("fibonacci-24").directions
     for before, after in zip(np.roll(forces, 1, axis=0), forces, strict=True):
@@ -78,11 +78,12 @@ def environment_of(site):
 def steps(site, walked):
     """What came of all commands, in a folder that holds what a reader has.
 
-    That is a log of a sensor, two calibrations of another, campaigns of three and, for studies, the
-    configurations and the verdicts of one.
+    That is a log of a sensor and one of a reference beside it, two calibrations of another,
+    campaigns of three and, for studies, the configurations and the verdicts of one.
     """
     folder = walked
     log_csv(folder / "log.csv")
+    log_csv(folder / "ref.csv", seed=2)
     for seed, season in enumerate(("spring", "autumn")):
         write_document(folder / season / "calibration.json", seed)
     for seed in (1, 2, 3):

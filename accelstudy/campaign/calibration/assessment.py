@@ -40,6 +40,8 @@ class Assessment:
     tilt_shares : mapping of effect to the tilt error that the uncertainty of its parameters leaves,
         (2,), rad, rms of roll and of pitch
     tilt_parameters : (2,) array, rad, the same of all parameters together
+    tilt_reference : (2,) array, rad, the part of it that the calibration of a reference causes;
+        None without one
     tilt_missing : (2,) array, rad, rms tilt error of a reading that is wrong by as much as the
         residuals exceed the stated noise; 0 where they do not refute it
     implausible : tuple of str, parameters and tilt errors that no sensor has
@@ -56,6 +58,7 @@ class Assessment:
     components: VarianceComponents | None
     tilt_shares: Mapping[str, Array]
     tilt_parameters: Array
+    tilt_reference: Array | None
     tilt_missing: Array
     implausible: tuple[str, ...]
     gross_error: Recognised | None
@@ -98,7 +101,7 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
     session = (fit.model, fit.approach, fit.observed)
     solution = quality.solve(*session, fit.adjustment)
     shares, missing = tilt_shares(fit), tilt_missing(fit)
-    left = shares.pop("all")
+    left, by_reference = shares.pop("all"), shares.pop("reference", None)
     implausible = (
         *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
         *implausible_tilt(*np.hypot(left, missing)),
@@ -116,6 +119,7 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         components=variance_components(*session) if fit.sigma_known else None,
         tilt_shares=shares,
         tilt_parameters=left,
+        tilt_reference=by_reference,
         tilt_missing=missing,
         implausible=implausible,
         gross_error=None if without_gross_error else recognise(fit.campaign, full),
@@ -139,6 +143,8 @@ def tilt_missing(fit: CampaignFit) -> Array:
 def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     """Tilt error from the uncertainty of each effect's parameters, and of "all", (2,), rad.
 
+    With a reference there is also the part of all that its calibration causes, "reference".
+
     It is the rms of roll and of pitch over tilts up to `MAX_TILT_GON`, without the noise of a
     reading. Effects that depend on temperature or time have those of the campaign. Effects of the
     rig have no share: the sensor in use has left the rig.
@@ -151,11 +157,13 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     slope = tilt_slope(model, p, output, f_b, g, hold) * model.stays
     covariance = fit.covariance
 
-    def rms(columns: slice) -> Array:
+    def rms(columns: slice, covariance: Array = covariance) -> Array:
         part, block = slope[..., columns], covariance[columns, columns]
         return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(f_b))
 
     shares, first = {"all": rms(slice(None))}, 0
+    if fit.by_reference is not None:
+        shares["reference"] = rms(slice(None), fit.by_reference)
     for effect in model.effects:
         last = first + len(effect.parameters)
         if effect.part == "sensor":

@@ -42,6 +42,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "model": fit.model.name,
         "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,
+        "reference": None
+        if fit.by_reference is None or campaign.reference is None
+        else campaign.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
         "axes": FRD.name,
         "unit": campaign.unit,
         "nominal": _nominal(fit),
@@ -95,6 +98,7 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
     components = assessment.components
     gross, parameters = assessment.gross_error, assessment.tilt_parameters / MGON
     angles = None if held is None else held.rms_angles
+    reference = (None, None) if (by := assessment.tilt_reference) is None else by / MGON
     positions = assessment.fit.campaign.positions
     return {
         "state": assessment.state,
@@ -138,6 +142,8 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "pitch": json_number(assessment.tilt[1] / MGON),
             "parameters_roll": json_number(parameters[0]),
             "parameters_pitch": json_number(parameters[1]),
+            "reference_roll": json_number(reference[0]),
+            "reference_pitch": json_number(reference[1]),
             "max_tilt_gon": MAX_TILT_GON,
         },
     }

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
@@ -129,6 +130,20 @@ class CampaignFit:
         return self.variance_factor * self.adjustment.cofactors[0, :u, :u]
 
     @property
+    def by_reference(self) -> Array | None:
+        """Part of `covariance` that the calibration of a reference causes, (u, u), SI.
+
+        It is what would be gone if that calibration had no errors: Q_xc Q_cc⁻¹ Q_cx, with the
+        errors c that all holds share. None where no reference was used.
+        """
+        if self.observed.common is None or not self.approach.uses_angles:
+            return None
+        q, u = self.adjustment.cofactors[0], self.model.n_parameters
+        shared = slice(u, u + self.observed.common.shape[-1])
+        part = q[:u, shared] @ np.linalg.solve(q[shared, shared], q[shared, :u])
+        return self.variance_factor * part
+
+    @property
     def sigma(self) -> Array:
         """Standard deviations of the parameters to quote, (u,), SI."""
         return np.sqrt(np.diag(self.covariance))
@@ -184,11 +199,18 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
     noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
+    errors = angle_errors(campaign)
+    sigma_angle: float | Array = noise.sigma_angle
+    common = None
+    if errors is not None and campaign.angles is not None:
+        sigma_angle, common = errors(campaign.angles)
     return Observations(
         forces=campaign.forces[None],
         sigma_force=noise.sigma_force,
         angles=None if campaign.angles is None else campaign.angles[None],
-        sigma_angle=noise.sigma_angle,
+        sigma_angle=sigma_angle,
+        common=common,
+        angle_errors=errors,
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
@@ -196,6 +218,13 @@ def campaign_observations(campaign: Campaign) -> Observations:
         slope=campaign.slope if stated else None,
         sd_slope=campaign.sd_slope if stated else None,
     )
+
+
+def angle_errors(campaign: Campaign) -> AngleErrors | None:
+    """Errors of a reference in any attitude, as of `Observations`; None without a reference."""
+    if campaign.reference is None:
+        return None
+    return partial(campaign.reference.errors, gravity=campaign.gravity)
 
 
 def check_campaign(campaign: Campaign, model: SensorModel, approach: Approach) -> None:
@@ -270,7 +299,8 @@ def fit_campaign(
             f"{_cause(campaign, theory, diagnosing)}"
         )
     fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
-    if campaign.sigma_force is None and model.prior_weights.any() and adjustment.redundancy > 0:
+    prior = model.prior_weights.any() or observed.common is not None
+    if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
         # What is known a priori needs a sigma beside it: that of the residuals.
         for _ in range(3):
             sigma = max(fit.sigma_position_posteriori, 1e-9, least_sigma(campaign, approach))

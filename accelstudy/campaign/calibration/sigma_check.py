@@ -14,7 +14,7 @@ from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import p_value, quantity_text
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
-from accelstudy.simulation.sessions import BLOCK, session
+from accelstudy.simulation.sessions import BLOCK, session, with_angle_errors
 
 AT_ONCE = 500_000
 """Positions of all sessions of a block together, at most."""
@@ -66,7 +66,9 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         lambda block: np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(block,))),
         size,
     )
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 1)))
     for _, observed in drawn:
+        observed = with_angle_errors(ideal, observed, fit.observed.angle_errors, rng)
         result = calibrate(model, approach, replace(observed, initial=fit.parameters))
         estimates.append(result.parameters[result.converged, : model.n_parameters])
     errors = np.concatenate(estimates) - fit.parameters

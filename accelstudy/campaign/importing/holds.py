@@ -8,8 +8,8 @@ twice, first for the threshold (`windows`), then for the holds and the envelope 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -104,6 +104,17 @@ class DetectedHolds:
 
     def __len__(self) -> int:
         return len(self.segments)
+
+    def without(self, numbers: Collection[int]) -> DetectedHolds:
+        """Return the others, as if these had not been found."""
+        kept = ~np.isin(self.number, list(numbers))
+        return replace(
+            self,
+            segments={n: part for n, part in self.segments.items() if n not in numbers},
+            left_out={n: why for n, why in self.left_out.items() if n not in numbers},
+            conditions={name: values[kept] for name, values in self.conditions.items()},
+            sd_slope=self.sd_slope[kept],
+        )
 
     def of_each(self, attribute: str) -> NDArray[Any]:
         """Attribute of `Segment` for each hold, (n,) or (n, 3)."""
@@ -209,7 +220,7 @@ def detected_holds(
         segments=segments,
         left_out=left_out,
         conditions=_conditions(list(segments.values()), log.conditions),
-        noise=_noise(used, log.step),
+        noise=hold_noise(used, log.step),
         sd_slope=_slope_sigmas(list(segments.values()), log.step),
         threshold=threshold,
         step=log.step,
@@ -305,7 +316,7 @@ def _names(numbers: Sequence[int]) -> str:
     return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
 
 
-def _noise(segments: Sequence[Segment], step: float) -> HoldNoise:
+def hold_noise(segments: Sequence[Segment], step: float) -> HoldNoise:
     """Turn the samples of each hold to its channels, and add them up."""
     center, directed = _center(np.array([segment.mean for segment in segments]))
     frames = [_frame(segment.mean - center) for segment in segments]

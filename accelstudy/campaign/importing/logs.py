@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
-from accelstudy.campaign.importing.segments import segment_logs
+from accelstudy.campaign.importing.segments import Segment, segment_logs
 from accelstudy.campaign.importing.settings import (
     ImportSettings,
     Selection,
@@ -27,6 +28,20 @@ from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
+
+
+class TellsAngles(Protocol):
+    """A sensor beside those of the logs, as `accelstudy.campaign.beside` has it."""
+
+    def averaged(
+        self, log: Log, holds: DetectedHolds, gravity: float
+    ) -> tuple[DetectedHolds, list[Segment]]:
+        """Average its log in the holds; without those that it does not cover."""
+
+    def beside(
+        self, campaign: Campaign, report: ImportReport, segments: list[Segment], log: Log
+    ) -> tuple[Campaign, ImportReport]:
+        """Give a campaign roll and pitch of its holds."""
 
 
 def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) -> Log:
@@ -67,11 +82,17 @@ def import_log(
 
 
 def import_all(
-    paths: Sequence[str | Path], settings: ImportSettings
+    paths: Sequence[str | Path],
+    settings: ImportSettings,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import a table of means, or find the static holds of logs; see `import_sensors`."""
     if not settings.means:
-        return import_sensors(paths, settings)
+        return import_sensors(paths, settings, beside)
+    if beside is not None:
+        raise InputError(
+            "a table of means (--means) has no holds in time: leave out --reference-log"
+        )
     if len(paths) > 1 or settings.sensors:
         raise InputError("a table of means is one file of one sensor")
     if settings.block is not None:
@@ -82,7 +103,9 @@ def import_all(
 
 
 def import_sensors(
-    paths: Sequence[str | Path], settings: ImportSettings
+    paths: Sequence[str | Path],
+    settings: ImportSettings,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Find the static holds of the sensors in a log, or in logs of one position each.
 
@@ -91,6 +114,8 @@ def import_sensors(
     paths : files with raw logs, see `open_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
+    beside : TellsAngles, optional, a calibrated sensor on the same plate, whose roll and pitch the
+        campaigns get
 
     Returns
     -------
@@ -106,6 +131,10 @@ def import_sensors(
         If a log cannot be read or has no static hold.
     """
     chosen = _settings_of_sensors(named_after(settings, paths))
+    if beside is not None and (settings.block is not None or len(paths) > 1):
+        raise InputError(
+            "--reference-log goes with one log that has a time, not with several files or --block"
+        )
     if settings.block is not None:
         if len(paths) > 1:
             raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
@@ -124,10 +153,16 @@ def import_sensors(
         selection=parse_selection(settings.exclude, settings.join),
         one_each=len(paths) > 1,
     )
-    return {
-        name: campaign_of_holds(paths, each, logs[name], holds)
-        for (name, each), holds in zip(chosen.items(), detected, strict=True)
-    }
+    result = {}
+    for (name, each), holds in zip(chosen.items(), detected, strict=True):
+        if beside is None:
+            result[name] = campaign_of_holds(paths, each, logs[name], holds)
+            continue
+        log, g = _parts(logs[name])[0], each.gravity.value_mps2
+        covered, segments = beside.averaged(log, holds, g)
+        made = campaign_of_holds(paths, each, log, covered)
+        result[name] = beside.beside(*made, segments, log)
+    return result
 
 
 def _import_blocks(
@@ -224,6 +259,7 @@ def import_each(
     paths: Sequence[str | Path],
     settings: ImportSettings,
     figure: bool = True,
+    beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import logs, or a table of means, and write the campaigns to folders.
 
@@ -232,7 +268,7 @@ def import_each(
     Parameters
     ----------
     folders : mapping of the names of the sensors to folders; "" where the settings name none
-    paths, settings : as of `import_sensors`
+    paths, settings, beside : as of `import_sensors`
     figure : bool
 
     Raises
@@ -240,7 +276,7 @@ def import_each(
     InputError
         If a file cannot be read or makes no campaign, or a folder cannot be written.
     """
-    campaigns = import_all(paths, settings)
+    campaigns = import_all(paths, settings, beside)
     for name, (campaign, report) in campaigns.items():
         write_campaign(campaign, folders[name])
         if figure and report.holds is not None:
@@ -254,7 +290,7 @@ def import_each(
 def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
-        raise InputError("robot: its angles go with a table of means (--means)")
+        raise InputError("robot (--robot-sigma): its angles go with a table of means (--means)")
     if not settings.sensors:
         return {"": settings}
     if set(AXES) & set(settings.columns):

@@ -27,6 +27,7 @@ from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
 from accelstudy.diagnosis.space.slopes import Slopes
 from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
+from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
 
@@ -174,6 +175,14 @@ class Frame:
         ]
 
 
+def _of_robot(effect: Effect) -> bool:
+    """Whether only a robot has an effect: it is in its readings, or turns with its axes."""
+    if type(effect).reading is not Effect.reading:
+        return True
+    columns = compose(effect.spec, (effect.spec,)).hold_columns
+    return effect.part == "rig" and bool({"roll", "pitch", "yaw"} & {*columns})
+
+
 def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
     """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
     from scipy.linalg import qr  # slow to import, and seldom needed
@@ -222,6 +231,9 @@ class ExaminedFit:
         invisible, untestable = [], {}
         for name in effect_names():
             if name in modelled:
+                continue
+            if solution.observed.angle_errors is not None and _of_robot(get_effect(name)):
+                untestable[name] = "a calibrated sensor told the angles, and no robot"
                 continue
             try:
                 effects = get_effect(name).candidates(frame.hold, frame.forces, solution.gravity)

@@ -1,0 +1,85 @@
+"""A calibrated sensor beside the one that is calibrated, which tells roll and pitch of each hold.
+
+Its readings have noise, independent from hold to hold. Its calibration has errors, the same in all
+holds: with the covariance matrix C = L Lᵀ of its parameters they are J L c, with the derivatives J
+of roll and pitch by the parameters, and unknown numbers c that are 0 ± 1.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, model_validator
+
+from accelstudy.files.validation import Block, Finite, SigmaForce
+from accelstudy.leveling.angles import jacobian, specific_force
+from accelstudy.sensors.frames import Frame, parse_frame
+from accelstudy.sensors.models import compose
+from accelstudy.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+NEAREST = 1e-4
+"""rad; nearer to the pole of roll its derivatives are those at this distance."""
+
+
+class ReferenceSensor(Block):
+    """A calibrated sensor whose roll and pitch the table has; instead of a robot."""
+
+    calibration: str = Field(description="campaign of its calibration")
+    frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
+        description="where its axes x, y and z point, in the axes of the sensor: frd if they are "
+        "the same up to a small rotation"
+    )
+    sigma_mps2: SigmaForce = Field(description="standard deviation of its mean in a hold, per axis")
+    effects: Annotated[list[str], Field(min_length=1)] = Field(description="its model")
+    parameters: list[Finite] = Field(description="its calibration, SI")
+    covariance: list[list[Finite]] = Field(description="covariance matrix of the parameters, SI")
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        u = self.model.n_parameters
+        if {len(self.parameters), len(self.covariance), *map(len, self.covariance)} != {u}:
+            raise ValueError(f"parameters, covariance: expected {u} and {u} by {u} numbers")
+        return self
+
+    @property
+    def model(self) -> SensorModel:
+        """Its sensor model."""
+        return compose("+".join(self.effects), tuple(self.effects))
+
+    @property
+    def axes(self) -> Frame:
+        """The frame."""
+        return parse_frame(self.frame)
+
+    @cached_property
+    def _root(self) -> Array:
+        """L, (u, u), of a covariance matrix that may be singular."""
+        values, vectors = np.linalg.eigh(np.array(self.covariance))
+        return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+    def errors(self, angles: Array, gravity: float) -> tuple[Array, Array]:
+        """Errors of roll and pitch in some attitudes.
+
+        Parameters
+        ----------
+        angles : (n, 2) array, rad
+        gravity : float, m/s²
+
+        Returns
+        -------
+        sigma : (n, 2) array, rad, standard deviations by the noise of its readings
+        common : (n, 2, u) array, rad, derivatives J L by the errors of its calibration
+        """
+        most = np.pi / 2 - NEAREST
+        roll, pitch = angles[:, 0], np.clip(angles[:, 1], -most, most)
+        forces = np.column_stack(specific_force(roll, pitch, gravity))
+        own, model, p = self.axes.from_frd(forces), self.model, np.array(self.parameters)
+        by_parameters = model.correction_jacobian(model.sense(own, p, gravity), p, gravity)
+        by_force = jacobian(forces)
+        sigma = self.sigma_mps2 * np.linalg.norm(by_force, axis=-1)
+        return sigma, by_force @ self.axes.matrix @ by_parameters @ self._root

@@ -1,0 +1,215 @@
+"""A calibrated sensor beside the one that is calibrated: the import of its log."""
+
+import json
+
+import numpy as np
+import pytest
+from calling import call, refusal, succeed
+
+from accelstudy.campaign.format import read_campaign, write_campaign
+
+G, RATE, HOLD = 9.80665, 25.0, 4.0
+QUARTER = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # x of the reference points right
+SMALL = np.array([[1.0, -0.015, -0.02], [0.015, 1, -0.01], [0.02, 0.01, 1]])
+OF_REFERENCE = np.array([[1.002, 0.003, -0.002], [0, 0.998, 0.001], [0, 0, 1.001]])
+OF_SENSOR = np.array([[0.99, 0.012, 0.007], [-0.004, 1.005, 0.009], [0.011, -0.006, 1.003]])
+
+
+def turned(count, rng):
+    """Forces of a plate that is held in evenly spread attitudes, and moved between them."""
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, np.pi * (1 + 5**0.5) * i
+    r = np.sqrt(1 - z * z)
+    held = np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
+    share = np.linspace(0, 1, int(2 * RATE))[:, None]
+    parts = []
+    for first, then in zip(held, np.roll(held, -1, axis=0), strict=True):
+        parts.append(np.repeat(first[None], int(HOLD * RATE), axis=0))
+        shaken = 0.3 * np.sin(8 * np.pi * share) * rng.standard_normal(3)
+        way = first * (1 - share) + then * share + shaken
+        parts.append(way / np.linalg.norm(way, axis=1, keepdims=True))
+    return -G * np.concatenate(parts[:-1])
+
+
+def write(path, forces, start=0.0, names="time,fx,fy,fz"):
+    time = start + np.arange(len(forces)) / RATE
+    table = np.column_stack([time, forces])
+    np.savetxt(path, table, delimiter=",", header=names, comments="", fmt="%.7f")
+    return path
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """A folder with the logs of a sensor and a reference, and the calibration of the latter."""
+    folder, rng = tmp_path_factory.mktemp("plate"), np.random.default_rng(5)
+
+    def noisy(forces, matrix, bias, sigma):
+        return forces @ matrix.T + bias + sigma * rng.standard_normal(forces.shape)
+
+    alone, together = turned(16, rng), turned(14, rng)
+    own = np.array([0.02, -0.03, 0.05])
+    names = "time,ax,ay,az"
+    write(folder / "alone.csv", noisy(alone, OF_REFERENCE, own, 0.01), names=names)
+    beside = noisy(together @ QUARTER.T, OF_REFERENCE, own, 0.01)
+    write(folder / "ref.csv", beside, 1000, names)
+    write(folder / "late.csv", beside, 5000, names)
+    write(folder / "shifted.csv", beside, 1018, names)
+    write(folder / "between.csv", beside, 1003, names)
+    write(folder / "in-g.csv", beside / 9.80665, 1000, names)
+    write(folder / "other.csv", beside, 1000, "t,p,q,r")
+    askew = np.array([[1, -1, 0], [1, 1, 0], [0, 0, 2**0.5]]) / 2**0.5
+    write(folder / "askew.csv", noisy(together @ askew.T, OF_REFERENCE, own, 0.01), 1000, names)
+    still = np.repeat(beside[:1], len(beside), axis=0) + 0.01 * rng.standard_normal(beside.shape)
+    write(folder / "still.csv", still, 1000, names)
+    write(folder / "partly.csv", beside[len(beside) // 2 :], 1000 + len(beside) // 2 / RATE, names)
+    measured = noisy(together @ SMALL.T, OF_SENSOR, np.array([0.3, -0.2, 0.1]), 0.02)
+    write(folder / "log.csv", measured, 1000)
+    succeed("import", folder / "alone.csv", "--out", folder / "alone", "--no-figure")
+    succeed("calibrate", folder / "alone", "--out", folder / "ref")
+    return folder
+
+
+def given(plate, out, log="ref.csv", calibration="ref/calibration.json", *more):
+    """Words of an import beside a reference."""
+    beside = ("--reference-log", plate / log, "--reference", plate / calibration)
+    return ("import", plate / "log.csv", "--out", out, "--no-figure", *beside, *more)
+
+
+def test_from_two_logs_to_the_sensor(plate, tmp_path):
+    said = succeed(*given(plate, tmp_path / "c"))
+    assert "x right, y back, z down" in said.output
+    campaign = read_campaign(tmp_path / "c")
+    assert campaign.reference.frame == "rbd"
+    assert campaign.reference.calibration == "alone"
+    # Four seconds less trims and half windows, at 25 per second.
+    assert campaign.reference.sigma_mps2 == pytest.approx(0.01 / np.sqrt(70), rel=0.4)
+    succeed(
+        *("calibrate", tmp_path / "c", "--out", tmp_path / "out", "--approach", "robot"),
+        *("--model", "bias-scale-nonorthogonality-crossaxis"),
+    )
+    content = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert content["quality"]["state"] == "accepted"
+    assert content["reference"]["calibration"] == "alone"
+    tilt = content["quality"]["tilt_rms_mgon"]
+    assert 0 < tilt["reference_roll"] < tilt["parameters_roll"]
+    # The rotation between the sensors is part of what is estimated: forces in the axes of the
+    # reference come out, whatever the sensor was turned by.
+    matrix, bias = (np.array(content["affine"][key]) for key in ("matrix", "bias_mps2"))
+    levels = -G * np.array([[0.3, 0.2, 0.93], [-0.4, 0.1, 0.91]])
+    read = levels @ SMALL.T @ OF_SENSOR.T + [0.3, -0.2, 0.1]
+    np.testing.assert_allclose((read - bias) @ matrix.T, levels, atol=0.02)
+
+
+def test_the_campaign_is_read_as_it_was_written(plate, tmp_path):
+    succeed(*given(plate, tmp_path / "c"))
+    campaign = read_campaign(tmp_path / "c")
+    write_campaign(campaign, tmp_path / "again", "parquet")
+    again = read_campaign(tmp_path / "again")
+    assert again.reference == campaign.reference
+    np.testing.assert_array_equal(again.angles, campaign.angles)
+
+
+def test_other_columns_and_times(plate, tmp_path):
+    """Columns by option; a clock that is off by an offset; no clock at all."""
+    succeed(*given(plate, tmp_path / "a"))
+    columns = ("--reference-columns", "fx=p,fy=q,fz=r,time=t")
+    succeed(*given(plate, tmp_path / "b", "other.csv", "ref/calibration.json", *columns))
+    moved = ("--reference-offset", "-18")
+    succeed(*given(plate, tmp_path / "c", "shifted.csv", "ref/calibration.json", *moved))
+    first = read_campaign(tmp_path / "a")
+    for name in "bc":
+        np.testing.assert_allclose(read_campaign(tmp_path / name).angles, first.angles, atol=2e-4)
+
+
+def test_holds_without_the_reference_are_left_out(plate, tmp_path):
+    said = succeed(*given(plate, tmp_path / "c", "partly.csv")).stderr
+    assert "hold 1 left out: the reference log does not cover it" in said
+    assert read_campaign(tmp_path / "c").positions[0] == 8
+
+
+REFUSED = {
+    "late.csv": ("--reference-log", "whose holds lie from", "--reference-offset"),
+    "shifted.csv": ("--reference-log", "do not turn together", "--reference-offset"),
+    "between.csv": ("--reference-log", "moves in", "--reference-offset"),
+    "in-g.csv": ("--reference-log", "about 1 m/s^2", "unit"),
+    "other.csv": ("--reference-log", "--reference-columns"),
+    "askew.csv": ("--reference-log", "turned by 50 gon", "20 gon"),
+    "still.csv": ("--reference-log", "do not turn together"),
+    "missing.csv": ("missing.csv",),
+}
+
+
+@pytest.mark.parametrize("log", REFUSED)
+def test_logs_that_tell_no_angles(plate, tmp_path, log):
+    line = refusal(*given(plate, tmp_path / "c", log))
+    for part in REFUSED[log]:
+        assert part in line
+    assert not (tmp_path / "c").exists()
+
+
+def changed(plate, tmp_path, **change):
+    """A calibration.json with something else in it."""
+    content = json.loads((plate / "ref" / "calibration.json").read_text())
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps({**content, **change}))
+    return path
+
+
+def test_calibrations_that_tell_no_angles(plate, tmp_path):
+    def line(**change):
+        path = changed(plate, tmp_path, **change)
+        return refusal(*given(plate, tmp_path / "c", "ref.csv", path))
+
+    content = json.loads((plate / "ref" / "calibration.json").read_text())
+    none = [[None] * 9] * 9
+    assert "no covariance matrix" in line(covariance=none)
+    quality = {**content["quality"], "plausible": False, "warnings": ["s_x is 0.5"]}
+    assert "do not use this calibration: s_x is 0.5" in line(quality=quality)
+    names = [f"b_T_{axis}" for axis in "xyz"]
+    more = [{**content["parameters"][0], "name": name} for name in names]
+    warm = line(
+        effects=[*content["effects"], "thermal_bias"],
+        parameters=[*content["parameters"], *more],
+        covariance=np.eye(12).tolist(),
+    )
+    assert "--reference" in warm
+    assert "thermal_bias needs the temperature" in warm
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["--reference-log", "ref.csv"], "--reference-log: give the calibration.json"),
+        (["--reference", "ref/calibration.json"], "--reference: give the raw log"),
+        (["--reference-offset", "3"], "--reference-offset: goes with --reference-log"),
+        (["--reference-columns", "fx=1"], "--reference-columns: goes with --reference-log"),
+    ],
+)
+def test_options_that_go_together(plate, tmp_path, words, part):
+    words = [plate / word if "." in word else word for word in words]
+    assert part in refusal("import", plate / "log.csv", "--out", tmp_path / "c", *words)
+
+
+@pytest.mark.parametrize(
+    ("more", "part"),
+    [
+        (["--means"], "--means"),
+        (["--block", "100"], "--block"),
+        (["--robot-sigma", "3"], "--robot-sigma"),
+        (["--reference-columns", "fx=ax,fw=az"], "--reference-columns: fw"),
+        (["--reference-columns", "ax,ay"], "--reference-columns: expected"),
+        (["--reference-offset", "nan"], "--reference-offset"),
+    ],
+)
+def test_options_that_do_not_go_together(plate, tmp_path, more, part):
+    assert part in refusal(*given(plate, tmp_path / "c", "ref.csv", "ref/calibration.json", *more))
+
+
+def test_angles_in_the_log_are_left_out(plate, tmp_path):
+    table = np.loadtxt(plate / "log.csv", delimiter=",", skiprows=1)
+    table = np.column_stack([table, np.zeros((len(table), 2))])
+    path, head = tmp_path / "log.csv", "time,fx,fy,fz,roll,pitch"
+    np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.6f")
+    words = list(given(plate, tmp_path / "c"))
+    words[1] = path
+    assert "columns roll, pitch are left out" in call(*words).stderr

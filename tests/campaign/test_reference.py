@@ -1,0 +1,199 @@
+"""A calibrated sensor as reference, against simulated sessions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from calling import refused
+
+from accelstudy.adjustment import Observations, calibrate
+from accelstudy.adjustment.quality import solve
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import STANDARD_GRAVITY as G
+from accelstudy.campaign.calibration.fit import campaign_observations, fit_campaign
+from accelstudy.campaign.calibration.sigma_check import check_sigmas
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.next_positions import _fit
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
+from accelstudy.leveling.angles import angles_of
+from accelstudy.positions.points import evenly_spread
+from accelstudy.sensors.models import get_model
+from accelstudy.sequential.advisor import next_rows
+from accelstudy.sequential.recursion import Recursion
+from accelstudy.simulation.sessions import Noise
+
+NINE = get_model("bias-scale-nonorthogonality")
+TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
+SESSIONS = 200
+ROBOT, GRAVITY = get_approach("robot"), get_approach("gravity")
+NOISE, NOISE_OF_REFERENCE = 1e-3, 0.5e-3
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Covariance matrix of a reference that was calibrated by gravity in 18 positions."""
+    ideal = Observations(-G * evenly_spread(18)[None], 1e-3)
+    return calibrate(NINE, GRAVITY, ideal).cofactors[0]
+
+
+def sessions(covariance, count, seed, frame="frd"):
+    """Campaigns beside a reference whose calibration is wrong as its covariance says.
+
+    Each with the true parameters of the sensor that is calibrated.
+    """
+    rng = np.random.default_rng(seed)
+    root = np.linalg.cholesky(covariance)
+    forces = -G * evenly_spread(20)
+    for _ in range(count):
+        truth = np.concatenate([0.1 * rng.standard_normal(3), 5e-3 * rng.standard_normal(9)])
+        own = np.concatenate([0.05 * rng.standard_normal(3), 2e-3 * rng.standard_normal(6)])
+        told = own + root @ rng.standard_normal(9)
+        beside = ReferenceSensor(
+            calibration="reference",
+            frame=frame,
+            sigma_mps2=NOISE_OF_REFERENCE,
+            effects=[effect.spec for effect in NINE.effects],
+            parameters=told.tolist(),
+            covariance=covariance.tolist(),
+        )
+        reading = NINE.sense(beside.axes.from_frd(forces), own)
+        reading = reading + NOISE_OF_REFERENCE * rng.standard_normal(forces.shape)
+        angles = angles_of(beside.axes.to_frd(NINE.correct(reading, told)))
+        measured = TWELVE.sense(forces, truth) + NOISE * rng.standard_normal(forces.shape)
+        yield (
+            truth,
+            Campaign(
+                name="beside",
+                positions=np.arange(1, 21),
+                forces=measured,
+                gravity=G,
+                sigma_force=NOISE,
+                angles=angles,
+                sigma_angle=NOISE_OF_REFERENCE / G,
+                reference=beside,
+            ),
+        )
+
+
+def test_sigmas_contain_the_calibration_of_the_reference(known):
+    inside, alone, omega = [], [], []
+    for truth, campaign in sessions(known, SESSIONS, seed=1):
+        observed = campaign_observations(campaign)
+        for common, hits in ((observed.common, inside), (None, alone)):
+            result = calibrate(TWELVE, ROBOT, replace(observed, common=common))
+            sigma = result.sigma_priori[0, :12]
+            hits.append(np.abs(result.parameters[0, :12] - truth) < 1.96 * sigma)
+            if common is not None:
+                omega.append(result.omega[0] / result.redundancy)
+    # A share of 0.95 of 200 sessions scatters by 0.015.
+    assert np.all(np.abs(np.mean(inside, axis=0) - 0.95) < 0.045)
+    assert np.min(np.mean(alone, axis=0)) < 0.85
+    assert np.mean(omega) == pytest.approx(1, abs=4 * np.sqrt(2 / result.redundancy / SESSIONS))
+
+
+@pytest.fixture(scope="module")
+def campaign(known):
+    """A campaign beside a reference whose x axis points to the right."""
+    ((_, campaign),) = sessions(known, 1, seed=2, frame="rbd")
+    return campaign
+
+
+def test_common_errors_are_those_of_changed_parameters(campaign):
+    """J L by the package, against roll and pitch with a calibration that is changed a little."""
+    beside, angles = campaign.reference, campaign.angles
+    _, common = beside.errors(angles, G)
+    own = beside.axes.from_frd(G * np.column_stack(_directions(angles)))
+    p = np.array(beside.parameters)
+    reading = NINE.sense(own, p)
+    step = np.cov(np.random.default_rng(1).standard_normal((9, 40)))[0] * 1e-5
+
+    def roll_and_pitch(parameters):
+        return angles_of(beside.axes.to_frd(NINE.correct(reading, parameters)))
+
+    change = (roll_and_pitch(p + step) - roll_and_pitch(p - step)) / 2
+    # A step of the parameters is L c; that of the angles is then J L c.
+    values, vectors = np.linalg.eigh(np.array(beside.covariance))
+    c = (vectors / np.sqrt(values)).T @ step
+    np.testing.assert_allclose(common @ c, change, atol=1e-9)
+
+
+def _directions(angles):
+    roll, pitch = angles.T
+    return np.sin(pitch), -np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll)
+
+
+def test_the_part_of_the_reference_is_what_its_errors_add(known):
+    """What is left is what an adjustment without common errors finds."""
+    ((_, campaign),) = sessions(known, 1, seed=3)
+    fit = fit_campaign(campaign, TWELVE, ROBOT)
+    alone = replace(campaign_observations(campaign), common=None)
+    sigma = calibrate(TWELVE, ROBOT, alone).sigma_priori[0, :12]
+    part = fit.sigma**2 - np.diag(fit.by_reference)
+    assert np.all(fit.sigma > sigma)
+    np.testing.assert_allclose(np.sqrt(part), sigma, rtol=0.05)
+
+
+def test_one_position_after_the_other_is_the_same(campaign):
+    observed = campaign_observations(campaign)
+    together = calibrate(TWELVE, ROBOT, observed)
+    recursion = Recursion(TWELVE, ROBOT, observed)
+    np.testing.assert_allclose(recursion.parameters, together.parameters, rtol=1e-6, atol=1e-9)
+    sigma = np.sqrt(np.diag(recursion.cofactors[0]))
+    np.testing.assert_allclose(sigma, together.sigma_priori[0], rtol=1e-6)
+
+
+def test_the_next_position_shares_the_errors(campaign):
+    """Rows of a candidate are those that it has as a position of the session."""
+    directions = np.array([[0.2, -0.3, 0.93], [0.6, 0.64, -0.48]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    rows = next_rows(campaign, TWELVE, ROBOT, Noise(NOISE), directions)
+    assert rows.shape == (2, 3, 12 + 9)
+    _, common = campaign.reference.errors(angles_of(-G * directions), G)
+    tilt = np.linalg.norm(common[:, 1], axis=-1)  # of pitch, which no cosine stretches
+    assert np.all(np.linalg.norm(rows[..., 12:], axis=(1, 2)) > 0.5 * tilt * G / NOISE)
+
+
+def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
+    solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
+    fitted = _fit(Frame.of(solution), ())
+    sigma, expected = (np.sqrt(np.diag(q)) for q in (fitted.cofactors, solution.cofactors))
+    np.testing.assert_allclose(sigma, expected, rtol=0.05)
+
+
+def test_a_reference_has_no_errors_of_a_robot(campaign):
+    solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
+    examined = ExaminedFit.of(Frame.of(solution))
+    of_robot = {"encoder_scale", "encoder_offset", "base_tilt", "axis_nonperpendicularity"}
+    assert of_robot < {*examined.untestable}
+    assert {"quadratic_scale", "bias_drift"} & {*examined.candidates}
+    assert not of_robot & {*examined.candidates}
+
+
+def test_simulated_sessions_confirm_the_sigmas(campaign):
+    """The check by simulation draws the errors that all holds share, too."""
+    table = check_sigmas(fit_campaign(campaign, TWELVE, ROBOT), 500)
+    # Standard deviations of 500 scatter by 3 %.
+    np.testing.assert_allclose(table["ratio"], 1, atol=0.13)
+
+
+def test_headers_that_are_wrong(campaign, tmp_path):
+    write_campaign(campaign, tmp_path)
+    header = tmp_path / "campaign.yaml"
+    text = header.read_text()
+    header.write_text(text + "robot:\n  angle_sigma_mgon: 3\n")
+    with refused("campaign.yaml", "goes without reference"):
+        read_campaign(tmp_path)
+    header.write_text(text.replace("  frame: rbd", "  frame: rbu"))
+    with refused("campaign.yaml", "reference.frame", "left-handed"):
+        read_campaign(tmp_path)
+    header.write_text(text.replace("  - scale\n", ""))
+    with refused("campaign.yaml", "expected 6 and 6 by 6 numbers"):
+        read_campaign(tmp_path)
+    header.write_text(text)
+    table = tmp_path / "positions.csv"
+    rows = [line.rsplit(",", 2)[0] for line in table.read_text().splitlines()]
+    table.write_text("\n".join(rows) + "\n")
+    with refused("campaign.yaml: reference: is given", "has no roll_robot_gon"):
+        read_campaign(tmp_path)

@@ -1,0 +1,85 @@
+"""A plan with a calibrated sensor beside the one that is calibrated."""
+
+import json
+
+import numpy as np
+import pytest
+from calling import refusal, succeed
+
+from accelstudy.adjustment import Observations, calibrate
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import GON, MGON
+from accelstudy.basics.units import STANDARD_GRAVITY as G
+from accelstudy.data_sheets import of_sigma
+from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.error import cap_forces
+from accelstudy.planning.answer import _beside
+from accelstudy.planning.candidates import rows_of
+from accelstudy.planning.question import Equipment, Question, planned_reference
+from accelstudy.planning.theory import theory_of
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
+
+SIGMA, RANGE, SESSIONS = 2e-3, 30 * GON, 250
+NINE = get_model("bias-scale-nonorthogonality")
+TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
+
+
+@pytest.fixture(scope="module")
+def beside():
+    return Equipment("reference", 20.0, 300.0, planned_reference("alike", of_sigma(SIGMA)))
+
+
+def test_what_is_left_is_what_simulated_sessions_leave(beside):
+    """Both sensors are simulated: the reference by its own, wrong calibration."""
+    rng = np.random.default_rng(3)
+    scheme, reference = get_scheme("fibonacci-15"), beside.reference
+    question = Question(10 * MGON, RANGE, of_sigma(SIGMA), (beside,))
+    theory = theory_of(RANGE)
+    rows = rows_of(question, beside, theory, scheme.directions, SIGMA)
+    expected = theory.expected(rows, TWELVE, {}).rms
+    forces, used = -G * scheme.directions, cap_forces(RANGE, 64)
+    root = np.linalg.cholesky(np.array(reference.covariance))
+    squares = []
+    for _ in range(SESSIONS):
+        told = root @ rng.standard_normal(9)
+        # The reference itself is ideal, and its calibration is wrong.
+        own = forces + SIGMA * rng.standard_normal(forces.shape)
+        angles = angles_of(NINE.correct(own, told))
+        sigma, common = reference.errors(angles, G)
+        measured = forces + SIGMA * rng.standard_normal(forces.shape)
+        observed = Observations(measured[None], SIGMA, angles[None], sigma, common=common)
+        estimates = calibrate(TWELVE, get_approach("robot"), observed).parameters[0, :12]
+        error = angles_of(TWELVE.correct(used, estimates)) - angles_of(used)
+        squares.append(np.mean(error**2, axis=0))
+    # Mean squares of a few independent errors scatter by about their own size.
+    np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected, rtol=0.1)
+    # With a robot of the same noise it would be clearly less.
+    noise = Noise(SIGMA, reference.sigma_mps2 / G)
+    robot = theory.expected(theory.rows(scheme.directions, "robot", noise), TWELVE, {}).rms
+    assert np.all(robot < 0.85 * expected)
+
+
+def test_only_models_with_the_rotation_are_tried(beside):
+    question = Question(30 * MGON, RANGE, of_sigma(SIGMA), beside=beside, most_positions=20)
+    found = _beside(question)
+    names = {effect.name for effect in found.model.effects}
+    assert names & {"cross_axis_misalignment", "mounting_rotation"}
+    assert found.seconds == 300 + found.scheme.n_positions * 30
+
+
+def test_the_command_says_what_it_takes_for_granted():
+    words = ("--tilt-range", "30gon", "--sigma", "2mm/s2", "--reference", "alike")
+    said = succeed("plan", "--tilt-accuracy", "30mgon", "--replicates", "20", *words).output
+    assert "positions by hand beside a calibrated sensor" in said
+    assert "By linear theory it leaves" in said
+    assert "of the same type, calibrated by gravity alone in 24 evenly spread positions" in said
+
+
+def test_a_calibration_that_cannot_be_a_reference(tmp_path):
+    words = ("plan", "--tilt-accuracy", "30mgon", "--sigma", "2mm/s2", "--reference")
+    assert "no-such.json" in refusal(*words, tmp_path / "no-such.json")
+    other = tmp_path / "calibration.json"
+    other.write_text(json.dumps({"schema_version": 1}))
+    assert "not a calibration.json" in refusal(*words, other)
