@@ -40,14 +40,14 @@ def lot_command(
     whether anything is missing in the lot, at one level for all, in how many of the sensors, how
     large it is, and which sensor is odd.
 
-    The folder of results gets report.html, lot.json, a figure and, if effects are missing,
-    model.yaml with them, which `--model` takes.
+    The folder of results gets report.html, lot.json, a figure and a calibration.json of each
+    sensor. If effects are missing, these have them, and model.yaml has them for `--model`.
     """
     from accelstudy.approaches import get_approach
     from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import LOT, result_folder
-    from accelstudy.lots.lot import weigh_lot, with_sizes
+    from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
     from accelstudy.lots.output import write_lot
     from accelstudy.sensors.models import get_model
 
@@ -61,9 +61,10 @@ def lot_command(
     with result_folder(out, LOT, folders, force) as results:
         measured = [read_campaign(folder) for folder in folders]
         lot = weigh_lot(measured, *chosen, seed=seed)
-        found = with_sizes(lot, measured, *chosen)
+        fits = calibrations(lot, measured, chosen[1])
+        found = with_sizes(lot, fits, chosen[0])
         of_first = chosen[1] or usual_approach(measured[0])
-        content = write_lot(lot, found, chosen[0], of_first, results, out)
+        content = write_lot(lot, found, fits, chosen[0], of_first, results, out)
     click.echo(content["verdict"])
     say(f"report: {out / 'report.html'}")
 

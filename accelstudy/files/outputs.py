@@ -84,7 +84,7 @@ POLE = Kind(
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
-LOT = Kind("lot", "lot.json", ("model.yaml", "report.html"), ("figures",))
+LOT = Kind("lot", "lot.json", ("model.yaml", "report.html"), ("figures", "each"))
 PLAN = Kind(
     "plan",
     "plan.parquet",

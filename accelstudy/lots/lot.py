@@ -14,7 +14,7 @@ from scipy import optimize
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
-from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
+from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import fit_base
@@ -296,15 +296,16 @@ class Lot:
     ----------
     passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the type,
         with the model and all that was found before, until nothing new is found
-    model : SensorModel, with all that was found
+    model : SensorModel, with `effects`
     effects : tuple of (Found, spec or None), in the order in which they were found
-    explained : bool, whether they are all that the lot lacks, but for odd sensors. If not, it lacks
-        something without a name, of which they only come close
+    close : tuple of names, which come closest to what has no name
+    explained : bool; if false, the sensors have something in common that no names explain
     """
 
     passes: tuple[Pass, ...]
     model: SensorModel
-    effects: tuple[tuple[Found, str | None], ...]
+    effects: tuple[tuple[Found, str | None], ...] = ()
+    close: tuple[tuple[str, ...], ...] = ()
     explained: bool = True
 
     @property
@@ -337,15 +338,9 @@ class Lot:
         """Odd sensors, with all that was found in the model; the surest first."""
         return self.passes[-1].odd
 
-    @property
-    def close(self) -> list[tuple[str, ...]]:
-        """Names that come close to what has no name, if something without one is missing."""
-        nameless = [] if self.explained else self.effects
-        return [f.names for f, spec in nameless if spec is not None]
-
     def each(self) -> list[tuple[str, tuple[str, ...], float]]:
         """Campaign, names of what it lacks under the lot, and their posterior, for each sensor."""
-        told = {found.names[0] for found, _ in self.effects} if self.explained else set()
+        told = {found.names[0] for found, _ in self.effects}
         rows = []
         for i, sensor in enumerate(self.sensors):
             names, probability = tuple[str, ...](), 1.0
@@ -415,7 +410,10 @@ def weigh_lot(
             break
     nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
     explained = not nameless and _explained(now, whole, weighed, len(effects))
-    return Lot(tuple(passes), whole, tuple(effects), explained)
+    if not explained:
+        close = tuple(found.names for found, spec in effects if spec is not None)
+        return Lot(tuple(passes), model, close=close, explained=False)
+    return Lot(tuple(passes), whole, tuple(effects))
 
 
 def _shows(campaign: Campaign, model: SensorModel, approach: Approach | None) -> bool:
@@ -474,30 +472,46 @@ def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
     return compose(composition_name(compose("type", effects).effects), effects)
 
 
-def with_sizes(
-    lot: Lot, campaigns: Sequence[Campaign], model: SensorModel, approach: Approach | None = None
-) -> list[Found]:
-    """Find the sizes of what the lot lacks, by calibrations with all of it.
+def calibrations(
+    lot: Lot, campaigns: Sequence[Campaign], approach: Approach | None = None
+) -> list[CampaignFit | InputError]:
+    """Calibrate each sensor with the model of the type, or say why that cannot be done.
 
     Parameters
     ----------
     lot : Lot
     campaigns : of its sensors, in the same order
-    model : SensorModel, of the diagnosis
-    approach : Approach, as in `sensor_evidence`
+    approach : Approach, as in `weigh_lot`
     """
-    values, sigmas = np.full((2, len(campaigns), lot.model.n_parameters), np.nan)
-    effects = lot.effects if lot.explained else ()
-    known = any(spec for _, spec in effects)
-    for i, campaign in enumerate(campaigns if known else ()):
-        with suppress(InputError):  # the campaign cannot show all of it
-            fit = fit_campaign(campaign, lot.model, approach or usual_approach(campaign))
-            values[i], sigmas[i] = fit.parameters, np.sqrt(np.diag(fit.covariance))
-    first, results = model.n_parameters, []
-    for found, spec in effects:
+    fits: list[CampaignFit | InputError] = []
+    for campaign in campaigns:
+        try:
+            fits.append(fit_campaign(campaign, lot.model, approach or usual_approach(campaign)))
+        except InputError as error:
+            fits.append(error)
+    return fits
+
+
+def with_sizes(
+    lot: Lot, fits: Sequence[CampaignFit | InputError], model: SensorModel
+) -> list[Found]:
+    """Find the sizes of what the lot lacks.
+
+    Parameters
+    ----------
+    lot : Lot
+    fits : of `calibrations`
+    model : SensorModel, of the diagnosis
+    """
+    values, sigmas = np.full((2, len(fits), lot.model.n_parameters), np.nan)
+    for i, fit in enumerate(fits):
+        if isinstance(fit, CampaignFit):
+            values[i], sigmas[i] = fit.parameters, fit.sigma
+    lacks, first, results = lot.each(), model.n_parameters, []
+    for found, spec in lot.effects:
         sizes = []
         if spec is not None:
-            rows = np.array([found.names[0] in names for _, names, _ in lot.each()])
+            rows = np.array([found.names[0] in names for _, names, _ in lacks])
             for j, p in enumerate(compose(spec, (spec,)).parameters, start=first):
                 of_type = random_effects(values[rows, j], sigmas[rows, j] ** 2)
                 sizes.append(Size(p.name, p.unit, *of_type, values[:, j], sigmas[:, j]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,13 @@ from matplotlib.figure import Figure
 
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggested
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import json_number, json_text
-from accelstudy.campaign.calibration.output import SUSPECT
+from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
     FULL,
@@ -33,6 +37,9 @@ from accelstudy.lots.lot import LEVEL, Found, Lot
 from accelstudy.pages import lines, write_page
 from accelstudy.sensors.models import MODEL_FILE
 from accelstudy.sensors.sensor import SensorModel
+
+EACH = "each"
+"""Folder of the calibrations of the sensors."""
 
 
 def said(lot: Lot, found: Sequence[Found]) -> list[str]:
@@ -58,8 +65,17 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
     )
 
 
-def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
-    """Describe a lot, in SI."""
+def lot_document(
+    lot: Lot, found: Sequence[Found], calibrated: Sequence[str | None]
+) -> dict[str, Any]:
+    """Describe a lot, in SI.
+
+    Parameters
+    ----------
+    lot : Lot
+    found : of `with_sizes`
+    calibrated : for each sensor, why it has no calibration; None if it has one
+    """
     return {
         "schema_version": 1,
         "sensors": len(lot.sensors),
@@ -92,8 +108,8 @@ def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
             for o in lot.odd
         ],
         "each": [
-            {"campaign": campaign, "names": list(names), "posterior": p}
-            for campaign, names, p in lot.each()
+            {"campaign": campaign, "names": list(names), "posterior": p, "failed": failed}
+            for (campaign, names, p), failed in zip(lot.each(), calibrated, strict=True)
         ],
         "verdict": " ".join(said(lot, found)),
     }  # fmt: skip
@@ -102,17 +118,19 @@ def lot_document(lot: Lot, found: Sequence[Found]) -> dict[str, Any]:
 def write_lot(
     lot: Lot,
     found: Sequence[Found],
+    fits: Sequence[CampaignFit | InputError],
     model: SensorModel,
     approach: Approach,
     folder: str | Path,
     place: str | Path = "",
 ) -> dict[str, Any]:
-    """Write lot.json, model.yaml, report.html and the figure into a folder.
+    """Write lot.json, model.yaml, report.html, the figure, and a calibration of each sensor.
 
     Parameters
     ----------
     lot : Lot
     found : of `with_sizes`
+    fits : of `calibrations`
     model : SensorModel, of the diagnosis
     approach : Approach, of the first campaign
     folder : path, to write to
@@ -123,7 +141,17 @@ def write_lot(
     dict
         The content of lot.json.
     """
-    folder, content = Path(folder), lot_document(lot, found)
+    folder = Path(folder)
+    failed = [str(fit) if isinstance(fit, InputError) else None for fit in fits]
+    content = lot_document(lot, found, failed)
+    for i, fit in enumerate(fits, start=1):
+        if isinstance(fit, CampaignFit):
+            name = re.sub(r"[^\w.-]+", "-", fit.campaign.name)
+            its_own = folder / EACH / f"{i:04d}-{name}"
+            its_own.mkdir(parents=True)
+            with whole_file(its_own / "calibration.json") as path:
+                text = json_text(calibration_content(fit, assess(fit)))
+                path.write_text(text, encoding="utf-8")
     whole, steps = lot.model, []
     if lot.explained and len(whole.effects) > len(model.effects):
         effects = [effect.spec for effect in whole.effects]

@@ -212,6 +212,12 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     page = (tmp_path / "lot/report.html").read_text(encoding="utf-8")
     assert_sound(page)
     assert "A lot of 9 sensors" in text_of(page)
+    each = sorted(path.name for path in (tmp_path / "lot/each").iterdir())
+    assert each == [f"{i + 1:04d}-sensor-{i}" for i in range(9)]
+    calibrated = json.loads(
+        (tmp_path / "lot/each/0001-sensor-0/calibration.json").read_text(encoding="utf-8")
+    )
+    assert "b_T_x" in {p["name"] for p in calibrated["parameters"]}
     model = tmp_path / "lot/model.yaml"
     said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
     assert "ACCEPTED" in said

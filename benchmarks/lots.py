@@ -1,0 +1,179 @@
+"""How well lots are judged: simulated lots of 20 sensors, each with a truth the judgement lacks.
+
+    python benchmarks/lots.py [LOTS] [SEED]       # 40 lots of each kind: half an hour of two cores
+
+Prints, for each kind, how often something is found, named rightly and named wrongly, how often
+intervals of shares hold them, how many sensors are judged rightly, and how often sensors are odd.
+Each lot has a design, an approach and an effect at random.
+"""
+
+import logging
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations
+from multiprocessing import Pool
+
+import numpy as np
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.shares import clopper_pearson
+from accelstudy.hidden.judging import all_true
+from accelstudy.hidden.physics import (
+    APPROACHES,
+    DESIGNS,
+    NOISES,
+    visible_effects,
+    visible_outside,
+    visible_unforeseen,
+)
+from accelstudy.hidden.physics.atlas import atlas
+from accelstudy.hidden.physics.lots import LotCase, generate_lot
+from accelstudy.lots.lot import weigh_lot
+from accelstudy.sensors.models import get_model
+from timing import table
+
+MODEL = "bias-scale-nonorthogonality"
+SENSORS = 20
+UNNAMED = "unknown"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A row of the table: what the lots lack, in which shares, and how large it is."""
+
+    title: str
+    choices: Callable[[str, str], list[tuple[str, ...]]] = lambda design, approach: [()]
+    shares: tuple[float, ...] = ()
+    lam: float = 0.0
+    named: bool = True
+    noise: bool = False
+
+
+def single(design, approach):
+    """Effects that a session shows."""
+    return [(name,) for name in visible_effects(design, approach)]
+
+
+@cache
+def pairs(design, approach):
+    """Two effects that a session shows and tells apart."""
+    seen = atlas(design, approach)
+    alike = {name: set() for name in seen.visible}
+    for shape in seen.shapes:
+        alike[shape.effect.name].update(seen.same_as(shape))
+    told = [(a, b) for a, b in combinations(seen.visible, 2) if b not in alike[a]]
+    return told + [(b, a) for a, b in told]
+
+
+def elsewhere(design, approach):
+    """Physics that is not in the catalogue."""
+    seen = (*visible_outside(design, approach), *visible_unforeseen(design, approach))
+    return [(name,) for name in seen]
+
+
+KINDS = (
+    Kind("nothing"),
+    Kind("the noise is wrong, in all", noise=True),
+    *(Kind("one effect, in all", single, (1.0,), lam) for lam in (6.0, 10.5, 16.0, 100.0)),
+    Kind("one effect, in half", single, (0.5,), 10.5),
+    Kind("two effects, in all and in a third", pairs, (1.0, 1 / 3), 16.0),
+    Kind("one sensor is odd", single, (0.0,), 60.0),
+    Kind("physics outside of the catalogue, in all", elsewhere, (1.0,), 60.0, named=False),
+)
+
+
+def lot_of(kind, seed):
+    """Campaigns and truths of a lot, and its case; drawn again where a design cannot show it."""
+    rng = np.random.default_rng(seed.spawn(1)[0])
+    while True:
+        design, approach = rng.choice(DESIGNS), rng.choice(APPROACHES)
+        choices = kind.choices(str(design), str(approach))
+        known = bool(rng.integers(2))
+        if not choices:
+            continue
+        effects = choices[rng.integers(len(choices))]
+        noise = str(rng.choice([*NOISES])) if kind.noise else None
+        case = LotCase(
+            kind.title, str(design), str(approach), known, effects, kind.shares, kind.lam, noise
+        )
+        try:
+            return case, list(generate_lot(case, SENSORS, seed.spawn(1)[0]))
+        except InputError:
+            continue
+
+
+def judged(job):
+    """Judge one lot: a row of answers, with None where a question does not arise."""
+    logging.disable()
+    number, i, seed = job
+    kind = KINDS[number]
+    case, made = lot_of(kind, np.random.SeedSequence([seed, number, i]))
+    truths = [truth for _, truth in made]
+    lot = weigh_lot([campaign for campaign, _ in made], get_model(MODEL))
+    classes = {}
+    for truth in truths if kind.named else ():
+        for effect, same in zip(truth.effects, truth.classes, strict=True):
+            classes.setdefault(effect.name, {effect.name}).update(same)
+    if case.noise is not None:
+        classes = {case.noise: {NOISES[case.noise]}}
+    told = [found for found, _ in lot.effects] if lot.explained else []
+    told = [found for found in told if not found.names[0].startswith(UNNAMED)]
+    right = {
+        name: found for name, same in classes.items() for found in told if same & {*found.names}
+    }
+    of_type = 0.0 not in kind.shares
+    has = {name: [any(e.name == name for e in t.effects) for t in truths] for name in classes}
+    odd = {int(one.campaign.split("-")[1]) - 1 for one in lot.odd}
+    carriers = set() if of_type else {k for k, t in enumerate(truths) if t.effects}
+    return {
+        "kind": number,
+        "missing": lot.missing,
+        "named": len(right) == len(classes) if classes and of_type else None,
+        "wrong": any(not all_true([f.names], [*classes.values()]) for f in told),
+        "shares": [f.share_ci95[0] <= np.mean(has[n]) <= f.share_ci95[1] for n, f in right.items()
+                   if kind.shares],
+        "sensors": [
+            bool({*names} & classes[case.effects[0]]) for _, names, _ in lot.each()
+        ] if kind.shares == (1.0,) and kind.named else [],
+        "odd": None if of_type else carriers <= odd,
+        "odd wrongly": bool(odd - carriers),
+    }  # fmt: skip
+
+
+def share(answers):
+    """Share of yes with its 95 % interval, as text."""
+    answers = [one for one in answers if one is not None]
+    if not answers:
+        return ""
+    count, n = sum(answers), len(answers)
+    low, high = clopper_pearson(count, n)
+    return f"{count / n:.2f} ({low:.2f} to {high:.2f})"
+
+
+def main(lots, seed):
+    """Print the table."""
+    jobs = [(number, i, seed) for i in range(lots) for number in range(len(KINDS))]
+    with Pool(2) as pool:
+        answers = pool.map(judged, jobs, chunksize=1)
+    rows = []
+    for number, kind in enumerate(KINDS):
+        of_kind = [one for one in answers if one["kind"] == number]
+        inside, sensors = ([x for one in of_kind for x in one[k]] for k in ("shares", "sensors"))
+        rows.append([
+            kind.title, f"{kind.lam:g}" if kind.lam else "", str(len(of_kind)),
+            *(share([one[k] for one in of_kind]) for k in ("missing", "named", "wrong")),
+            share(inside), f"{np.mean(sensors):.2f}" if sensors else "",
+            *(share([one[k] for one in of_kind]) for k in ("odd", "odd wrongly")),
+        ])  # fmt: skip
+    head = [
+        "what the lot lacks", "λ", "lots", "anything missing", "named rightly", "a wrong name",
+        "share inside", "sensors rightly", "odd found", "odd wrongly",
+    ]  # fmt: skip
+    print(table(head, *rows))
+
+
+if __name__ == "__main__":
+    given = [int(text) for text in sys.argv[1:]]
+    main(*given, *(40, 20261123)[len(given) :])
