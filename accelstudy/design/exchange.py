@@ -102,21 +102,20 @@ def exchange(candidates: Candidates, chosen: list[int], criterion: Criterion) ->
     normal = candidates.normal(chosen)
     value = float(criterion.value(normal))
     for _ in range(SWEEPS):
-        before = value
+        before, order = value, None  # the rank of the candidates, until a position is exchanged
         for i, old in enumerate(chosen):
             rest = normal - candidates.informations[old]
-            rank = flat @ criterion.gradient(normal).ravel()
-            tied = TIED * float(np.abs(rank).max())
-            rank[~candidates.allowed(chosen[:i] + chosen[i + 1 :])] = np.inf
-            tried = in_order(rank, tied)[:TRIED]
-            tried = tried[np.isfinite(rank[tried])]
+            if order is None:
+                rank = flat @ criterion.gradient(normal).ravel()
+                order = in_order(rank, TIED * float(np.abs(rank).max()))
+            tried = order[candidates.allowed(chosen[:i] + chosen[i + 1 :])[order]][:TRIED]
             if not len(tried):
                 continue
             values = criterion.value(rest + candidates.informations[tried])
             best = first_best(values)
             if values[best] < value - GAIN:
                 chosen[i], value = int(tried[best]), float(values[best])
-                normal = rest + candidates.informations[chosen[i]]
+                normal, order = rest + candidates.informations[chosen[i]], None
         normal = candidates.normal(chosen)  # computed anew, without the rounding of many exchanges
         if not value < before - GAIN:
             break

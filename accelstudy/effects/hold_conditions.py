@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,7 @@ class HoldConditions:
         return replace(self, step_x=step[:, 0], step_y=step[:, 1], step_z=step[:, 2], order=order)
 
     @classmethod
+    @cache
     def columns(cls) -> tuple[str, ...]:
         """Names of all columns."""
         return tuple(field.name for field in fields(cls) if field.name not in OF_ALL)

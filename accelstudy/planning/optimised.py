@@ -128,8 +128,9 @@ def cheapest(question: Question, good: Sequence[Candidate], confidence: float | 
         hopes.append((first.equipment.seconds(likely, hold), least, likely, sought))
     for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
         if sought.equipment.seconds(least, sought.hold) <= best.seconds:
-            fewest = sought.fewest(confidence, likely)
-            best = min(best, *filter(None, [fewest]), key=lambda c: (c.seconds, c.rms))
+            no_longer = replace(question, most_seconds=best.seconds)  # else it is not the cheapest
+            fewest = replace(sought, question=no_longer).fewest(confidence, likely)
+            best = min(filter(None, [best, fewest]), key=lambda c: (c.seconds, c.rms))
     return best
 
 

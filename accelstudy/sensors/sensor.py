@@ -232,6 +232,8 @@ class SensorModel:
         """
         angles = np.asarray(angles, dtype=float)
         errors = np.zeros_like(angles)
+        if self.trace.reading.is_zero:
+            return errors
         for _ in range(10):  # each iteration gains as many digits as a relative error has zeros
             before, errors = errors, self.errors_of_reading(angles + errors, parameters, hold)
             if np.array_equal(before, errors):
@@ -258,12 +260,18 @@ class SensorModel:
         output: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """Call a function of the trace, of vectors, components last: (..., n, 3) in and out."""
-        force = np.moveaxis(np.asarray(force, dtype=float), -1, 0)
-        output = force if output is None else np.moveaxis(np.asarray(output, dtype=float), -1, 0)
-        parameters = np.moveaxis(np.asarray(parameters, dtype=float), -1, 0)
+        force = _components(force)
+        output = force if output is None else _components(output)
+        parameters = _components(parameters)
         g = np.asarray(g, dtype=float)
         result = self.trace.evaluate(function, force, output, parameters, self.settings, g, hold)
-        return np.moveaxis(result[:, 0], 0, -1)
+        return result[:, 0].transpose(*range(1, result.ndim - 1), 0)
+
+
+def _components(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Turn the last axis into the first, as `np.moveaxis` does in many times the time."""
+    array = np.asarray(vectors, dtype=float)
+    return array.transpose(-1, *range(array.ndim - 1))
 
 
 def not_affine(model: SensorModel) -> tuple[str, ...]:

@@ -139,6 +139,11 @@ class TracedFunction:
         """Names of the arguments on which the result depends."""
         return frozenset(self._generated[2])
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether all entries are zero by structure."""
+        return not self._generated[1]
+
     def __call__(self, shape: tuple[int, ...], *arguments: Any) -> NDArray[np.float64]:
         """Evaluate at arrays that broadcast to `shape`; returns an array (rows, columns, *shape).
 
