@@ -9,10 +9,11 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from scipy import integrate
 
+from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.lots.evidence import DRAWS, SensorEvidence, lot_classes
-from accelstudy.lots.lot import LEVEL, Lot, random_effects
+from accelstudy.lots.lot import LEVEL, Lot
 from accelstudy.lots.mixture import MISSING, MORE, ODD, Mixture
 
 STANDARD_ERRORS = 3.3
