@@ -1,0 +1,82 @@
+"""The command that follows a sensor over its calibrations."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, stage
+from accelstudy.basics.wording import counted
+from accelstudy.commands.options import (
+    PATH,
+    angle_unit_option,
+    example,
+    force_option,
+    quiet_option,
+)
+
+
+@click.command(
+    "history",
+    epilog=example(
+        "accelstudy history spring/calibration.json autumn/calibration.json "
+        "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years"
+    ),
+)
+@click.argument(
+    "calibrations", type=PATH, nargs=-1, required=True, metavar="CALIBRATION..."
+)
+@click.option(
+    "--date",
+    "dates",
+    multiple=True,
+    help="Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.",
+)
+@click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@force_option
+@angle_unit_option
+@quiet_option
+def history_command(
+    calibrations: tuple[Path, ...], dates: tuple[str, ...], out: Path, force: bool
+) -> None:
+    """Say how a sensor changes over time.
+
+    CALIBRATION are three or more calibration.json files of one sensor. For each parameter there
+    is a rate with its interval, and the scatter from session to session, as by switching the
+    sensor off and on. All tests together have one level. If calibrations differ in their effects,
+    they are brought to those that all of them have.
+
+    The folder of results gets report.html, history.json, history.parquet and a figure.
+    """
+    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.epochs.history import history_of
+    from accelstudy.epochs.history_output import write_history
+    from accelstudy.files.outputs import HISTORY, result_folder
+
+    for i, path in enumerate(calibrations):
+        if path.resolve() in [other.resolve() for other in calibrations[:i]]:
+            raise InputError(f"{path}: is given twice; each calibration counts once")
+    if len(dates) != len(calibrations):
+        raise InputError(
+            f"--date: {counted(len(dates), 'date')} for "
+            f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
+            "--date 2026-03-01"
+        )
+    when = [_date(text) for text in dates]
+    with result_folder(out, HISTORY, calibrations, force) as folder, stage("history"):
+        history = history_of([read_calibration(path) for path in calibrations], when)
+        content = write_history(history, folder)
+    click.echo(f"{content['state'].upper()}: {content['verdict']}")
+    say(f"report: {out / 'report.html'}")
+
+
+def _date(text: str) -> datetime:
+    """Date, in UTC where it names a time zone."""
+    try:
+        date = datetime.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"--date: {text!r} is no date, such as 2026-03-01") from None
+    return date if date.tzinfo is None else date.astimezone(UTC).replace(tzinfo=None)

@@ -1,0 +1,168 @@
+"""What a history of calibrations writes: JSON, a table, a figure and a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.figure import Figure
+
+from accelstudy.basics.units import shown_unit, to_display
+from accelstudy.basics.wording import estimate
+from accelstudy.campaign.calibration.document import json_text
+from accelstudy.drawing.saving import save_all
+from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
+from accelstudy.epochs.congruence import LEVEL
+from accelstudy.epochs.history import History
+from accelstudy.epochs.output import STATES
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.parquet import write_frame
+from accelstudy.pages import lines, write_page
+
+COLUMNS = 3
+"""Panels side by side."""
+
+
+def history_said(history: History) -> list[str]:
+    """Say what drifts and what scatters; the verdict comes first."""
+    rates, scatters = [], []
+    for course, parameter, (drifts, scatter) in zip(
+        history.courses, history.parameters, history.found, strict=True
+    ):
+        unit = shown_unit(parameter.unit)
+        if drifts:
+            value, sigma = estimate(*course.rate, parameter.unit)
+            sign = "" if value.startswith("−") else "+"
+            rates.append(f"{parameter.name} by {sign}{value} ± {sigma} {unit}".strip())
+        if scatter:
+            size = estimate(course.line.scatter, course.line.scatter, parameter.unit)[1]
+            scatters.append(f"{parameter.name} by {size} {unit}".strip())
+    return lines("epochs/wording.txt.j2", "history", history, rates, scatters)
+
+
+def history_document(history: History) -> dict[str, Any]:
+    """Describe a history, in SI; rates are per year."""
+    h = history
+    return {
+        "schema_version": 1,
+        "sensor": next((c.content["sensor"] for c in h.calibrations if c.content["sensor"]), None),
+        "calibrations": [
+            {
+                "campaign": one.content["campaign"],
+                "date": date.isoformat(),
+                "left_out": h.common.missing_in(one),
+            }
+            for one, date in zip(h.calibrations, h.dates, strict=True)
+        ],
+        "effects": [effect.spec for effect in h.common.model.effects],
+        "state": STATES[not h.found.any()],
+        "level": LEVEL,
+        "parameters": [
+            {
+                "name": parameter.name,
+                "unit": parameter.unit,
+                "value": float(course.line.estimates[0]),
+                "sigma": float(np.sqrt(course.line.covariance[0, 0])),
+                "rate": {
+                    "per_year": course.rate[0],
+                    "sigma": course.rate[1],
+                    "ci95": course.rate_interval,
+                    "p_value": course.p_values[0],
+                    "found": bool(drifts),
+                    "detectable": course.detectable_rate(h.level),
+                },
+                "scatter": {
+                    "sd": course.line.scatter,
+                    "ci95": course.line.scatter_interval(),
+                    "p_value": course.p_values[1],
+                    "found": bool(scatters),
+                    "detectable": course.detectable_scatter(h.level),
+                },
+            }
+            for course, parameter, (drifts, scatters) in zip(
+                h.courses, h.parameters, h.found, strict=True
+            )
+        ],
+        "verdict": " ".join(history_said(h)),
+    }
+
+
+def history_table(history: History) -> pd.DataFrame:
+    """Return a row per calibration and parameter, in SI."""
+    sigmas = np.sqrt(np.diagonal(history.common.covariances, axis1=1, axis2=2))
+    return pd.DataFrame(
+        [
+            {
+                "calibration": number,
+                "campaign": one.content["campaign"],
+                "date": date.isoformat(),
+                "parameter": parameter.name,
+                "value": float(history.common.values[number - 1, k]),
+                "sigma": float(sigmas[number - 1, k]),
+                "unit": parameter.unit,
+            }
+            for number, (one, date) in enumerate(
+                zip(history.calibrations, history.dates, strict=True), start=1
+            )
+            for k, parameter in enumerate(history.parameters)
+        ]
+    )
+
+
+def write_history(history: History, folder: str | Path) -> dict[str, Any]:
+    """Write history.json, history.parquet, report.html and the figure; returns the content."""
+    folder, content = Path(folder), history_document(history)
+    drawn = save_all({"history": lambda: history_figure(history)}, folder / "figures")
+    sentences = history_said(history)
+    write_page(
+        folder / "report.html",
+        "epochs/history.html.j2",
+        " ".join(sentences),
+        doc=content,
+        lines=sentences,
+        figures=drawn,
+    )
+    write_frame(folder / "history.parquet", history_table(history))
+    with whole_file(folder / "history.json") as path:
+        path.write_text(json_text(content), encoding="utf-8")
+    return content
+
+
+def history_figure(history: History) -> Figure:
+    """Draw each parameter over time with 95 % intervals, and its line."""
+    h = history
+    rows = -(-len(h.parameters) // COLUMNS)
+    figure = new_figure(FULL, 12 + 36 * rows)
+    panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+    sigmas = np.sqrt(np.diagonal(h.common.covariances, axis1=1, axis2=2))
+    dates = np.array(h.dates, dtype="datetime64[us]")
+    for k, (ax, parameter, course) in enumerate(zip(panels, h.parameters, h.courses, strict=False)):
+        colour = group_colour(group_of(parameter.name))
+        line = course.line.design @ course.line.estimates
+        band = np.sqrt(
+            np.einsum("iu,uw,iw->i", course.line.design, course.line.covariance, course.line.design)
+        )
+        value, half = (
+            to_display(v, parameter.unit) for v in (h.common.values[:, k], 1.96 * sigmas[:, k])
+        )
+        low, middle, high = (
+            to_display(line + side * course.sigmas_95 * band, parameter.unit)
+            for side in (-1, 0, 1)
+        )
+        ax.fill_between(dates, low, high, color=colour, alpha=0.15, linewidth=0)
+        found = bool(h.found[k, 0])
+        ax.plot(dates, middle, "-" if found else ":", color=colour)
+        ax.errorbar(dates, value, half, fmt="o", color=INK, capsize=2, linewidth=0.8, markersize=3)
+        said = [word for word, is_so in zip(("drifts", "scatters"), h.found[k], strict=True) if is_so]
+        ax.set_title(" ".join([symbol(parameter.name), *([f"({' and '.join(said)})"] if said else [])]))
+        ax.set_ylabel(f"{shown_unit(parameter.unit)}")
+        locator = AutoDateLocator(minticks=2, maxticks=5)
+        ax.xaxis.set(major_locator=locator, major_formatter=ConciseDateFormatter(locator))
+        ax.tick_params(axis="x", labelbottom=k + COLUMNS >= len(h.parameters))
+    for ax in panels[len(h.parameters) :]:
+        ax.set_visible(False)
+    figure.suptitle("Calibrations and lines with 95 % intervals; dotted: no drift found")
+    return figure
