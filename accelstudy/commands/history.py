@@ -26,9 +26,7 @@ from accelstudy.commands.options import (
         "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years"
     ),
 )
-@click.argument(
-    "calibrations", type=PATH, nargs=-1, required=True, metavar="CALIBRATION..."
-)
+@click.argument("calibrations", type=PATH, nargs=-1, required=True, metavar="CALIBRATION...")
 @click.option(
     "--date",
     "dates",

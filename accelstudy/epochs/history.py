@@ -1,13 +1,17 @@
-"""A sensor over time: whether its parameters drift, and whether they scatter between sessions.
+"""A sensor over time: whether its parameters change, drift, and scatter between sessions.
 
 A parameter of session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the scatter of the sessions with
-the sd τ, as by switching off and on, and the noise of the calibration. The scatter is estimated by
-the squares about the line, so that the rate is a t variable with n − 2 degrees of freedom, whether
-or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22, 2693; exact where all
-sigmas are equal). The scatter is tested by the squares that noise alone leaves, χ² with stated
-noise. Where noise was estimated they follow Johansen (1980, Biometrika 67, 85).
+the sd τ, as by switching off and on, and the noise of the calibration.
 
-All tests have one level together, by the steps of Holm (1979, Scand. J. Statist. 6, 65).
+* It changes if its squares about the mean are more than noise leaves: χ² with stated noise. Where
+  noise was estimated they follow Johansen (1980, Biometrika 67, 85).
+* It scatters if its squares about the line are.
+* The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
+  about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
+  2693; exact where all sigmas are equal).
+
+Each of p parameters has the p-th part of the level. What changes is tested further for rate and for
+scatter: one of the two is not zero then, so that the other may take the same part.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common
-from accelstudy.epochs.congruence import LEVEL, POWER
+from accelstudy.epochs.congruence import LEVEL, POWER, noncentrality, tail
 
 Array = NDArray[np.float64]
 
@@ -34,8 +38,6 @@ YEAR = 365.25 * 86400.0
 """s"""
 FEWEST = 3
 """Calibrations of which a line leaves a degree of freedom."""
-QUANTILES = (np.arange(200) + 0.5) / 200
-"""Probabilities over which a power is averaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +46,26 @@ class Course:
 
     Attributes
     ----------
-    line : RandomEffects, about the value at the last date and the rate, per year
-    dof : (n,) array, degrees of freedom of the sigmas; inf if the noise was stated
+    years : (n,) array, time
+    values, variances : (n,) arrays, of the calibrations
+    dof : (n,) array, degrees of freedom of the variances; inf if the noise was stated
     """
 
-    line: RandomEffects
+    years: Array
+    values: Array
+    variances: Array
     dof: Array
+
+    @cached_property
+    def line(self) -> RandomEffects:
+        """Value at the time 0, and rate per year."""
+        design = np.column_stack([np.ones_like(self.years), self.years])
+        return RandomEffects(self.values, self.variances, design)
+
+    @cached_property
+    def mean(self) -> RandomEffects:
+        """The same without a rate."""
+        return RandomEffects(self.values, self.variances, np.ones((len(self.years), 1)))
 
     @property
     def rate(self) -> tuple[float, float]:
@@ -68,68 +84,59 @@ class Course:
         return rate - half * sigma, rate + half * sigma
 
     @property
-    def p_values(self) -> tuple[float, float]:
-        """Of the rate and of the scatter, each if it is zero."""
+    def p_values(self) -> tuple[float, float, float]:
+        """Whether nothing changes, nothing drifts, and nothing scatters."""
         rate, sigma = self.rate
-        factor, other = self._of_squares
-        return (
-            2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof)),
-            _tail(self.line.squares(0.0) / factor, self.line.dof, other),
-        )
+        drifts = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
+        return self._exceeds(self.mean), drifts, self._exceeds(self.line)
+
+    def found(self, level: float) -> tuple[str, ...]:
+        """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""
+        change, drift, scatter = (p <= level for p in self.p_values)
+        if not change:
+            return ()
+        named = {"drifts": drift, "scatters": scatter}
+        return tuple(word for word, is_so in named.items() if is_so) or ("changed",)
 
     def detectable_rate(self, level: float) -> float:
-        """Rate that a test at some level finds with a probability of `POWER`, with this scatter."""
-        dof, sigma = self.line.dof, self.rate[1]
-        limit = stats.t.isf(level / 2, dof)
-        # Sigmas never are smaller than by the noise alone.
-        least = np.sqrt(self.line.covariance_with(0.0)[1, 1]) / sigma
-        bounds = limit * np.maximum(least, np.sqrt(stats.chi2.ppf(QUANTILES, dof) / dof))
-
-        def missed(size: float) -> float:
-            found = stats.norm.sf(bounds - size) + stats.norm.cdf(-bounds - size)
-            return float(np.mean(found)) - POWER
-
-        return sigma * float(optimize.brentq(missed, 0.0, 10 * bounds[-1] + 10))
+        """Rate that by itself is found to be a change with a probability of `POWER`."""
+        _, other = self._of_squares(self.mean)
+        # Squares about the mean that a rate of 1 adds.
+        each = RandomEffects(self.years, self.variances, self.mean.design).squares(0.0)
+        return float(np.sqrt(noncentrality(self.mean.dof, other, level) / each))
 
     def detectable_scatter(self, level: float) -> float:
-        """Scatter that a test at some level finds with a probability of `POWER`.
+        """Scatter that by itself is found to be a change with a probability of `POWER`.
 
         Squares are taken as a scaled χ² variable of the same mean and variance.
         """
-        n, (factor, other) = len(self.line.values), self._of_squares
-        limit = factor * _limit(level, self.line.dof, other)
-        root = np.sqrt(self.line.variances)
-        apart = (np.eye(n) - self.line.design @ self.line.combination(0.0)) * root / root[:, None]
-        sizes = np.linalg.eigvalsh((apart / self.line.variances) @ apart.T)[-self.line.dof :]
+        factor, other = self._of_squares(self.mean)
+        f, root, design = self.mean.dof, np.sqrt(self.variances), self.mean.design
+        limit = factor * (stats.chi2.isf(level, f) / f if np.isinf(other)
+                          else stats.f.isf(level, f, other))  # fmt: skip
+        apart = (np.eye(f + 1) - design @ self.mean.combination(0.0)) * root / root[:, None]
+        sizes = np.linalg.eigvalsh((apart / self.variances) @ apart.T)[1:] * self.variances.min()
 
         def missed(ratio: float) -> float:
-            each = 1 + ratio**2 * sizes * self.line.variances.min()
+            each = 1 + ratio**2 * sizes
             scale = np.sum(each**2) / np.sum(each)
             return float(stats.chi2.sf(limit / scale, np.sum(each) / scale)) - POWER
 
         most = 1.0
         while missed(most) < 0:
             most *= 2
-        return float(np.sqrt(self.line.variances.min()) * optimize.brentq(missed, 0.0, most))
+        return float(root.min() * optimize.brentq(missed, 0.0, most))
 
-    @cached_property
-    def _of_squares(self) -> tuple[float, float]:
-        """Factor c and second degrees of freedom: squares of noise alone are c F(n − 2, ν)."""
-        leverage = np.einsum("iu,ui->i", self.line.design, self.line.combination(0.0))
-        a, f = float(np.sum((1 - leverage) ** 2 / self.dof)), self.line.dof
+    def _exceeds(self, fit: RandomEffects) -> float:
+        """Probability that noise alone leaves such squares."""
+        factor, other = self._of_squares(fit)
+        return tail(fit.squares(0.0) / factor, fit.dof, other)
+
+    def _of_squares(self, fit: RandomEffects) -> tuple[float, float]:
+        """Factor c and second degrees of freedom ν: squares of noise alone are c F(f, ν)."""
+        leverage = np.einsum("iu,ui->i", fit.design, fit.combination(0.0))
+        a, f = float(np.sum((1 - leverage) ** 2 / self.dof)), fit.dof
         return f + 2 * a - 6 * a / (f + 2), (f * (f + 2) / (3 * a) if a else np.inf)
-
-
-def _tail(statistic: float, dof: int, other: float) -> float:
-    if np.isinf(other):
-        return float(stats.chi2.sf(dof * statistic, dof))
-    return float(stats.f.sf(statistic, dof, other))
-
-
-def _limit(level: float, dof: int, other: float) -> float:
-    if np.isinf(other):
-        return float(stats.chi2.isf(level, dof)) / dof
-    return float(stats.f.isf(level, dof, other))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,32 +167,21 @@ class History:
     @cached_property
     def courses(self) -> tuple[Course, ...]:
         """Each parameter over time."""
-        design = np.column_stack([np.ones_like(self.years), self.years])
         variances = np.diagonal(self.common.covariances, axis1=1, axis2=2)
         return tuple(
-            Course(RandomEffects(values, variance, design), self.common.dof)
+            Course(self.years, values, variance, self.common.dof)
             for values, variance in zip(self.common.values.T, variances.T, strict=True)
         )
 
     @property
     def level(self) -> float:
-        """Level of the first of all tests; it is that of each test which states its power."""
-        return LEVEL / (2 * len(self.parameters))
+        """Level of the tests of one parameter."""
+        return LEVEL / len(self.parameters)
 
     @cached_property
-    def found(self) -> NDArray[np.bool_]:
-        """Whether each parameter drifts, and whether it scatters, (p, 2), at one level for all."""
-        return holm(np.array([course.p_values for course in self.courses]))
-
-
-def holm(p_values: Array) -> NDArray[np.bool_]:
-    """Which of some hypotheses are rejected, at one level for all."""
-    flat = p_values.ravel()
-    order = np.argsort(flat, kind="stable")
-    passed = flat[order] <= LEVEL / np.arange(len(flat), 0, -1)
-    rejected = np.zeros(len(flat), dtype=bool)
-    rejected[order] = np.logical_and.accumulate(passed)
-    return rejected.reshape(p_values.shape)
+    def found(self) -> tuple[tuple[str, ...], ...]:
+        """What each parameter does, in words, at one level for all."""
+        return tuple(course.found(self.level) for course in self.courses)
 
 
 def history_of(calibrations: Sequence[Calibration], dates: Sequence[datetime]) -> History:
@@ -208,6 +204,4 @@ def history_of(calibrations: Sequence[Calibration], dates: Sequence[datetime]) -
     ordered = Common(
         common.model, common.values[order], common.covariances[order], common.dof[order]
     )
-    return History(
-        tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered
-    )
+    return History(tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered)

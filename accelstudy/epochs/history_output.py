@@ -16,31 +16,39 @@ from accelstudy.campaign.calibration.document import json_text
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.epochs.congruence import LEVEL
-from accelstudy.epochs.history import History
-from accelstudy.epochs.output import STATES
+from accelstudy.epochs.history import YEAR, History
+from accelstudy.epochs.output import STATES, largest
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines, write_page
 
 COLUMNS = 3
 """Panels side by side."""
+GRID = 50
+"""Points of a line."""
 
 
 def history_said(history: History) -> list[str]:
     """Say what drifts and what scatters; the verdict comes first."""
-    rates, scatters = [], []
-    for course, parameter, (drifts, scatter) in zip(
+    rates, scatters, others = [], [], []
+    for course, parameter, found in zip(
         history.courses, history.parameters, history.found, strict=True
     ):
         unit = shown_unit(parameter.unit)
-        if drifts:
+        if "drifts" in found:
             value, sigma = estimate(*course.rate, parameter.unit)
             sign = "" if value.startswith("−") else "+"
             rates.append(f"{parameter.name} by {sign}{value} ± {sigma} {unit}".strip())
-        if scatter:
+        if "scatters" in found:
             size = estimate(course.line.scatter, course.line.scatter, parameter.unit)[1]
             scatters.append(f"{parameter.name} by {size} {unit}".strip())
-    return lines("epochs/wording.txt.j2", "history", history, rates, scatters)
+        if "changed" in found:
+            others.append(parameter.name)
+    least = [
+        largest(history.parameters, [c.detectable_rate(history.level) for c in history.courses]),
+        largest(history.parameters, [c.detectable_scatter(history.level) for c in history.courses]),
+    ]
+    return lines("epochs/wording.txt.j2", "history", history, rates, scatters, others, least)
 
 
 def history_document(history: History) -> dict[str, Any]:
@@ -58,7 +66,7 @@ def history_document(history: History) -> dict[str, Any]:
             for one, date in zip(h.calibrations, h.dates, strict=True)
         ],
         "effects": [effect.spec for effect in h.common.model.effects],
-        "state": STATES[not h.found.any()],
+        "state": STATES[not any(h.found)],
         "level": LEVEL,
         "parameters": [
             {
@@ -66,25 +74,23 @@ def history_document(history: History) -> dict[str, Any]:
                 "unit": parameter.unit,
                 "value": float(course.line.estimates[0]),
                 "sigma": float(np.sqrt(course.line.covariance[0, 0])),
+                "found": found,
+                "p_value": course.p_values[0],
                 "rate": {
                     "per_year": course.rate[0],
                     "sigma": course.rate[1],
                     "ci95": course.rate_interval,
-                    "p_value": course.p_values[0],
-                    "found": bool(drifts),
+                    "p_value": course.p_values[1],
                     "detectable": course.detectable_rate(h.level),
                 },
                 "scatter": {
                     "sd": course.line.scatter,
                     "ci95": course.line.scatter_interval(),
-                    "p_value": course.p_values[1],
-                    "found": bool(scatters),
+                    "p_value": course.p_values[2],
                     "detectable": course.detectable_scatter(h.level),
                 },
             }
-            for course, parameter, (drifts, scatters) in zip(
-                h.courses, h.parameters, h.found, strict=True
-            )
+            for course, parameter, found in zip(h.courses, h.parameters, h.found, strict=True)
         ],
         "verdict": " ".join(history_said(h)),
     }
@@ -139,26 +145,24 @@ def history_figure(history: History) -> Figure:
     panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
     sigmas = np.sqrt(np.diagonal(h.common.covariances, axis1=1, axis2=2))
     dates = np.array(h.dates, dtype="datetime64[us]")
+    years = np.linspace(h.years[0], 0.0, GRID)
+    design = np.column_stack([np.ones(GRID), years])
+    between = dates[-1] + (years * YEAR * 1e6).astype("timedelta64[us]")
     for k, (ax, parameter, course) in enumerate(zip(panels, h.parameters, h.courses, strict=False)):
-        colour = group_colour(group_of(parameter.name))
-        line = course.line.design @ course.line.estimates
-        band = np.sqrt(
-            np.einsum("iu,uw,iw->i", course.line.design, course.line.covariance, course.line.design)
-        )
-        value, half = (
-            to_display(v, parameter.unit) for v in (h.common.values[:, k], 1.96 * sigmas[:, k])
-        )
-        low, middle, high = (
-            to_display(line + side * course.sigmas_95 * band, parameter.unit)
-            for side in (-1, 0, 1)
-        )
-        ax.fill_between(dates, low, high, color=colour, alpha=0.15, linewidth=0)
-        found = bool(h.found[k, 0])
-        ax.plot(dates, middle, "-" if found else ":", color=colour)
-        ax.errorbar(dates, value, half, fmt="o", color=INK, capsize=2, linewidth=0.8, markersize=3)
-        said = [word for word, is_so in zip(("drifts", "scatters"), h.found[k], strict=True) if is_so]
-        ax.set_title(" ".join([symbol(parameter.name), *([f"({' and '.join(said)})"] if said else [])]))
-        ax.set_ylabel(f"{shown_unit(parameter.unit)}")
+        colour, unit = group_colour(group_of(parameter.name)), parameter.unit
+        values, halves = (to_display(v[:, k], unit) for v in (h.common.values, 1.96 * sigmas))
+        ax.errorbar(dates, values, halves, fmt="o", color=INK, capsize=2, linewidth=0.8, ms=3)
+        seen = ax.get_ylim()
+        line = to_display(design @ course.line.estimates, unit)
+        variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
+        half = to_display(course.sigmas_95 * np.sqrt(variance), unit)
+        ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
+        ax.plot(between, line, "-" if "drifts" in h.found[k] else ":", color=colour)
+        # The band of a few calibrations would dwarf them.
+        ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
+        said = f" ({' and '.join(h.found[k])})" if h.found[k] else ""
+        ax.set_title(symbol(parameter.name) + said)
+        ax.set_ylabel(shown_unit(unit))
         locator = AutoDateLocator(minticks=2, maxticks=5)
         ax.xaxis.set(major_locator=locator, major_formatter=ConciseDateFormatter(locator))
         ax.tick_params(axis="x", labelbottom=k + COLUMNS >= len(h.parameters))
