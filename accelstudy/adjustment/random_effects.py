@@ -73,13 +73,6 @@ class RandomEffects:
         low, high = (self._scatter_of(stats.chi2.isf(p, self.dof)) for p in (beyond, 1 - beyond))
         return low, high
 
-    def profile(self, sizes: int, beyond: float) -> tuple[Array, Array]:
-        """Scatters from 0 to `beyond` times what is seen, and the squares with each of them."""
-        most = beyond * (float(np.ptp(self.values)) + float(np.sqrt(self.variances.max())))
-        least = 0.1 * float(np.sqrt(self.variances.min()))
-        scatters = np.concatenate([[0.0], np.geomspace(least, most, sizes - 1)])
-        return scatters, np.array([self.squares(scatter) for scatter in scatters])
-
     def _scatter_of(self, squares: float) -> float:
         """Scatter with which the weighted squares are as many as given."""
         if self.squares(0.0) <= squares:

@@ -1,11 +1,10 @@
 """The calibration interval: how long the last calibration of a sensor stays good enough.
 
 A time t after it, the error of the last calibration n is δ(t) = eₙ + sₙ − s − r t, with its noise,
-the scatter of its session, that of the session in use, and the drift since. What the calibrations
-say of r and of the scatter τ is drawn by generalised inference (Iyer, Wang & Mathew 2004, J. Am.
-Stat. Assoc. 99, 1060): the squares about the line are those of a drawn χ² variable, which gives τ;
-a drawn noise and scatter of all sessions is taken from the estimated rate, which gives r, and leave
-that of the last session in δ.
+the scatter of its session, that of the session in use, and the drift since. The true rate r is the
+estimated one less what noise and scatter of all sessions put into it; both are drawn. The scatter
+is estimated itself: the mean square of the tilt error has the degrees of freedom of Satterthwaite
+(1946, Biometrics Bulletin 2, 110), of which a χ² variable is drawn.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import optimize
 
 from accelstudy.epochs.common import session_like
 from accelstudy.epochs.history import History
@@ -27,10 +26,6 @@ DRAWS = 4000
 SEED = 1
 LONGEST = 10.0
 """Years beyond which nothing is promised."""
-SIZES = 80
-"""Scatters between which the squares about a line are interpolated."""
-BEYOND = 1e3
-"""Largest scatter, in parts of what is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +72,7 @@ class Interval:
         g, forces = last.gravity, cap_forces(self.tilt_range, ATTITUDES, last.gravity)
         hold, values = session_like(last, -forces / g).hold, last.parameters
         form = tilt_error(last.model, values, last.model, values, forces, g, hold).quadratic
-        at_once, per_year = self._drawn()
+        at_once, per_year = self._drawn(np.einsum("auu->u", form))
         first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
         return (
             np.einsum("kaw,kw->ka", first, at_once),
@@ -85,37 +80,37 @@ class Interval:
             np.einsum("kaw,kw->ka", second, per_year),
         )
 
-    def _drawn(self) -> tuple[Array, Array]:
-        """Error of the last calibration at once, and its growth per year, (DRAWS, u) each."""
+    def _drawn(self, weights: Array) -> tuple[Array, Array]:
+        """Error of the last calibration at once, and its growth per year, (DRAWS, u) each.
+
+        Parameters
+        ----------
+        weights : (u,) array, squared tilt error by a parameter that is wrong by 1
+        """
         history, rng = self.history, np.random.default_rng(SEED)
         common, last = history.common, history.calibrations[-1]
-        n = len(history.years)
-        noise = [_normal(rng, c, dof) for c, dof in zip(common.covariances, common.dof, strict=True)]
-        at_once = _normal(rng, last.covariance, common.dof[-1])
+        noise = [_normal(rng, c) for c in common.covariances]
+        at_once, drift = _normal(rng, last.covariance), np.zeros(len(weights))
+        per_year = np.zeros_like(at_once)
         names = last.model.parameter_names
         places = [names.index(name) for name in common.model.parameter_names]
         noise[-1] = at_once[:, places]
-        per_year = np.zeros_like(at_once)
         for k, (place, course) in enumerate(zip(places, history.courses, strict=True)):
-            scatters, squares = course.line.profile(SIZES, BEYOND)
-            drawn = np.log(rng.chisquare(course.line.dof, DRAWS))
-            scatter = np.interp(-drawn, -np.log(squares), scatters)
-            sessions = scatter[:, None] * rng.standard_normal((DRAWS, n + 1))
-            errors = np.stack([each[:, k] for each in noise], axis=1) + sessions[:, :n]
-            rates = np.array([course.line.combination(size)[1] for size in scatters])
-            of_draw = np.stack([np.interp(scatter, scatters, each) for each in rates.T], axis=1)
-            per_year[:, place] = -np.einsum("ki,ki->k", of_draw, course.values - errors)
-            at_once[:, place] += sessions[:, n - 1] - sessions[:, n]
-        return at_once, per_year
+            scatter = course.line.scatter
+            sessions = scatter * rng.standard_normal((len(noise) + 1, DRAWS))
+            errors = np.array([each[:, k] for each in noise]) + sessions[:-1]
+            per_year[:, place] = course.line.combination(scatter)[1] @ errors
+            drift[place] = course.rate[0]
+            at_once[:, place] += sessions[-2] - sessions[-1]
+        parts = weights * np.mean(at_once**2, axis=0)
+        dof = history.courses[0].line.dof * np.sum(parts) ** 2 / np.sum(parts**2)
+        factor = np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]
+        return factor * at_once, factor * per_year - drift
 
 
-def _normal(rng: np.random.Generator, covariance: Array, dof: float) -> Array:
-    """Draws (DRAWS, u) of errors of a covariance matrix that was estimated or stated."""
+def _normal(rng: np.random.Generator, covariance: Array) -> Array:
+    """Draws (DRAWS, u) of errors of a covariance matrix."""
     size = np.sqrt(np.diag(covariance))
-    size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    normal = rng.standard_normal((DRAWS, len(size))) @ root.T
-    if np.isfinite(dof):
-        normal *= np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]
-    return np.asarray(normal)
+    return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root.T)
