@@ -52,7 +52,8 @@ class RandomEffects:
 
     def covariance_with(self, scatter: float) -> Array:
         """Covariance matrix of the parameters, (u, u), with a given scatter."""
-        return np.linalg.inv((self.design.T / (self.variances + scatter**2)) @ self.design)
+        normal = (self.design.T / (self.variances + scatter**2)) @ self.design
+        return np.asarray(np.linalg.inv(normal))
 
     def combination(self, scatter: float) -> Array:
         """Matrix (u, n) by which values become parameters, with a given scatter."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,11 +13,13 @@ from accelstudy.basics.progress import say, stage
 from accelstudy.basics.wording import counted
 from accelstudy.commands.options import (
     PATH,
+    Quantity,
     angle_unit_option,
     example,
     force_option,
     quiet_option,
 )
+from accelstudy.commands.plan import Confidence
 
 
 @click.command(
@@ -34,11 +37,36 @@ from accelstudy.commands.options import (
     help="Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.",
 )
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
+@click.option(
+    "--tilt-accuracy",
+    type=Quantity("rad", 1e-9, math.pi / 2),
+    help="Ask how long the last calibration stays this accurate in roll and pitch, as 10mgon.",
+)
+@click.option(
+    "--tilt-range",
+    type=Quantity("rad", 1e-3, math.pi / 2),
+    default="50gon",
+    show_default=True,
+    help="Largest tilt at which the accuracy is wanted.",
+)
+@click.option(
+    "--confidence",
+    type=Confidence(),
+    default="95%",
+    show_default=True,
+    help="Probability with which it stays so.",
+)
 @force_option
 @angle_unit_option
 @quiet_option
 def history_command(
-    calibrations: tuple[Path, ...], dates: tuple[str, ...], out: Path, force: bool
+    calibrations: tuple[Path, ...],
+    dates: tuple[str, ...],
+    out: Path,
+    tilt_accuracy: float | None,
+    tilt_range: float,
+    confidence: float | None,
+    force: bool,
 ) -> None:
     """Say how a sensor changes over time.
 
@@ -47,11 +75,15 @@ def history_command(
     sensor off and on. All tests together have one level. If calibrations differ in their effects,
     they are brought to those that all of them have.
 
+    With --tilt-accuracy it says how long the last calibration is good enough, and what a new one
+    would gain.
+
     The folder of results gets report.html, history.json, history.parquet and a figure.
     """
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.epochs.history import history_of
     from accelstudy.epochs.history_output import write_history
+    from accelstudy.epochs.interval import Interval
     from accelstudy.files.outputs import HISTORY, result_folder
 
     for i, path in enumerate(calibrations):
@@ -63,10 +95,15 @@ def history_command(
             f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
             "--date 2026-03-01"
         )
+    if confidence is None:
+        raise InputError("--confidence: a probability, such as 95%, not rms")
     when = [_date(text) for text in dates]
     with result_folder(out, HISTORY, calibrations, force) as folder, stage("history"):
         history = history_of([read_calibration(path) for path in calibrations], when)
-        content = write_history(history, folder)
+        interval = None
+        if tilt_accuracy is not None:
+            interval = Interval(history, tilt_accuracy, tilt_range, confidence)
+        content = write_history(history, folder, interval)
     click.echo(f"{content['state'].upper()}: {content['verdict']}")
     say(f"report: {out / 'report.html'}")
 
@@ -77,4 +114,6 @@ def _date(text: str) -> datetime:
         date = datetime.fromisoformat(text)
     except ValueError:
         raise InputError(f"--date: {text!r} is no date, such as 2026-03-01") from None
+    if not 1900 <= date.year < 2200:
+        raise InputError(f"--date: {text}: the year must be from 1900 to 2199")
     return date if date.tzinfo is None else date.astimezone(UTC).replace(tzinfo=None)

@@ -10,13 +10,14 @@ import pandas as pd
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from accelstudy.basics.units import shown_unit, to_display
+from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.drawing.saving import save_all
-from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
+from accelstudy.drawing.style import COLUMN, FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.history import YEAR, History
+from accelstudy.epochs.interval import LONGEST, SHOWN, Interval
 from accelstudy.epochs.output import STATES, largest
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
@@ -24,11 +25,13 @@ from accelstudy.pages import lines, write_page
 
 COLUMNS = 3
 """Panels side by side."""
+WRONG = "#C2247A"
+"""Colour of what must not be exceeded."""
 GRID = 50
 """Points of a line."""
 
 
-def history_said(history: History) -> list[str]:
+def history_said(history: History, interval: Interval | None = None) -> list[str]:
     """Say what drifts and what scatters; the verdict comes first."""
     rates, scatters, others = [], [], []
     for course, parameter, found in zip(
@@ -48,11 +51,13 @@ def history_said(history: History) -> list[str]:
         largest(history.parameters, [c.detectable_rate(history.level) for c in history.courses]),
         largest(history.parameters, [c.detectable_scatter(history.level) for c in history.courses]),
     ]
-    return lines("epochs/wording.txt.j2", "history", history, rates, scatters, others, least)
+    return lines(
+        "epochs/wording.txt.j2", "history", history, rates, scatters, others, least, interval
+    )
 
 
-def history_document(history: History) -> dict[str, Any]:
-    """Describe a history, in SI; rates are per year."""
+def history_document(history: History, interval: Interval | None = None) -> dict[str, Any]:
+    """Describe a history, in SI but for keys that name another unit; rates are per year."""
     h = history
     return {
         "schema_version": 1,
@@ -92,7 +97,20 @@ def history_document(history: History) -> dict[str, Any]:
             }
             for course, parameter, found in zip(h.courses, h.parameters, h.found, strict=True)
         ],
-        "verdict": " ".join(history_said(h)),
+        "interval": None if interval is None else _interval(interval),
+        "verdict": " ".join(history_said(h, interval)),
+    }
+
+
+def _interval(interval: Interval) -> dict[str, Any]:
+    """Describe how long the last calibration stays good enough."""
+    return {
+        "years": interval.years,
+        "until": interval.until.date().isoformat(),
+        "accuracy_mgon": interval.accuracy / MGON,
+        "max_tilt_gon": interval.tilt_range / GON,
+        "confidence": interval.confidence,
+        "errors": [{"years": years, "mgon": interval.error(years) / MGON} for years in SHOWN],
     }
 
 
@@ -118,11 +136,16 @@ def history_table(history: History) -> pd.DataFrame:
     )
 
 
-def write_history(history: History, folder: str | Path) -> dict[str, Any]:
+def write_history(
+    history: History, folder: str | Path, interval: Interval | None = None
+) -> dict[str, Any]:
     """Write history.json, history.parquet, report.html and the figure; returns the content."""
-    folder, content = Path(folder), history_document(history)
-    drawn = save_all({"history": lambda: history_figure(history)}, folder / "figures")
-    sentences = history_said(history)
+    folder, content = Path(folder), history_document(history, interval)
+    figures = {"history": lambda: history_figure(history)}
+    if interval is not None:
+        figures["interval"] = lambda: interval_figure(interval)
+    drawn = save_all(figures, folder / "figures")
+    sentences = history_said(history, interval)
     write_page(
         folder / "report.html",
         "epochs/history.html.j2",
@@ -163,10 +186,36 @@ def history_figure(history: History) -> Figure:
         said = f" ({' and '.join(h.found[k])})" if h.found[k] else ""
         ax.set_title(symbol(parameter.name) + said)
         ax.set_ylabel(shown_unit(unit))
-        locator = AutoDateLocator(minticks=2, maxticks=5)
-        ax.xaxis.set(major_locator=locator, major_formatter=ConciseDateFormatter(locator))
+        locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
+        formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+        ax.xaxis.set(major_locator=locator, major_formatter=formatter)
         ax.tick_params(axis="x", labelbottom=k + COLUMNS >= len(h.parameters))
     for ax in panels[len(h.parameters) :]:
         ax.set_visible(False)
     figure.suptitle("Calibrations and lines with 95 % intervals; dotted: no drift found")
+    return figure
+
+
+def interval_figure(interval: Interval) -> Figure:
+    """Draw the tilt error that is not exceeded, over the time since the last calibration."""
+    figure = new_figure(COLUMN, 55)
+    ax = figure.subplots()
+    last = min(LONGEST, max(1.0, 1.5 * interval.years))
+    years = np.linspace(0.0, last, GRID)
+    error = to_display([interval.error(t) for t in years], "rad")
+    ax.plot(years, error, color=INK)
+    ax.axhline(float(error[0]), color=INK, linewidth=0.8, linestyle=":")
+    ax.annotate("a new calibration", (last, float(error[0])), (0, 2), textcoords="offset points",
+                ha="right", fontsize=7)  # fmt: skip
+    accuracy = float(to_display(interval.accuracy, "rad"))
+    ax.axhline(accuracy, color=WRONG, linewidth=0.8)
+    ax.annotate("accuracy", (0, accuracy), (2, 2), textcoords="offset points", fontsize=7,
+                color=WRONG)  # fmt: skip
+    ax.set(
+        xlabel="years since the last calibration",
+        ylabel=f"tilt error / {shown_unit('rad')}",
+        xlim=(0, last),
+        ylim=(0, 1.1 * max(float(error.max()), accuracy)),
+    )
+    ax.set_title(f"Not exceeded with {100 * interval.confidence:g} %")
     return figure

@@ -10,6 +10,7 @@ is estimated itself: the mean square of the tilt error has the degrees of freedo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from accelstudy.epochs.common import session_like
-from accelstudy.epochs.history import History
+from accelstudy.epochs.history import YEAR, History
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ DRAWS = 4000
 SEED = 1
 LONGEST = 10.0
 """Years beyond which nothing is promised."""
+SHOWN = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
+"""Years at which errors are told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,11 @@ class Interval:
         a, b, c = self._squares
         larger = np.max(a + b * years + c * years**2, axis=1)
         return float(np.sqrt(np.quantile(np.maximum(larger, 0.0), self.confidence)))
+
+    @property
+    def until(self) -> datetime:
+        """Date until which it stays good enough."""
+        return self.history.dates[-1] + timedelta(seconds=self.years * YEAR)
 
     @cached_property
     def years(self) -> float:

@@ -10,10 +10,10 @@ from session_helpers import document
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.epochs.history import YEAR, history_of
-from accelstudy.epochs.interval import Interval
+from accelstudy.epochs.interval import LONGEST, Interval
 
 G = 9.80665
-N = 200
+N = 80
 CONFIDENCE = 0.9
 AT = np.array([-2.5, -2.0, -1.4, -0.9, -0.5, 0.0])
 """Years of the sessions."""
@@ -47,24 +47,43 @@ def error_in_use(truth, calibrated, directions):
     return np.sqrt(np.mean(apart**2, axis=1)).max()
 
 
-@pytest.mark.parametrize(("scatter", "drift"), [(0.0, 0.0), (3.0, 0.0), (10.0, 20.0), (0.0, 9.0)])
-def test_the_promise_is_kept(session, scatter, drift):
+@pytest.mark.parametrize(("sessions", "scatter", "drift"), [
+    (6, np.zeros(6), 0.0), (6, np.full(6, 3.0), 0.0), (6, np.full(6, 10.0), 20.0),
+    (6, np.zeros(6), 9.0), (4, np.array([10.0, 0, 0, 0, 0, 0]), 0.0), (3, np.full(6, 3.0), 9.0),
+])  # fmt: skip
+def test_the_promise_is_kept(session, sessions, scatter, drift):
     """Parameters scatter, and drift in a year, by some of their sigmas, each on its own."""
-    rng = np.random.default_rng(round(scatter + drift))
-    sigma = np.sqrt(np.diag(session.covariance))
+    rng = np.random.default_rng(7)
+    sigma, at = np.sqrt(np.diag(session.covariance)), AT[-sessions:]
     root = np.linalg.cholesky(session.covariance)
-    dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * at) for at in AT]
+    dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * years) for years in at]
     directions = tilts(rng, 50 * GON)
     kept = []
     for _ in range(N):
         rate = drift * sigma * rng.uniform(-1, 1, 6)
-        start = session.parameters + scatter * sigma * rng.standard_normal((7, 6))
-        truth = start[:6] + AT[:, None] * rate
-        estimates = truth + rng.standard_normal((6, 6)) @ root.T
+        switched = session.parameters + scatter * sigma * rng.standard_normal((sessions + 1, 6))
+        truth = switched[:-1] + at[:, None] * rate
+        estimates = truth + rng.standard_normal(truth.shape) @ root.T
         each = [replace(session, parameters=estimate) for estimate in estimates]
         interval = Interval(history_of(each, dates), MGON, 50 * GON, CONFIDENCE)
-        now = [error_in_use(start[6] + rate * t, estimates[-1], directions) for t in (0.0, 1.0)]
-        kept.append([error <= interval.error(t) for error, t in zip(now, (0.0, 1.0), strict=True)])
-    print(np.mean(kept, axis=0))
+        kept.append([
+            error_in_use(switched[-1] + rate * years, estimates[-1], directions)
+            <= interval.error(years) for years in (0.0, 1.0)
+        ])  # fmt: skip
     tolerance = 3.3 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / N)
     assert np.all(np.mean(kept, axis=0) >= CONFIDENCE - tolerance)
+
+
+def test_a_sensor_that_drifts_is_good_until_the_drift_is_as_large(session):
+    """Without noise or scatter, the bias of x becomes a pitch by itself."""
+    quiet = replace(session, covariance=1e-10 * session.covariance)
+    dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * years) for years in AT]
+    each = [
+        replace(quiet, parameters=session.parameters + 0.01 * years * np.eye(6)[0]) for years in AT
+    ]
+    history, small = history_of(each, dates), 1e-3
+    interval = Interval(history, 0.01 / G * 2.5, small, CONFIDENCE)
+    assert interval.years == pytest.approx(2.5, rel=5e-3)  # the scale of x is not 1
+    assert (interval.until - dates[-1]).total_seconds() / YEAR == pytest.approx(interval.years)
+    assert Interval(history, 0.01 / G * 20, small, CONFIDENCE).years == LONGEST
+    assert Interval(history_of([session] * 3, dates[:3]), 1e-6, small, CONFIDENCE).years == 0
