@@ -143,7 +143,7 @@ def plan_command(
 
     question = question_of(sensor=sensor, **asked)
     if history is not None:
-        from accelstudy.data_sheets import with_history
+        from accelstudy.data_sheets.measured import with_history
 
         question = replace(question, sheet=with_history(question.sheet, history))
     begin("comparing calibrations, which takes some seconds ...")

@@ -127,7 +127,7 @@ def pole_command(
     mounting, the heading, the bending and the length of the pole, the position of the top. A
     quantity of 0 leaves its source out.
     """
-    from accelstudy.data_sheets import get_data_sheet, with_history
+    from accelstudy.data_sheets import get_data_sheet
     from accelstudy.files.outputs import POLE, result_folder
     from accelstudy.pole.output import write_pole
     from accelstudy.pole.sensor import (
@@ -141,6 +141,8 @@ def pole_command(
 
     setup, frame, sheet = Setup(**given), parse_frame(mounting), get_data_sheet(sensor)
     if history is not None:
+        from accelstudy.data_sheets.measured import with_history
+
         sheet = with_history(sheet, history)
     source_of = click.get_current_context().get_parameter_source
     typed = [n for kind in KINDS for n in kind if source_of(n) is ParameterSource.COMMANDLINE]

@@ -4,7 +4,6 @@ The YAML files next to this module are the sensors of the package; each value ha
 user's own files have the same form.
 """
 
-from accelstudy.data_sheets.over_time import with_history
 from accelstudy.data_sheets.reading import (
     data_sheet_names,
     get_data_sheet,
@@ -21,5 +20,4 @@ __all__ = [
     "of_sigma",
     "parse_data_sheet",
     "read_data_sheet",
-    "with_history",
 ]
