@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 import click
 
+from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, stage
 from accelstudy.basics.wording import counted
@@ -34,7 +35,8 @@ from accelstudy.commands.plan import Confidence
     "--date",
     "dates",
     multiple=True,
-    help="Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.",
+    help="Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.  "
+    "[default: those of the campaigns]",
 )
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
 @click.option(
@@ -89,7 +91,7 @@ def history_command(
     for i, path in enumerate(calibrations):
         if path.resolve() in [other.resolve() for other in calibrations[:i]]:
             raise InputError(f"{path}: is given twice; each calibration counts once")
-    if len(dates) != len(calibrations):
+    if dates and len(dates) != len(calibrations):
         raise InputError(
             f"--date: {counted(len(dates), 'date')} for "
             f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
@@ -97,9 +99,12 @@ def history_command(
         )
     if confidence is None:
         raise InputError("--confidence: a probability, such as 95%, not rms")
-    when = [_date(text) for text in dates]
     with result_folder(out, HISTORY, calibrations, force) as folder, stage("history"):
-        history = history_of([read_calibration(path) for path in calibrations], when)
+        read = [read_calibration(path) for path in calibrations]
+        given = dates or [one.content["date"] for one in read]
+        wheres = ["--date"] * len(dates) or [f"{path}: date" for path in calibrations]
+        when = [_date(text, where) for text, where in zip(given, wheres, strict=True)]
+        history = history_of(read, when)
         interval = None
         if tilt_accuracy is not None:
             interval = Interval(history, tilt_accuracy, tilt_range, confidence)
@@ -108,12 +113,13 @@ def history_command(
     say(f"report: {out / 'report.html'}")
 
 
-def _date(text: str) -> datetime:
-    """Date, in UTC where it names a time zone."""
+def _date(text: str | None, where: str) -> datetime:
+    if text is None:
+        raise InputError(
+            f"{where}: missing; give --date for each calibration, or calibrate again with `date` "
+            "in the header of the campaign"
+        )
     try:
-        date = datetime.fromisoformat(text)
-    except ValueError:
-        raise InputError(f"--date: {text!r} is no date, such as 2026-03-01") from None
-    if not 1900 <= date.year < 2200:
-        raise InputError(f"--date: {text}: the year must be from 1900 to 2199")
-    return date if date.tzinfo is None else date.astimezone(UTC).replace(tzinfo=None)
+        return read_date(text)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None

@@ -8,9 +8,20 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, write_document
 
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import (
+    calibration_document,
+    json_text,
+    quality_document,
+)
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL, POWER
 from accelstudy.epochs.history import Course
 from accelstudy.files.parquet import read_frame
+from accelstudy.sensors.models import get_model
 
 N = 500
 STANDARD_ERRORS = 3.3
@@ -147,7 +158,8 @@ def test_bad_input_ends_in_one_line(tmp_path):
     other = tmp_path / "other.json"
     write_document(other, 4, model="quadratic_scale", scheme="fibonacci-30")
     for given, said in (
-        (paths, "--date: 0 dates for 3 calibrations"),
+        (paths, f"{paths[0]}: date: missing; give --date"),
+        (arguments(paths, YEARS[:2]), "--date: 2 dates for 3 calibrations"),
         (arguments(paths[:2], YEARS[:2]), "CALIBRATION: a history has 3 or more, not 2"),
         (arguments(paths, ["2023-01-01"] * 3), "--date: all are the same"),
         (arguments(paths, [*YEARS[:2], "1.2.2023"]), "--date: '1.2.2023' is no date"),
@@ -159,3 +171,24 @@ def test_bad_input_ends_in_one_line(tmp_path):
         line = refusal("history", *given, "--out", tmp_path / "out")
         assert line.startswith(f"error: {said}")
     assert not (tmp_path / "out").exists()
+
+
+def test_dates_come_from_the_campaigns(tmp_path):
+    """Of a header, by the calibration, to the history."""
+    paths = []
+    for k, date in enumerate(YEARS[:3]):
+        folder = tmp_path / f"session-{k}"
+        write_campaign(simulate_campaign(CampaignSettings(seed=k))[0], folder)
+        with (folder / "campaign.yaml").open("a", encoding="utf-8") as file:
+            file.write(f"date: {date}\n")
+        write_campaign(read_campaign(folder), folder)
+        fit = fit_campaign(read_campaign(folder), get_model("bias"), get_approach("gravity"))
+        content = {**calibration_document(fit), "quality": quality_document(assess(fit))}
+        paths.append(tmp_path / f"{k}.json")
+        paths[-1].write_text(json_text(content), encoding="utf-8")
+    succeed("history", *paths, "--out", tmp_path / "out")
+    content = json.loads((tmp_path / "out/history.json").read_text(encoding="utf-8"))
+    assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
+    header = folder / "campaign.yaml"
+    header.write_text(header.read_text(encoding="utf-8").replace(date, "spring"), encoding="utf-8")
+    assert "date: 'spring' is no date" in refusal("calibrate", folder, "--out", tmp_path / "c")
