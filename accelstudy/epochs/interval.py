@@ -120,5 +120,6 @@ def _normal(rng: np.random.Generator, covariance: Array) -> Array:
     """Draws (DRAWS, u) of errors of a covariance matrix."""
     size = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root.T)
+    # The symmetric root, as the signs of eigenvectors depend on the processor.
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root * size)
