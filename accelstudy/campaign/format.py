@@ -280,6 +280,7 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
     return Campaign(
         name=header.name,
         sensor=header.sensor,
+        date=header.date,
         unit=header.unit,
         gravity=header.gravity.value_mps2,
         sigma_gravity=header.gravity.sigma_mps2,
@@ -328,6 +329,7 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         "schema_version": 1,
         "name": campaign.name,
         "sensor": campaign.sensor,
+        "date": campaign.date,
         "unit": campaign.unit,
         "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
     }

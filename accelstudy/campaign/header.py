@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from datetime import date as calendar_date
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     StrictInt,
@@ -18,6 +20,7 @@ from pydantic import (
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
+from accelstudy.basics.dates import read_date
 from accelstudy.basics.units import GON
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import (
@@ -155,12 +158,25 @@ class Exclusion(Block):
     reason: Annotated[str, Field(min_length=1)] = Field(description="why it is left out")
 
 
+def _iso(value: Any) -> Any:
+    """Date as text; YAML makes dates of what looks like one."""
+    return value.isoformat() if isinstance(value, calendar_date) else value
+
+
+def _is_date(text: str) -> str:
+    read_date(text)
+    return text
+
+
 class Header(Block):
     """The content of `campaign.yaml`."""
 
     schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
     name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")
     sensor: str | None = Field(None, description="what was calibrated, any text")
+    date: Annotated[str, BeforeValidator(_iso), AfterValidator(_is_date)] | None = Field(
+        None, description="when it was measured, as 2026-03-01 or 2026-03-01T14:00"
+    )
     unit: Literal["m/s^2", "g", "counts"] = Field(
         description="of the forces in the table; g is 9.80665 m/s²"
     )

@@ -34,6 +34,7 @@ class Campaign:
     gravity, sigma_gravity : float, m/s²
     unit : str, of the file ("m/s^2", "g" or "counts")
     sensor : str, optional
+    date : str, optional, ISO 8601
     sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
     angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
     sigma_angle : float, rad, of a level hold; None without a robot
@@ -59,6 +60,7 @@ class Campaign:
     sigma_gravity: float = 0.0
     unit: str = "m/s^2"
     sensor: str | None = None
+    date: str | None = None
     sigma_force: float | None = None
     angles: Array | None = None
     sigma_angle: float | None = None

@@ -24,6 +24,7 @@ from accelstudy.commands.diagnose import diagnose_command
 from accelstudy.commands.effects import effects_command
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
 from accelstudy.commands.export import export_command
+from accelstudy.commands.history import history_command
 from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
 from accelstudy.commands.lot import lot_command
@@ -49,6 +50,7 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
         apply_command,
         export_command,
         compare_command,
+        history_command,
     ),
     "Before a calibration, and what it is worth": (
         plan_command,

@@ -142,6 +142,12 @@ def approach_option(default: str | None) -> Callable[[Command], Command]:
     )
 
 
+history_option = click.option(
+    "--history",
+    type=PATH,
+    help="A history.json of this sensor: drift and switch-on scatter of its bias.",
+)
+
 force_option = click.option(
     "--force",
     is_flag=True,

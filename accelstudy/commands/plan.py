@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from accelstudy.commands.options import (
     angle_unit_option,
     example,
     force_option,
+    history_option,
     quantity_option,
     quiet_option,
     seed_option,
@@ -46,6 +48,7 @@ _SECTIONS = {
         "tilt_range",
         "sensor",
         "sigma",
+        "history",
         "equipment",
         "reference",
         "confidence",
@@ -75,6 +78,7 @@ _SECTIONS = {
     "campaign.",
 )
 @quantity_option("sigma", QUANTITIES["sigma"])
+@history_option
 @click.option(
     "--equipment",
     type=click.Choice(["gravity", "robot", "both"]),
@@ -128,6 +132,7 @@ _SECTIONS = {
 @quiet_option
 def plan_command(
     sensor: str | None,
+    history: Path | None,
     replicates: int,
     seed: int,
     out: Path | None,
@@ -143,6 +148,10 @@ def plan_command(
     from accelstudy.planning.question import question_of
 
     question = question_of(sensor=sensor, **asked)
+    if history is not None:
+        from accelstudy.data_sheets.measured import with_history
+
+        question = replace(question, sheet=with_history(question.sheet, history))
     begin("comparing calibrations, which takes some seconds ...")
     from accelstudy.planning.answer import answer
     from accelstudy.planning.wording import (
@@ -168,7 +177,8 @@ def plan_command(
         from accelstudy.basics.suggested import study_again
         from accelstudy.planning.output import write_plan
 
-        inputs = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
+        given = [Path(sensor)] if sensor is not None and Path(sensor).exists() else []
+        inputs = [*given, *([] if history is None else [history])]
         write_plan(plan, out, {"config_hash": None, "seed": seed}, inputs, force)
         say(f"\nplan, table and figure: {out}")
         say(f"the same numbers again: {study_again(out / 'study.yaml')}")

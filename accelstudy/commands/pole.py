@@ -19,6 +19,7 @@ from accelstudy.commands.options import (
     approach_option,
     example,
     force_option,
+    history_option,
     model_option,
     quantity_option,
     quiet_option,
@@ -65,6 +66,7 @@ def _setup_options(command: Command) -> Command:
 @click.option(
     "--sensor", type=SENSOR, required=True, help="A data sheet: its name, or a YAML file."
 )
+@history_option
 @click.option("--calibration", type=PATH, help="A calibration.json of the sensor.")
 @quantity_option("tilt_sigma", TILT_SIGMA)
 @click.option(
@@ -101,6 +103,7 @@ def _setup_options(command: Command) -> Command:
 @quiet_option
 def pole_command(
     sensor: str,
+    history: Path | None,
     calibration: Path | None,
     tilt_sigma: float | None,
     mounting: str,
@@ -137,10 +140,14 @@ def pole_command(
     from accelstudy.sensors.frames import parse_frame
 
     setup, frame, sheet = Setup(**given), parse_frame(mounting), get_data_sheet(sensor)
+    if history is not None:
+        from accelstudy.data_sheets.measured import with_history
+
+        sheet = with_history(sheet, history)
     source_of = click.get_current_context().get_parameter_source
     typed = [n for kind in KINDS for n in kind if source_of(n) is ParameterSource.COMMANDLINE]
     check_one_kind({name: f"--{name.replace('_', '-')}" for name in typed})
-    inputs = [] if calibration is None else [calibration]
+    inputs = [path for path in (calibration, history) if path is not None]
     with result_folder(out, POLE, inputs, force) as folder, stage("budget of the pole"):
         if calibration is not None:
             calibrated = from_calibration(calibration, sheet, frame)

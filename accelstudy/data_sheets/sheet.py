@@ -51,6 +51,7 @@ class DataSheet:
     Attributes
     ----------
     name, title, source : str
+    bias_rate : float, m/s²/s, drift of the bias, which only a history of the sensor tells
     sources : mapping of quantity to where its value comes from
     assumed : frozenset of quantities whose value is an assumption
     """
@@ -71,6 +72,7 @@ class DataSheet:
     alignment: float | None = None
     nonlinearity: float | None = None
     full_scale: float | None = None
+    bias_rate: float | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
     assumed: frozenset[str] = frozenset()
 
@@ -126,8 +128,8 @@ class DataSheet:
     def bias_change(self, seconds: float, restarted: bool = False) -> float:
         """Standard deviation of the bias's change since the calibration, m/s².
 
-        It is √(F² + K² t + repeatability²) with F of `flicker_change`. Unknown quantities count as
-        zero; `unknown` lists them. What a temperature adds says `warmed`.
+        It is √(F² + K² t + rate² t² + repeatability²) with F of `flicker_change`. Unknown
+        quantities count as zero; `unknown` lists them. What a temperature adds says `warmed`.
 
         Parameters
         ----------
@@ -139,7 +141,8 @@ class DataSheet:
         )
         walk = (self.acceleration_random_walk or 0.0) * math.sqrt(seconds)
         again = (self.repeatability or 0.0) if restarted else 0.0
-        return math.hypot(floor, walk, again)
+        drift = (self.bias_rate or 0.0) * seconds
+        return math.hypot(floor, walk, drift, again)
 
     def warmed(self, kelvin: float, corrected: Collection[str] = ()) -> tuple[float, float]:
         """Standard deviations of what a temperature changes: of the bias, m/s², and of the scale.

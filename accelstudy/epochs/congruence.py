@@ -86,7 +86,7 @@ class Epochs:
         shares, directions = linalg.eigh(first, first + second)
         statistic = float(np.sum((directions.T @ (self.differences / size)) ** 2)) / p
         nu = _common_dof(np.clip(shares, 0.0, 1.0), self.dof)
-        return Test(statistic, (p, nu), float(_tail(statistic, p, nu)))
+        return Test(statistic, (p, nu), float(tail(statistic, p, nu)))
 
     def changed(self) -> tuple[int, ...]:
         """Fewest parameters that changed: all others are congruent, at one level for all.
@@ -120,10 +120,10 @@ class Epochs:
         return first_best(rest, ALIKE * rest[0])
 
 
-def noncentrality(p: int, nu: float) -> float:
+def noncentrality(p: int, nu: float, level: float = LEVEL) -> float:
     """Noncentrality of a change that a test with p and ν degrees of freedom finds with `POWER`."""
     many = not np.isfinite(nu)
-    limit = stats.chi2.isf(LEVEL, p) if many else stats.f.isf(LEVEL, p, nu)
+    limit = stats.chi2.isf(level, p) if many else stats.f.isf(level, p, nu)
 
     def missed(size: float) -> float:
         if many:
@@ -146,7 +146,8 @@ def _common_dof(shares: ArrayLike, dof: tuple[float, float]) -> float:
     return float(2 * mean / (mean - len(a)))
 
 
-def _tail(statistic: float, p: int, nu: float) -> float:
+def tail(statistic: float, p: int, nu: float) -> float:
+    """Probability of a larger F(p, ν), which is χ²/p where ν is infinite."""
     if np.isinf(nu):
         return float(stats.chi2.sf(p * statistic, p))
     return float(stats.f.sf(statistic, p, nu))

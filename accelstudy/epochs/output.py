@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.document import json_number, json_text
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
+from accelstudy.effects import Parameter
 from accelstudy.epochs.comparison import Comparison
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.files.outputs import whole_file
@@ -25,18 +28,25 @@ STATES = {True: "unchanged", False: "changed"}
 def said(comparison: Comparison) -> list[str]:
     """Say whether the sensor changed, in what, and what it matters; the verdict comes first."""
     c = comparison
-    detectable: dict[str, tuple[float, str]] = {}
-    for parameter, change in zip(c.parameters, c.epochs.detectable(), strict=True):
-        largest = detectable.get(parameter.unit, (0.0, ""))
-        detectable[parameter.unit] = max(largest, (float(change), parameter.name))
-    worst = [
-        f"{estimate(change, change, unit)[1]} {shown_unit(unit)} in {name}".replace("  ", " ")
-        for unit, (change, name) in detectable.items()
-    ]
+    worst = largest(c.parameters, c.epochs.detectable())
     changes = [_change(c, place) for place in c.changed]
     return lines(
         "epochs/wording.txt.j2", "verdict", c, changes, *c.tilt.tolist(), c.tilt_range, worst
     )
+
+
+def largest(
+    parameters: Sequence[Parameter], sizes: Sequence[float] | NDArray[np.float64]
+) -> list[str]:
+    """Name the largest of the sizes in each unit, with its parameter."""
+    found: dict[str, tuple[float, str]] = {}
+    for parameter, size in zip(parameters, sizes, strict=True):
+        before = found.get(parameter.unit, (0.0, ""))
+        found[parameter.unit] = max(before, (float(size), parameter.name))
+    return [
+        f"{estimate(size, size, unit)[1]} {shown_unit(unit)} in {name}".replace("  ", " ")
+        for unit, (size, name) in found.items()
+    ]
 
 
 def _change(c: Comparison, place: int) -> str:

@@ -84,6 +84,7 @@ POLE = Kind(
     ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
 )
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
+HISTORY = Kind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = Kind("lot", "lot.json", ("model.yaml", "report.html"), ("figures", "each"))
 PLAN = Kind(
     "plan",
@@ -97,7 +98,7 @@ STUDY = Kind(
     ("profiles", "campaigns/example"),
     replaced=False,
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON, LOT)
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON, HISTORY, LOT)
 
 
 @contextmanager

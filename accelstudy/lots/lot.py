@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
+from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
@@ -518,33 +518,3 @@ def with_sizes(
             first += len(sizes)
         results.append(replace(found, sizes=tuple(sizes)))
     return results
-
-
-def random_effects(values: Array, variances: Array) -> tuple[float, float, float]:
-    """Mean of a type, its scatter from sensor to sensor, and the sigma of the mean.
-
-    The scatter is that of Paule & Mandel (1982, J. Res. NBS 87, 377): with it the weighted squares
-    about the mean are as many as the degrees of freedom.
-
-    Parameters
-    ----------
-    values, variances : (n,) arrays; NaN where a sensor has none
-    """
-    known = np.isfinite(values) & np.isfinite(variances)
-    values, variances = values[known], variances[known]
-    if not len(values):
-        return np.nan, np.nan, np.nan
-
-    def mean(scatter: float) -> tuple[float, float]:
-        weights = 1 / (variances + scatter**2)
-        return float(weights @ values / weights.sum()), float(1 / np.sqrt(weights.sum()))
-
-    def excess(scatter: float) -> float:
-        return float(np.sum((values - mean(scatter)[0]) ** 2 / (variances + scatter**2))) - (
-            len(values) - 1
-        )
-
-    scatter, most = 0.0, float(np.ptp(values))
-    if len(values) > 1 and excess(0.0) > 0:
-        scatter = float(optimize.brentq(excess, 0.0, 10 * most))
-    return mean(scatter)[0], scatter, mean(scatter)[1]

@@ -209,7 +209,8 @@ def in_use(
         return float(np.sqrt(np.einsum("auu,u->a", theory.quadratic, variance).max()))
 
     drift = warmth = restart = math.nan
-    if sheet.bias_instability is not None or sheet.acceleration_random_walk is not None:
+    changes = (sheet.bias_instability, sheet.acceleration_random_walk, sheet.bias_rate)
+    if any(change is not None for change in changes):
         drift = tilt(bias=sheet.bias_change(hours * 3600))
     if sheet.bias_per_kelvin is not None or sheet.scale_per_kelvin is not None:
         bias, scale = sheet.warmed(kelvin)

@@ -24,6 +24,7 @@ STATES = {
 }
 """What makes a calibration such."""
 READ = ("log.csv", "--columns", "fx=0,fy=1,fz=2", "--rate", 50)
+EPOCHS = ("plain", "later", "latest")
 RESULTS = {
     "import": (*READ, "--no-figure", "--out", "log"),
     "simulate-campaign": ("--out", "again"),
@@ -39,6 +40,8 @@ RESULTS = {
     "calibrate": ("accepted", "--out", "plain"),
     "lot": ("accepted", "rejected", "--out", "lot"),
     "compare": ("plain/calibration.json", "plain/calibration.json", "--out", "compared"),
+    "history": (*(f"{name}/calibration.json" for name in EPOCHS), "--date", "2024-01-01", "--date",
+                "2024-07-01", "--date", "2025-01-01", "--out", "years"),
 }  # fmt: skip
 """Arguments of commands that have --quiet."""
 HAVE = {
@@ -47,7 +50,8 @@ HAVE = {
     "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
     "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
     "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
-    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ", "lot": "is missing",
+    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ", "history": "^UNCHANGED: ",
+    "lot": "is missing",
 }  # fmt: skip
 """What its result has."""
 
@@ -65,7 +69,9 @@ def made(tmp_path_factory):
         np.savetxt("log.csv", readings, "%.5f", delimiter=",")
         for state, options in STATES.items():
             succeed("simulate-campaign", "--out", state, *options)
-        succeed("calibrate", "accepted", "--out", "plain")
+        succeed("calibrate", "accepted", "--out", EPOCHS[0])
+        for epoch in EPOCHS[1:]:
+            shutil.copytree(EPOCHS[0], epoch)
     return folder
 
 

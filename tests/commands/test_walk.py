@@ -84,7 +84,7 @@ def steps(site, walked):
     folder = walked
     log_csv(folder / "log.csv")
     log_csv(folder / "ref.csv", seed=2)
-    for seed, season in enumerate(("spring", "autumn")):
+    for seed, season in enumerate(("spring", "autumn", "winter")):
         write_document(folder / season / "calibration.json", seed)
     for seed in (1, 2, 3):
         session = simulate_campaign(CampaignSettings(seed=seed, scheme="fibonacci-18"))[0]

@@ -68,9 +68,9 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
 def test_what_cannot_be_compared_is_said():
     one = document(1)
     counts = {**one, "unit": "counts", "nominal": {"scale": [1e-3] * 3, "offset": [0.0] * 3}}
-    with pytest.raises(InputError, match="nominal: the two calibrations"):
+    with pytest.raises(InputError, match=r"calibration 2 .*: nominal: "):
         compare(calibration_of(one), calibration_of(counts))
-    with pytest.raises(InputError, match="the second calibration has no sigmas"):
+    with pytest.raises(InputError, match=r"calibration 2 .*: no sigmas"):
         compare(calibration_of(one), calibrated(1, scheme="fibonacci-9", sigma_known=False))
     other = calibrated(1, model="quadratic_scale", scheme="fibonacci-30")
     with pytest.raises(InputError, match="none in common"):

@@ -11,10 +11,11 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from scipy import integrate
 
+from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.lots.evidence import DRAWS, LotNoise, SensorEvidence, lot_classes, mean_sensor
-from accelstudy.lots.lot import LEVEL, Lot, Pass, random_effects, weigh_lot
+from accelstudy.lots.lot import LEVEL, Lot, Pass, weigh_lot
 from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Mixture
 from accelstudy.sensors.models import get_model
 

@@ -1,5 +1,6 @@
 """Data sheets: the sensors that come along, files of a user's, and what follows from them."""
 
+import json
 import math
 
 import numpy as np
@@ -17,6 +18,7 @@ from accelstudy.data_sheets import (
     parse_data_sheet,
     read_data_sheet,
 )
+from accelstudy.data_sheets.measured import with_history
 from accelstudy.data_sheets.sheet import FLICKER, flicker_change
 from accelstudy.planning.question import get_sensor
 
@@ -197,3 +199,32 @@ def test_an_impossible_data_sheet_is_said_in_a_line(line, tmp_path):
     (tmp_path / "mine.yaml").write_text(line, encoding="utf-8")
     with pytest.raises(InputError, match=r"mine\.yaml: .*must be at (most|least)"):
         read_data_sheet(tmp_path / "mine.yaml")
+
+
+def history(path, scatter, rate, name="b_%s"):
+    """What a history.json says of three axes, SI and per year."""
+    each = zip("xyz", scatter, rate, strict=True)
+    parameters = [
+        {"name": name % axis, "scatter": {"sd": sd}, "rate": {"per_year": of_year, "sigma": 0.0}}
+        for axis, sd, of_year in each
+    ]
+    path.write_text(json.dumps({"schema_version": 1, "parameters": parameters}), encoding="utf-8")
+    return path
+
+
+def test_a_history_tells_drift_and_switch_on_scatter(tmp_path):
+    """The change of the bias between two sessions of simulated sensors, rms over the axes."""
+    rng = np.random.default_rng(9)
+    scatter, rate, years = np.array([1e-3, 4e-3, 0.0]), np.array([2e-3, 0.0, -6e-3]), 0.7
+    sheet = with_history(of_sigma(2e-3), history(tmp_path / "history.json", scatter, rate))
+    one, other = scatter * rng.standard_normal((2, 20_000, 3))
+    change = np.sqrt(np.mean((other + rate * years - one) ** 2))
+    said = sheet.bias_change(years * 365.25 * 86400, restarted=True)
+    assert said == pytest.approx(change, rel=0.01)
+    assert "repeatability" in sheet.known
+
+
+def test_a_history_without_a_bias_is_refused(tmp_path):
+    path = history(tmp_path / "history.json", [0.0] * 3, [0.0] * 3, name="s_%s")
+    given = ("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--history", path)
+    assert refusal("plan", *given).startswith(f"error: {path}: parameters: no bias")

@@ -6,6 +6,7 @@
 import json
 import re
 import sys
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.comparison import compare
+from accelstudy.epochs.history import history_of
+from accelstudy.epochs.history_output import history_document, history_table
 from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
 from accelstudy.lots.evidence import SensorEvidence
@@ -72,9 +75,12 @@ def test_each_key_of_a_calibration_is_described(pages):
     assessment = assess(fit)
     document = {**calibration_document(fit), "quality": quality_document(assessment)}
     one = calibration_of(json.loads(json_text(document)))
+    history = history_of([one] * 3, [datetime(2025, month, 1) for month in (1, 2, 3)])
     written = {
         "calibration.json": set(_keys(document)),
         "comparison.json": set(_keys(comparison_document(compare(one, one)))),
+        "history.json": set(_keys(history_document(history))),
+        "history.parquet": set(history_table(history)),
         "lot.json": set(_keys(_lot())),
         "positions.parquet": set(assessed_positions(assessment)),
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),

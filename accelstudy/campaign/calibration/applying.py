@@ -183,6 +183,7 @@ class _Document(BaseModel):
     schema_version: Annotated[Literal[1], Number]
     campaign: str
     sensor: str | None = None
+    date: str | None = None
     model: str
     approach: str = ""
     n_positions: int | None = None

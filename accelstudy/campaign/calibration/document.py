@@ -39,6 +39,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "schema_version": 1,
         "campaign": campaign.name,
         "sensor": campaign.sensor,
+        "date": campaign.date,
         "model": fit.model.name,
         "effects": [effect.spec for effect in fit.model.effects],
         "approach": fit.approach.name,

@@ -1,0 +1,207 @@
+"""A sensor over time: whether its parameters change, drift, and scatter between sessions.
+
+A parameter of session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the scatter of the sessions with
+the sd τ, as by switching off and on, and the noise of the calibration.
+
+* It changes if its squares about the mean are more than noise leaves: χ² with stated noise. Where
+  noise was estimated they follow Johansen (1980, Biometrika 67, 85).
+* It scatters if its squares about the line are.
+* The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
+  about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
+  2693; exact where all sigmas are equal).
+
+Each of p parameters has the p-th part of the level. What changes is tested further for rate and for
+scatter: one of the two is not zero then, so that the other may take the same part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.effects import Parameter
+from accelstudy.epochs.common import Common, in_common
+from accelstudy.epochs.congruence import LEVEL, POWER, noncentrality, tail
+
+Array = NDArray[np.float64]
+
+YEAR = 365.25 * 86400.0
+"""s"""
+FEWEST = 3
+"""Calibrations of which a line leaves a degree of freedom."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A parameter over time.
+
+    Attributes
+    ----------
+    years : (n,) array, time
+    values, variances : (n,) arrays, of the calibrations
+    dof : (n,) array, degrees of freedom of the variances; inf if the noise was stated
+    """
+
+    years: Array
+    values: Array
+    variances: Array
+    dof: Array
+
+    @cached_property
+    def line(self) -> RandomEffects:
+        """Value at the time 0, and rate per year."""
+        design = np.column_stack([np.ones_like(self.years), self.years])
+        return RandomEffects(self.values, self.variances, design)
+
+    @cached_property
+    def mean(self) -> RandomEffects:
+        """The same without a rate."""
+        return RandomEffects(self.values, self.variances, np.ones((len(self.years), 1)))
+
+    @property
+    def rate(self) -> tuple[float, float]:
+        """Rate and its sigma, per year."""
+        return float(self.line.estimates[1]), float(np.sqrt(self.line.covariance[1, 1]))
+
+    @property
+    def sigmas_95(self) -> float:
+        """Number of sigmas on either side of the line that hold 95 %."""
+        return float(stats.t.isf(0.025, self.line.dof))
+
+    @property
+    def rate_interval(self) -> tuple[float, float]:
+        """Interval that holds the rate with a probability of 95 %."""
+        (rate, sigma), half = self.rate, self.sigmas_95
+        return rate - half * sigma, rate + half * sigma
+
+    @property
+    def p_values(self) -> tuple[float, float, float]:
+        """Whether nothing changes, nothing drifts, and nothing scatters."""
+        rate, sigma = self.rate
+        drifts = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
+        return self._exceeds(self.mean), drifts, self._exceeds(self.line)
+
+    def found(self, level: float) -> tuple[str, ...]:
+        """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""
+        change, drift, scatter = (p <= level for p in self.p_values)
+        if not change:
+            return ()
+        named = {"drifts": drift, "scatters": scatter}
+        return tuple(word for word, is_so in named.items() if is_so) or ("changed",)
+
+    def detectable_rate(self, level: float) -> float:
+        """Rate that by itself is found to be a change with a probability of `POWER`."""
+        _, other = self._of_squares(self.mean)
+        # Squares about the mean that a rate of 1 adds.
+        each = RandomEffects(self.years, self.variances, self.mean.design).squares(0.0)
+        return float(np.sqrt(noncentrality(self.mean.dof, other, level) / each))
+
+    def detectable_scatter(self, level: float) -> float:
+        """Scatter that by itself is found to be a change with a probability of `POWER`.
+
+        Squares are taken as a scaled χ² variable of the same mean and variance.
+        """
+        factor, other = self._of_squares(self.mean)
+        f, root, design = self.mean.dof, np.sqrt(self.variances), self.mean.design
+        limit = factor * (stats.chi2.isf(level, f) / f if np.isinf(other)
+                          else stats.f.isf(level, f, other))  # fmt: skip
+        apart = (np.eye(f + 1) - design @ self.mean.combination(0.0)) * root / root[:, None]
+        sizes = np.linalg.eigvalsh((apart / self.variances) @ apart.T)[1:] * self.variances.min()
+
+        def missed(ratio: float) -> float:
+            each = 1 + ratio**2 * sizes
+            scale = np.sum(each**2) / np.sum(each)
+            return float(stats.chi2.sf(limit / scale, np.sum(each) / scale)) - POWER
+
+        most = 1.0
+        while missed(most) < 0:
+            most *= 2
+        return float(root.min() * optimize.brentq(missed, 0.0, most))
+
+    def _exceeds(self, fit: RandomEffects) -> float:
+        """Probability that noise alone leaves such squares."""
+        factor, other = self._of_squares(fit)
+        return tail(fit.squares(0.0) / factor, fit.dof, other)
+
+    def _of_squares(self, fit: RandomEffects) -> tuple[float, float]:
+        """Factor c and second degrees of freedom ν: squares of noise alone are c F(f, ν)."""
+        leverage = np.einsum("iu,ui->i", fit.design, fit.combination(0.0))
+        a, f = float(np.sum((1 - leverage) ** 2 / self.dof)), fit.dof
+        return f + 2 * a - 6 * a / (f + 2), (f * (f + 2) / (3 * a) if a else np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Calibrations of one sensor in the order of time.
+
+    Attributes
+    ----------
+    calibrations : tuple of n Calibration
+    dates : tuple of n datetime
+    common : Common, the effects that all have
+    """
+
+    calibrations: tuple[Calibration, ...]
+    dates: tuple[datetime, ...]
+    common: Common
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters that all have."""
+        return self.common.model.parameters
+
+    @cached_property
+    def years(self) -> Array:
+        """Time before the last calibration, (n,), negative."""
+        return np.array([(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates])
+
+    @cached_property
+    def courses(self) -> tuple[Course, ...]:
+        """Each parameter over time."""
+        variances = np.diagonal(self.common.covariances, axis1=1, axis2=2)
+        return tuple(
+            Course(self.years, values, variance, self.common.dof)
+            for values, variance in zip(self.common.values.T, variances.T, strict=True)
+        )
+
+    @property
+    def level(self) -> float:
+        """Level of the tests of one parameter."""
+        return LEVEL / len(self.parameters)
+
+    @cached_property
+    def found(self) -> tuple[tuple[str, ...], ...]:
+        """What each parameter does, in words, at one level for all."""
+        return tuple(course.found(self.level) for course in self.courses)
+
+
+def history_of(calibrations: Sequence[Calibration], dates: Sequence[datetime]) -> History:
+    """Put calibrations of one sensor in the order of time, and bring them to common effects.
+
+    Raises
+    ------
+    InputError
+        If they are fewer than three, of one date, or cannot be compared; see `in_common`.
+    """
+    if len(calibrations) < FEWEST:
+        raise InputError(
+            f"CALIBRATION: a history has {FEWEST} or more, not {len(calibrations)}; `compare` "
+            "takes two"
+        )
+    if len(set(dates)) < 2:
+        raise InputError("--date: all are the same; a rate needs two dates or more")
+    common = in_common(calibrations)
+    order = np.argsort(np.array(dates, dtype="datetime64[us]"), kind="stable")
+    ordered = Common(
+        common.model, common.values[order], common.covariances[order], common.dof[order]
+    )
+    return History(tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered)

@@ -1,0 +1,125 @@
+"""The calibration interval: how long the last calibration of a sensor stays good enough.
+
+A time t after it, the error of the last calibration n is δ(t) = eₙ + sₙ − s − r t, with its noise,
+the scatter of its session, that of the session in use, and the drift since. The true rate r is the
+estimated one less what noise and scatter of all sessions put into it; both are drawn. The scatter
+is estimated itself: the mean square of the tilt error has the degrees of freedom of Satterthwaite
+(1946, Biometrics Bulletin 2, 110), of which a χ² variable is drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from accelstudy.epochs.common import session_like
+from accelstudy.epochs.history import YEAR, History
+from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+
+Array = NDArray[np.float64]
+
+DRAWS = 4000
+SEED = 1
+LONGEST = 10.0
+"""Years beyond which nothing is promised."""
+SHOWN = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
+"""Years at which errors are told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """How long a calibration stays good enough.
+
+    Attributes
+    ----------
+    history : History
+    accuracy : float, rad, rms of roll and of pitch over the tilts
+    tilt_range : float, rad
+    confidence : float, probability that neither of the two is larger
+    """
+
+    history: History
+    accuracy: float
+    tilt_range: float
+    confidence: float
+
+    def error(self, years: float) -> float:
+        """Tilt error that is not exceeded with the probability, so many years later, rad."""
+        a, b, c = self._squares
+        larger = np.max(a + b * years + c * years**2, axis=1)
+        return float(np.sqrt(np.quantile(np.maximum(larger, 0.0), self.confidence)))
+
+    @property
+    def until(self) -> datetime:
+        """Date until which it stays good enough."""
+        return self.history.dates[-1] + timedelta(seconds=self.years * YEAR)
+
+    @cached_property
+    def years(self) -> float:
+        """Years until the error exceeds the accuracy; 0 if it does at once, at most `LONGEST`."""
+        if self.error(0.0) > self.accuracy:
+            return 0.0
+        steps = np.linspace(0.0, LONGEST, 201)
+        too_large = [t for t in steps if self.error(t) > self.accuracy]
+        if not too_large:
+            return LONGEST
+        first = too_large[0]
+        return float(
+            optimize.brentq(lambda t: self.error(t) - self.accuracy, first - steps[1], first)
+        )
+
+    @cached_property
+    def _squares(self) -> tuple[Array, Array, Array]:
+        """Squared errors of roll and pitch of the draws, (DRAWS, 2), as a + b t + c t², rad²."""
+        last = self.history.calibrations[-1]
+        g, forces = last.gravity, cap_forces(self.tilt_range, ATTITUDES, last.gravity)
+        hold, values = session_like(last, -forces / g).hold, last.parameters
+        form = tilt_error(last.model, values, last.model, values, forces, g, hold).quadratic
+        at_once, per_year = self._drawn(np.einsum("auu->u", form))
+        first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
+        return (
+            np.einsum("kaw,kw->ka", first, at_once),
+            2 * np.einsum("kaw,kw->ka", first, per_year),
+            np.einsum("kaw,kw->ka", second, per_year),
+        )
+
+    def _drawn(self, weights: Array) -> tuple[Array, Array]:
+        """Error of the last calibration at once, and its growth per year, (DRAWS, u) each.
+
+        Parameters
+        ----------
+        weights : (u,) array, squared tilt error by a parameter that is wrong by 1
+        """
+        history, rng = self.history, np.random.default_rng(SEED)
+        common, last = history.common, history.calibrations[-1]
+        noise = [_normal(rng, c) for c in common.covariances]
+        at_once, drift = _normal(rng, last.covariance), np.zeros(len(weights))
+        per_year = np.zeros_like(at_once)
+        names = last.model.parameter_names
+        places = [names.index(name) for name in common.model.parameter_names]
+        noise[-1] = at_once[:, places]
+        for k, (place, course) in enumerate(zip(places, history.courses, strict=True)):
+            scatter = course.line.scatter
+            sessions = scatter * rng.standard_normal((len(noise) + 1, DRAWS))
+            errors = np.array([each[:, k] for each in noise]) + sessions[:-1]
+            per_year[:, place] = course.line.combination(scatter)[1] @ errors
+            drift[place] = course.rate[0]
+            at_once[:, place] += sessions[-2] - sessions[-1]
+        parts = weights * np.mean(at_once**2, axis=0)
+        dof = history.courses[0].line.dof * np.sum(parts) ** 2 / np.sum(parts**2)
+        factor = np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]
+        return factor * at_once, factor * per_year - drift
+
+
+def _normal(rng: np.random.Generator, covariance: Array) -> Array:
+    """Draws (DRAWS, u) of errors of a covariance matrix."""
+    size = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    # The symmetric root, as the signs of eigenvectors depend on the processor.
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root * size)

@@ -1,0 +1,194 @@
+"""Rates and scatters of a sensor beside simulated ones, and what the command writes."""
+
+import json
+
+import numpy as np
+import pytest
+from calling import refusal, succeed
+from page_helpers import assert_sound, text_of
+from session_helpers import NINE, SENSOR, write_document
+
+from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import (
+    calibration_document,
+    json_text,
+    quality_document,
+)
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.epochs.congruence import LEVEL, POWER
+from accelstudy.epochs.history import Course
+from accelstudy.files.parquet import read_frame
+from accelstudy.sensors.models import get_model
+
+N = 500
+STANDARD_ERRORS = 3.3
+DATES = np.array([-2.1, -1.7, -1.0, -0.6, -0.5, 0.0])
+"""Years."""
+EQUAL, UNEQUAL = np.full(6, 0.7), np.array([0.5, 1.5, 0.8, 1.0, 2.0, 0.6])
+STATED = np.full(6, np.inf)
+
+
+def tolerance(share, n=N):
+    return STANDARD_ERRORS * np.sqrt(share * (1 - share) / n)
+
+
+def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
+    """Courses of a parameter: a line, its scatter and the noise, of which sigmas are estimated."""
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        values = 5 + rate * DATES + scatter * rng.standard_normal(6)
+        values += sigmas * rng.standard_normal(6)
+        variances = np.ones(6) if np.isinf(dof).all() else rng.chisquare(dof) / dof
+        yield Course(DATES, values, sigmas**2 * variances, dof)
+
+
+@pytest.mark.parametrize(("sigmas", "dof"), [
+    (UNEQUAL, STATED), (EQUAL, STATED), (UNEQUAL, np.full(6, 15.0)), (EQUAL, np.full(6, 9.0)),
+])  # fmt: skip
+def test_what_is_not_there_is_found_as_often_as_is_said(sigmas, dof):
+    """A change where there is none, and a scatter beside a drift."""
+    still = [c.p_values[0] < LEVEL for c in drawn(1, sigmas, dof=dof)]
+    drifting = [c.p_values[2] < LEVEL for c in drawn(1, sigmas, dof=dof, rate=3.0)]
+    for found in (still, drifting):
+        assert np.mean(found) == pytest.approx(LEVEL, abs=tolerance(LEVEL))
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize("sigmas", [EQUAL, UNEQUAL])
+def test_intervals_hold_rate_and_scatter(sigmas, scatter):
+    """Without scatter the interval of the rate is wider than it need be: nobody knows."""
+    rates, scatters = zip(
+        *((c.rate_interval, c.line.scatter_interval())
+          for c in drawn(2, sigmas, rate=0.4, scatter=scatter)), strict=True,
+    )  # fmt: skip
+    low, high = np.transpose(scatters)
+    held = np.mean((low <= scatter) & (scatter <= high))
+    assert held == pytest.approx(0.975 if scatter == 0 else 0.95, abs=tolerance(0.05))
+    low, high = np.transpose(rates)
+    held = np.mean((low < 0.4) & (high > 0.4))
+    assert held >= 0.95 - tolerance(0.05)
+    if scatter == 5:
+        assert held == pytest.approx(0.95, abs=tolerance(0.05))
+
+
+@pytest.mark.parametrize("true", [None, "drifts", "scatters"])
+def test_all_tests_have_one_level(true):
+    """Nine parameters whose noise is correlated, and of which none does anything, or three do."""
+    rng = np.random.default_rng(3)
+    root = np.linalg.cholesky(np.linalg.inv(np.cov(rng.standard_normal((9, 30)))))
+    variances = np.outer(UNEQUAL**2, np.sum(root**2, axis=1))
+    n, many = 200, 0 if true is None else 3
+    right = {"changed"} if true is None else {"changed", true}
+    wrong = 0
+    for _ in range(n):
+        values = UNEQUAL[:, None] * (rng.standard_normal((6, 9)) @ root.T)
+        shape = rng.standard_normal((6, 3)) if true == "scatters" else np.tile(DATES, (3, 1)).T
+        values[:, :many] += 20 * shape[:, :many]
+        found = [{*Course(DATES, x, v, STATED).found(LEVEL / 9)}
+                 for x, v in zip(values.T, variances.T, strict=True)]  # fmt: skip
+        wrong += any(f - right for f in found[:many]) or any(found[many:])
+    assert wrong / n <= LEVEL + tolerance(LEVEL, n)
+
+
+@pytest.mark.parametrize("sigmas", [EQUAL, UNEQUAL])
+@pytest.mark.parametrize("dof", [STATED, np.full(6, 15.0)])
+def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
+    known = Course(DATES, DATES, sigmas**2, dof)
+    for size in (
+        {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
+    ):  # fmt: skip
+        found = [c.p_values[0] < 0.01 for c in drawn(4, sigmas, dof=dof, **size)]
+        # With estimated sigmas, and of the scatter with unequal ones, the distribution is near it.
+        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER) + 0.03)
+
+
+YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")
+QUADRATIC = f"{NINE}-quadratic"
+
+
+def calibrations(folder, biases):
+    """Five calibrations of a sensor, of which one has an effect more; b_x is given."""
+    for k, b_x in enumerate(biases):
+        options = {"model": QUADRATIC, "scheme": "fibonacci-30"} if k == 2 else {}
+        effects = (f"bias: {b_x}, 0.05, -0.1", *SENSOR[1:])
+        write_document(folder / f"{k}.json", k + 1, effects=effects, **options)
+        yield folder / f"{k}.json"
+
+
+def arguments(paths, dates=YEARS):
+    return [*paths, *(f"--date={date}" for date in dates)]
+
+
+@pytest.mark.parametrize("per_year", [0.0, 0.02])
+def test_the_command_writes_what_it_says(per_year, tmp_path):
+    """Calibrations come in any order."""
+    paths = list(calibrations(tmp_path, [0.1 + per_year * k / 2 for k in range(5)]))
+    out = tmp_path / "out"
+    given = arguments(paths[::-1], YEARS[::-1])
+    told = succeed("history", *given, "--out", out, "--tilt-accuracy", "50mgon").stdout
+    content = json.loads((out / "history.json").read_text(encoding="utf-8"))
+    assert content["state"] == ("changed" if per_year else "unchanged")
+    assert told.startswith(f"{content['state'].upper()}: {content['verdict']}")
+    assert [p["found"] for p in content["parameters"] if p["found"]] == [["drifts"]] * bool(
+        per_year
+    )
+    low, high = content["parameters"][0]["rate"]["ci95"]
+    assert low < per_year < high
+    assert [c["campaign"] for c in content["calibrations"]] == [f"session-{k}" for k in range(1, 6)]
+    assert [c["left_out"] for c in content["calibrations"]].count(["quadratic_scale"]) == 1
+    # A drift of 20 mm/s² a year tilts by 130 mgon.
+    assert content["interval"]["until"] in told
+    assert (content["interval"]["years"] < 0.5) == bool(per_year)
+    assert (out / "figures/interval.svg").is_file()
+    table = read_frame(out / "history.parquet")
+    assert len(table) == 5 * 9
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert_sound(page)
+    assert "session-3 has quadratic scale" in text_of(page)
+    assert (out / "figures/history.svg").is_file()
+
+
+def test_bad_input_ends_in_one_line(tmp_path):
+    paths = [tmp_path / f"{k}.json" for k in range(3)]
+    for k, path in enumerate(paths):
+        write_document(path, k + 1)
+    other = tmp_path / "other.json"
+    write_document(other, 4, model="quadratic_scale", scheme="fibonacci-30")
+    for given, said in (
+        (paths, f"{paths[0]}: date: missing; give --date"),
+        (arguments(paths, YEARS[:2]), "--date: 2 dates for 3 calibrations"),
+        (arguments(paths[:2], YEARS[:2]), "CALIBRATION: a history has 3 or more, not 2"),
+        (arguments(paths, ["2023-01-01"] * 3), "--date: all are the same"),
+        (arguments(paths, [*YEARS[:2], "1.2.2023"]), "--date: '1.2.2023' is no date"),
+        (arguments(paths, [*YEARS[:2], "0202-01-01"]), "--date: 0202-01-01: the year must be"),
+        ([*arguments(paths, YEARS[:3]), "--confidence=rms"], "--confidence: a probability"),
+        (arguments([*paths[:2], paths[0]], YEARS[:3]), f"{paths[0]}: is given twice"),
+        (arguments([*paths, other], YEARS[:4]), "calibration 4 (session-4): effects: none in"),
+    ):
+        line = refusal("history", *given, "--out", tmp_path / "out")
+        assert line.startswith(f"error: {said}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_dates_come_from_the_campaigns(tmp_path):
+    """Of a header, by the calibration, to the history."""
+    paths = []
+    for k, date in enumerate(YEARS[:3]):
+        folder = tmp_path / f"session-{k}"
+        write_campaign(simulate_campaign(CampaignSettings(seed=k))[0], folder)
+        with (folder / "campaign.yaml").open("a", encoding="utf-8") as file:
+            file.write(f"date: {date}\n")
+        write_campaign(read_campaign(folder), folder)
+        fit = fit_campaign(read_campaign(folder), get_model("bias"), get_approach("gravity"))
+        content = {**calibration_document(fit), "quality": quality_document(assess(fit))}
+        paths.append(tmp_path / f"{k}.json")
+        paths[-1].write_text(json_text(content), encoding="utf-8")
+    succeed("history", *paths, "--out", tmp_path / "out")
+    content = json.loads((tmp_path / "out/history.json").read_text(encoding="utf-8"))
+    assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
+    header = folder / "campaign.yaml"
+    header.write_text(header.read_text(encoding="utf-8").replace(date, "spring"), encoding="utf-8")
+    assert "date: 'spring' is no date" in refusal("calibrate", folder, "--out", tmp_path / "c")

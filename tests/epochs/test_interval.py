@@ -1,0 +1,89 @@
+"""The promised tilt error beside readings of simulated sensors, leveled by plain trigonometry."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from session_helpers import document
+
+from accelstudy.basics.units import GON, MGON
+from accelstudy.campaign.calibration.applying import calibration_of
+from accelstudy.epochs.history import YEAR, history_of
+from accelstudy.epochs.interval import LONGEST, Interval
+
+G = 9.80665
+N = 80
+CONFIDENCE = 0.9
+AT = np.array([-2.5, -2.0, -1.4, -0.9, -0.5, 0.0])
+"""Years of the sessions."""
+
+
+@pytest.fixture(scope="module")
+def session():
+    effects = ("bias: 0.1, 0.05, -0.1", "scale: 0.002, -0.001, 0.003")
+    return calibration_of(document(1, model="bias-scale", effects=effects))
+
+
+def roll_and_pitch(f):
+    """In rad, of forces whose z axis points down."""
+    x, y, z = -f.T
+    return np.array([np.arctan2(y, z), np.arctan2(-x, np.hypot(y, z))])
+
+
+def tilts(rng, largest, n=300):
+    """Directions of gravity, even over a cap."""
+    z = rng.uniform(np.cos(largest), 1, n)
+    azimuth = rng.uniform(0, 2 * np.pi, n)
+    return np.stack([np.sqrt(1 - z**2) * w for w in (np.cos(azimuth), np.sin(azimuth))] + [z], 1)
+
+
+def error_in_use(truth, calibrated, directions):
+    """Larger rms of roll and pitch where (1 + s) f + b is read and b and s are corrected."""
+    forces = -G * directions
+    readings = (1 + truth[3:]) * forces + truth[:3]
+    corrected = (readings - calibrated[:3]) / (1 + calibrated[3:])
+    apart = roll_and_pitch(corrected) - roll_and_pitch(forces)
+    return np.sqrt(np.mean(apart**2, axis=1)).max()
+
+
+@pytest.mark.parametrize(("sessions", "scatter", "drift"), [
+    (6, np.zeros(6), 0.0), (6, np.full(6, 3.0), 0.0), (6, np.full(6, 10.0), 20.0),
+    (6, np.zeros(6), 9.0), (4, np.array([10.0, 0, 0, 0, 0, 0]), 0.0), (3, np.full(6, 3.0), 9.0),
+])  # fmt: skip
+def test_the_promise_is_kept(session, sessions, scatter, drift):
+    """Parameters scatter, and drift in a year, by some of their sigmas, each on its own."""
+    rng = np.random.default_rng(7)
+    sigma, at = np.sqrt(np.diag(session.covariance)), AT[-sessions:]
+    root = np.linalg.cholesky(session.covariance)
+    dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * years) for years in at]
+    directions = tilts(rng, 50 * GON)
+    kept = []
+    for _ in range(N):
+        rate = drift * sigma * rng.uniform(-1, 1, 6)
+        switched = session.parameters + scatter * sigma * rng.standard_normal((sessions + 1, 6))
+        truth = switched[:-1] + at[:, None] * rate
+        estimates = truth + rng.standard_normal(truth.shape) @ root.T
+        each = [replace(session, parameters=estimate) for estimate in estimates]
+        interval = Interval(history_of(each, dates), MGON, 50 * GON, CONFIDENCE)
+        kept.append([
+            error_in_use(switched[-1] + rate * years, estimates[-1], directions)
+            <= interval.error(years) for years in (0.0, 1.0)
+        ])  # fmt: skip
+    tolerance = 3.3 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / N)
+    assert np.all(np.mean(kept, axis=0) >= CONFIDENCE - tolerance)
+
+
+def test_a_sensor_that_drifts_is_good_until_the_drift_is_as_large(session):
+    """Without noise or scatter, the bias of x becomes a pitch by itself."""
+    quiet = replace(session, covariance=1e-10 * session.covariance)
+    dates = [datetime(2025, 1, 1) + timedelta(seconds=YEAR * years) for years in AT]
+    each = [
+        replace(quiet, parameters=session.parameters + 0.01 * years * np.eye(6)[0]) for years in AT
+    ]
+    history, small = history_of(each, dates), 1e-3
+    interval = Interval(history, 0.01 / G * 2.5, small, CONFIDENCE)
+    assert interval.years == pytest.approx(2.5, rel=5e-3)  # the scale of x is not 1
+    assert (interval.until - dates[-1]).total_seconds() / YEAR == pytest.approx(interval.years)
+    assert Interval(history, 0.01 / G * 20, small, CONFIDENCE).years == LONGEST
+    assert Interval(history_of([session] * 3, dates[:3]), 1e-6, small, CONFIDENCE).years == 0
