@@ -18,6 +18,7 @@ from accelstudy.diagnosis.decision.posterior import weigh
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
@@ -25,20 +26,20 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEVEL_OF_NOISE = "noise_level"
-"""Name of a noise that is larger or smaller than that of the others."""
 LEAST_SIGMA = 1e-9
 """m/s², of readings that are their own model."""
 DRAWS = 1000
 """Sets of residuals without any effect, of each campaign."""
-
-
 FREEDOMS = (AS_GIVEN, 60.0, 20.0, 8.0, DOUBTED)
 """ν of a type, the most first."""
 ALIKE = 1.0
 """Difference of log likelihoods that says nothing."""
 ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
+COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
+"""What a position has beside its forces."""
+SAME = 0.15
+"""Largest difference of the directions of forces in positions that are the same."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,11 @@ class LotNoise:
         ----------
         sigmas, redundancies : (n,) arrays, s in m/s² and r, of the sensors
         """
-        squares, of_each = np.square(sigmas), redundancies
+        squares = np.square(sigmas)
 
         def less_likely(log: float, freedom: float) -> float:
             ratios = squares / np.exp(log)
-            usual, odd = (stats.f.logpdf(ratios, of_each, nu) for nu in (freedom, ODD_FREEDOM))
+            usual, odd = (stats.f.logpdf(ratios, redundancies, nu) for nu in (freedom, ODD_FREEDOM))
             usual, odd = usual + np.log(1 - ODD_SHARE), odd + np.log(ODD_SHARE)
             return float(len(squares) * log - np.sum(np.logaddexp(usual, odd)))
 
@@ -109,7 +110,6 @@ class SensorEvidence:
     by_chance : (s, K) array, log odds of `tested` in noise alone
     tested : tuple of str, candidates and the unknown as a whole, K
     observed : (K,) array, their log odds in this campaign
-    sigma : float, m/s², of a position mean by the residuals
     redundancy : int
     residuals : (m,) array, m/s², equally uncertain
     """
@@ -123,7 +123,6 @@ class SensorEvidence:
     by_chance: Array
     tested: tuple[str, ...]
     observed: Array
-    sigma: float
     redundancy: int
     residuals: Array
 
@@ -157,16 +156,15 @@ def sensor_evidence(
     chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
     detection = detect(problem.field, problem.evidence, problem.residuals, chance)
     weighing = weigh(problem, detection, chance)
-    nothing = float(np.logaddexp.reduce(detection.noise))
-    if noise is not None:  # a sensor with a noise of its own is no usual one
-        nothing = float(detection.noise[0])
+    # A sensor with a noise of its own is no usual one.
+    usual = detection.noise if noise is None else detection.noise[:1]
+    nothing = float(np.logaddexp.reduce(usual))
+    z, unknown = problem.residuals.z, problem.field.unknown
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
     if noise is not None:
         any_level = Evidence(Level((1.0,), (DOUBTED,), known=True), problem.evidence.redundancy)
-        larger = any_level.of_noise(problem.residuals.z @ problem.residuals.z)
-        odds[LEVEL_OF_NOISE] = float(larger[0]) - nothing
-    z, unknown = problem.residuals.z, problem.field.unknown
+        odds[LEVEL_OF_NOISE] = float(any_level.of_noise(z @ z)[0]) - nothing
     if unknown is not None:
         odds |= {
             called(place): log - nothing
@@ -192,15 +190,9 @@ def sensor_evidence(
         by_chance=by_chance,
         tested=names,
         observed=np.array([detection.densities[name] - nothing for name in names]),
-        sigma=_sigma_of(base.solution),
         redundancy=base.solution.redundancy,
         residuals=z * _sigma_stated(base.solution),
     )
-
-
-def _sigma_of(fit: Solution) -> float:
-    """Noise of a position mean by the residuals, m/s²."""
-    return max(_sigma_stated(fit) * float(np.sqrt(fit.omega / fit.redundancy)), LEAST_SIGMA)
 
 
 def _sigma_stated(fit: Solution) -> float:
@@ -237,12 +229,6 @@ def mean_sensor(
     return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
 
 
-COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
-"""What a position has beside its forces."""
-SAME = 0.15
-"""Largest difference of the directions of forces in positions that are the same."""
-
-
 def _alike(one: Campaign, other: Campaign) -> bool:
     """Whether two campaigns were in the same positions, and have the same columns."""
     if one.forces.shape != other.forces.shape:
@@ -253,18 +239,12 @@ def _alike(one: Campaign, other: Campaign) -> bool:
     return bool(np.max(abs(a - b)) < SAME)
 
 
-def lot_noise(
-    campaigns: Iterable[Campaign],
-    models: Iterable[SensorModel],
-    approach: Approach | None,
-) -> LotNoise:
-    """Noise of a type by the calibrations of its sensors, each with a model."""
-    fits = [
-        fit_base(campaign, model, approach or usual_approach(campaign)).solution
-        for campaign, model in zip(campaigns, models, strict=True)
-    ]
-    sigmas = np.array([_sigma_of(fit) for fit in fits])
-    return LotNoise.of(sigmas, np.array([fit.redundancy for fit in fits]))
+def lot_noise(fits: Sequence[Solution]) -> LotNoise:
+    """Noise of a type by the calibrations of its sensors."""
+    redundancies = np.array([fit.redundancy for fit in fits])
+    factors = np.sqrt(np.array([fit.omega for fit in fits]) / redundancies)
+    sigmas = np.array([_sigma_stated(fit) for fit in fits]) * factors
+    return LotNoise.of(np.maximum(sigmas, LEAST_SIGMA), redundancies)
 
 
 def called(place: tuple[str, str]) -> str:

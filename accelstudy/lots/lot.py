@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -20,10 +21,11 @@ from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
+from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.lots.evidence import (
     COMMON,
     DRAWS,
-    LEVEL_OF_NOISE,
+    LotNoise,
     SensorEvidence,
     is_noise,
     lot_classes,
@@ -31,7 +33,7 @@ from accelstudy.lots.evidence import (
     mean_sensor,
     sensor_evidence,
 )
-from accelstudy.lots.mixture import Mixture, lot_odds
+from accelstudy.lots.mixture import Mixture, Names, lot_odds
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
@@ -146,13 +148,13 @@ class Pass:
             ]
             for each in self.sensors
         ]
-        pairs: dict[tuple[int, int], Array] = {}
+        pairs: dict[Names, Array] = {}
         for i, each in enumerate(self.sensors):
             for both, log in self._pairs(each).items():
                 pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        common: dict[tuple[int, ...], float] = {}
+        common: dict[Names, float] = {}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise.
             of_mean = {name: log for name, log in mean.odds.items() if not is_noise(name)}
@@ -162,14 +164,13 @@ class Pass:
                 for k, members in enumerate(self.classes)
                 if members[0] in of_mean
             }
-            for both, log in self._pairs(mean).items():
-                common[both] = log
+            common |= self._pairs(mean)
         return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common)
 
-    def _pairs(self, each: SensorEvidence) -> dict[tuple[int, int], float]:
+    def _pairs(self, each: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
         place = {name: k for k, members in enumerate(self.classes) for name in members}
-        pairs: dict[tuple[int, int], float] = {}
+        pairs: dict[Names, float] = {}
         for (one, other), log in each.pairs.items():
             if one in place and other in place and place[one] != place[other]:
                 first, second = sorted((place[one], place[other]))
@@ -261,9 +262,11 @@ class Pass:
 
     def without_odd(self) -> Pass:
         """The same without the sensors that are odd."""
-        odd = {one.campaign for one in self.odd}
+        if not (odd := {one.campaign for one in self.odd}):
+            return self
         return replace(self, sensors=tuple(e for e in self.sensors if e.campaign not in odd))
 
+    @cached_property
     def each(self) -> list[tuple[tuple[str, ...], float]]:
         """Names of what a sensor lacks under the lot, and their posterior, for each sensor."""
         lacks, odd = self.mixture.sensors
@@ -329,10 +332,6 @@ class Lot:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
-    @cached_property
-    def _each(self) -> dict[Pass, list[tuple[tuple[str, ...], float]]]:
-        return {one: one.each() for one in self.passes}
-
     @property
     def odd(self) -> list[Odd]:
         """Odd sensors, with all that was found in the model; the surest first."""
@@ -345,7 +344,7 @@ class Lot:
         for i, sensor in enumerate(self.sensors):
             names, probability = tuple[str, ...](), 1.0
             for k, one in enumerate(self.passes, start=1):
-                of_pass, posterior = self._each[one][i]
+                of_pass, posterior = one.each[i]
                 kept = {*told, ODD} if k == len(self.passes) else told
                 names += tuple(name for name in of_pass if name in kept)
                 probability *= posterior
@@ -358,7 +357,6 @@ def weigh_lot(
     model: SensorModel,
     approach: Approach | None = None,
     seed: int = 1,
-    first: Sequence[SensorEvidence] | None = None,
 ) -> Lot:
     """Say what sensors of one type lack together.
 
@@ -368,7 +366,6 @@ def weigh_lot(
     model : SensorModel
     approach : Approach; by default robot-aided where a campaign has the robot's angles
     seed : int, of the draws
-    first : evidence of each campaign, if it is known
 
     Raises
     ------
@@ -376,18 +373,13 @@ def weigh_lot(
         If a campaign does not determine the model, or leaves no redundancy.
     """
 
-    def weighed(with_: SensorModel, *, by_lot: bool = True) -> Pass:
-        models = [with_ if _shows(one, with_, approach) else model for one in campaigns]
-        noise = lot_noise(campaigns, models, approach) if by_lot else None
+    def weighed(models: Sequence[SensorModel], with_: SensorModel, noise: LotNoise | None) -> Pass:
         each = zip(campaigns, models, strict=True)
         progress = track(each, "evidence of the sensors", len(campaigns))
         sensors = [
             sensor_evidence(campaign, own, approach, seed + i, noise)
             for i, (campaign, own) in enumerate(progress)
         ]
-        return with_mean(sensors, with_)
-
-    def with_mean(sensors: Sequence[SensorEvidence], with_: SensorModel) -> Pass:
         odd, mean = {one.campaign for one in Pass(tuple(sensors)).odd}, None
         usual = [k for k, one in enumerate(sensors) if one.campaign not in odd]
         of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
@@ -396,33 +388,38 @@ def weigh_lot(
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
         return Pass(tuple(sensors), mean)
 
-    now = weighed(model, by_lot=False) if first is None else with_mean(first, model)
+    def again(with_: SensorModel) -> Pass:
+        fits = [_fitted(campaign, with_, model, approach) for campaign in campaigns]
+        return weighed([fit.model for fit in fits], with_, lot_noise(fits))
+
+    now = weighed([model] * len(campaigns), model, None)
     passes, whole = [now], model
     effects: list[tuple[Found, str | None]] = []
+    new = _new(now, whole, effects)
     for _ in range(PASSES):
-        found = _new(now, whole, effects)
-        specs = now.specs(k for k, _ in found)
-        effects += [(one, specs.get(k)) for k, one in found]
+        specs = now.specs(k for k, _ in new)
+        effects += [(one, specs.get(k)) for k, one in new]
         whole = extended(whole, specs.values())
-        now = weighed(whole)
+        now = again(whole)
         passes.append(now)
-        if not _new(now, whole, effects):
+        if not (new := _new(now, whole, effects)):
             break
     nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
-    explained = not nameless and _explained(now, whole, weighed, len(effects))
+    explained = not nameless and _explained(now, whole, again, len(effects))
     if not explained:
         close = tuple(found.names for found, spec in effects if spec is not None)
         return Lot(tuple(passes), model, close=close, explained=False)
     return Lot(tuple(passes), whole, tuple(effects))
 
 
-def _shows(campaign: Campaign, model: SensorModel, approach: Approach | None) -> bool:
-    """Whether a campaign determines a model, with redundancy."""
-    try:
-        fit_base(campaign, model, approach or usual_approach(campaign))
-    except InputError:
-        return False
-    return True
+def _fitted(
+    campaign: Campaign, whole: SensorModel, model: SensorModel, approach: Approach | None
+) -> Solution:
+    """Calibrate a sensor with the whole model, or with a smaller one if it determines no more."""
+    approach = approach or usual_approach(campaign)
+    with suppress(InputError):
+        return fit_base(campaign, whole, approach).solution
+    return fit_base(campaign, model, approach).solution
 
 
 def _new(
@@ -443,7 +440,7 @@ def _has(model: SensorModel, names: Sequence[str]) -> bool:
 def _explained(
     now: Pass,
     whole: SensorModel,
-    weighed: Callable[[SensorModel], Pass],
+    again: Callable[[SensorModel], Pass],
     known: int,
 ) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
@@ -455,15 +452,15 @@ def _explained(
         if not spec or known >= PASSES:
             return False
         whole, known = extended(whole, spec.values()), known + 1
-        now = weighed(whole)
+        now = again(whole)
     return True
 
 
 def _kind(name: str) -> str:
     """Which of `WEIGHTS` something has; things of one kind share it evenly."""
-    if name.startswith(UNKNOWN) and name != COMMON:
-        return UNKNOWN
-    return name if name == COMMON or is_noise(name) else EFFECT
+    if name in WEIGHTS:
+        return name
+    return UNKNOWN if name.startswith(UNKNOWN) else EFFECT
 
 
 def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:

@@ -76,7 +76,7 @@ class Mixture:
     """
 
     odds: Array
-    pairs: Mapping[tuple[int, int], Array]
+    pairs: Mapping[Names, Array]
     prior: Array
     common: Mapping[Names, float]
     sets: list[Weighted]
@@ -85,7 +85,7 @@ class Mixture:
     def of(
         cls,
         odds: Array,
-        pairs: Mapping[tuple[int, int], Array],
+        pairs: Mapping[Names, Array],
         prior: Array,
         common: Mapping[Names, float] | None = None,
     ) -> Mixture:

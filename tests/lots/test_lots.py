@@ -43,7 +43,7 @@ def sensor(name, odds, rng):
     known = dict(zip(NAMES, odds.tolist(), strict=True))
     pairs = {(a, b): known[a] + known[b] for a, b in product(NAMES, NAMES) if a < b}
     return SensorEvidence(name, 0.5, known, pairs, tuple((n,) for n in NAMES), {}, by_chance,
-                          NAMES, odds, 1.0, 10, np.zeros(1))  # fmt: skip
+                          NAMES, odds, 10, np.zeros(1))  # fmt: skip
 
 
 def lot_of(lacks, rng):
@@ -138,7 +138,7 @@ def test_names_that_no_campaign_tells_apart_are_one_class():
     def shows(*classes):
         odds = {name: 1.0 - i / 10 for i, name in enumerate(sorted(n for c in classes for n in c))}
         return SensorEvidence("c", 0.5, odds, {}, classes, {}, np.zeros((1, 0)), (), np.zeros(0),
-                              1.0, 10, np.zeros(1))  # fmt: skip
+                              10, np.zeros(1))  # fmt: skip
 
     together = [shows(("a", "b"), ("c",))] * 2
     assert lot_classes(together) == [("a", "b"), ("c",)]
@@ -170,7 +170,7 @@ def test_the_mean_of_sensors_has_their_noise_over_the_root_of_their_number():
     model = get_model("bias-scale-nonorthogonality")
     each = weigh_lot(made, model).sensors
     mean, noise = mean_sensor(made, each)
-    sigma = np.sqrt(np.mean([one.sigma**2 for one in each]) / 9)
+    sigma = np.sqrt(np.mean([np.sum(e.residuals**2) / e.redundancy for e in each]) / 9)
     assert noise.sigma == pytest.approx(sigma, rel=0.2)
     np.testing.assert_allclose(mean.forces, np.mean([one.forces for one in made], axis=0))
     turned = replace(made[0], forces=made[0].forces[::-1])

@@ -116,9 +116,7 @@ def _lot():
     """Content of lot.json, of sensors that lack the same."""
     name, odds, by_chance = "thermal_bias", np.array([20.0]), np.zeros((1000, 1))
     each = [
-        SensorEvidence(
-            c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds, 1.0, 9, odds
-        )
+        SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds, 9, odds)
         for c in "abc"
     ]
     one = Pass(tuple(each))
