@@ -11,14 +11,13 @@ import logging
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from itertools import combinations
 from multiprocessing import Pool
 
 import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
+from accelstudy.hidden.cells import distinct_pairs
 from accelstudy.hidden.judging import all_true
 from accelstudy.hidden.physics import (
     APPROACHES,
@@ -28,7 +27,6 @@ from accelstudy.hidden.physics import (
     visible_outside,
     visible_unforeseen,
 )
-from accelstudy.hidden.physics.atlas import atlas
 from accelstudy.hidden.physics.lots import LotCase, generate_lot
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
@@ -56,15 +54,10 @@ def single(design, approach):
     return [(name,) for name in visible_effects(design, approach)]
 
 
-@cache
 def pairs(design, approach):
-    """Two effects that a session shows and tells apart."""
-    seen = atlas(design, approach)
-    alike = {name: set() for name in seen.visible}
-    for shape in seen.shapes:
-        alike[shape.effect.name].update(seen.same_as(shape))
-    told = [(a, b) for a, b in combinations(seen.visible, 2) if b not in alike[a]]
-    return told + [(b, a) for a, b in told]
+    """Two effects that a session shows and tells apart, in either order."""
+    told = distinct_pairs(design, approach)
+    return [*told, *(pair[::-1] for pair in told)]
 
 
 def elsewhere(design, approach):

@@ -17,9 +17,10 @@ from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.holds import DetectedHolds, hold_noise
+from accelstudy.campaign.importing.logs import open_layout
 from accelstudy.campaign.importing.making import ImportReport, shown
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.recording import AXES, Log, locate, open_log
+from accelstudy.campaign.importing.recording import AXES, Log, locate
 from accelstudy.campaign.importing.segments import WANDERING, GrowingHold, Segment
 from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.reference import ReferenceSensor
@@ -306,19 +307,7 @@ def _opened(given: ReferenceLog, calibration: Calibration) -> Log:
     layout = LogLayout.model_validate(overlay({**source.layout}, known))
     own = {key: place for key, place in layout.columns.items() if key in AXES}
     try:
-        return open_log(
-            given.log,
-            columns=columns or own,
-            time=layout.time,
-            rate=layout.rate_hz,
-            unit=layout.unit,
-            scale=layout.scale,
-            offset=layout.offset,
-            time_unit=layout.time_unit,
-            variable=layout.variable,
-            frame=layout.axes,
-            source=source,
-        )
+        return open_layout(given.log, layout.model_copy(update={"columns": columns or own}), source)
     except InputError as error:
         said = str(error).split("; give the column of time")[0]
         raise InputError(

@@ -18,6 +18,7 @@ from accelstudy.commands.options import (
     angle_unit_option,
     example,
     force_option,
+    given_once,
     quiet_option,
 )
 from accelstudy.commands.plan import Confidence
@@ -88,9 +89,7 @@ def history_command(
     from accelstudy.epochs.interval import Interval
     from accelstudy.files.outputs import HISTORY, result_folder
 
-    for i, path in enumerate(calibrations):
-        if path.resolve() in [other.resolve() for other in calibrations[:i]]:
-            raise InputError(f"{path}: is given twice; each calibration counts once")
+    given_once(calibrations, "calibration")
     if dates and len(dates) != len(calibrations):
         raise InputError(
             f"--date: {counted(len(dates), 'date')} for "

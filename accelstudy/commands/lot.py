@@ -15,6 +15,7 @@ from accelstudy.commands.options import (
     approach_option,
     example,
     force_option,
+    given_once,
     model_option,
     quiet_option,
     seed_option,
@@ -54,9 +55,7 @@ def lot_command(
     folders = [path for given in campaigns for path in _folders(given)]
     if len(folders) < 2:
         raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-    for i, folder in enumerate(folders):
-        if folder.resolve() in [other.resolve() for other in folders[:i]]:
-            raise InputError(f"{folder}: is given twice; each sensor counts once")
+    given_once(folders, "sensor")
     chosen = get_model(model), None if approach is None else get_approach(approach)
     with result_folder(out, LOT, folders, force) as results:
         measured = [read_campaign(folder) for folder in folders]
@@ -64,7 +63,7 @@ def lot_command(
         fits = calibrations(lot, measured, chosen[1])
         found = with_sizes(lot, fits, chosen[0])
         of_first = chosen[1] or usual_approach(measured[0])
-        content = write_lot(lot, found, fits, chosen[0], of_first, results, out)
+        content = write_lot(lot, found, fits, of_first, results, out)
     click.echo(content["verdict"])
     say(f"report: {out / 'report.html'}")
 

@@ -258,6 +258,15 @@ class Sectioned(click.Command):
                 formatter.write_dl(records)
 
 
+def given_once(paths: Sequence[Path], what: str) -> None:
+    """Raise `InputError` if a path is given twice of which each stands for one thing."""
+    seen = set()
+    for path in paths:
+        if (place := path.resolve()) in seen:
+            raise InputError(f"{path}: is given twice; each {what} counts once")
+        seen.add(place)
+
+
 def example(*commands: str) -> str:
     """Epilog of a help text: commands that run as they stand, one after the other."""
     return "\n".join(["\b", "Example:", *(f"  {command}" for command in commands)])

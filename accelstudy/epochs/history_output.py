@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import estimate
-from accelstudy.campaign.calibration.document import json_text
+from accelstudy.campaign.calibration.document import write_json
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import COLUMN, FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.history import YEAR, History
 from accelstudy.epochs.interval import LONGEST, SHOWN, Interval
-from accelstudy.epochs.output import STATES, largest
-from accelstudy.files.outputs import whole_file
+from accelstudy.epochs.output import STATES, change_of, largest
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines, write_page
 
@@ -37,14 +36,11 @@ def history_said(history: History, interval: Interval | None = None) -> list[str
     for course, parameter, found in zip(
         history.courses, history.parameters, history.found, strict=True
     ):
-        unit = shown_unit(parameter.unit)
         if "drifts" in found:
-            value, sigma = estimate(*course.rate, parameter.unit)
-            sign = "" if value.startswith("−") else "+"
-            rates.append(f"{parameter.name} by {sign}{value} ± {sigma} {unit}".strip())
+            rates.append(change_of(parameter, *course.rate))
         if "scatters" in found:
             size = estimate(course.line.scatter, course.line.scatter, parameter.unit)[1]
-            scatters.append(f"{parameter.name} by {size} {unit}".strip())
+            scatters.append(f"{parameter.name} by {size} {shown_unit(parameter.unit)}".strip())
         if "changed" in found:
             others.append(parameter.name)
     least = [
@@ -155,8 +151,7 @@ def write_history(
         figures=drawn,
     )
     write_frame(folder / "history.parquet", history_table(history))
-    with whole_file(folder / "history.json") as path:
-        path.write_text(json_text(content), encoding="utf-8")
+    write_json(folder / "history.json", content)
     return content
 
 

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import estimate
-from accelstudy.campaign.calibration.document import json_number, json_text
+from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.effects import Parameter
 from accelstudy.epochs.comparison import Comparison
 from accelstudy.epochs.congruence import LEVEL
-from accelstudy.files.outputs import whole_file
 from accelstudy.pages import lines, write_page
 
 STATES = {True: "unchanged", False: "changed"}
@@ -51,10 +50,15 @@ def largest(
 
 def _change(c: Comparison, place: int) -> str:
     """Name a parameter with its change."""
-    parameter, sigma = c.parameters[place], float(np.sqrt(c.epochs.covariance[place, place]))
-    value, uncertain = estimate(float(c.epochs.differences[place]), sigma, parameter.unit)
-    sign = "" if value.startswith("−") else "+"
-    return f"{parameter.name} by {sign}{value} ± {uncertain} {shown_unit(parameter.unit)}".strip()
+    sigma = float(np.sqrt(c.epochs.covariance[place, place]))
+    return change_of(c.parameters[place], float(c.epochs.differences[place]), sigma)
+
+
+def change_of(parameter: Parameter, value: float, sigma: float) -> str:
+    """Name a parameter with its change, or its rate, and the sigma of that; in SI."""
+    shown, uncertain = estimate(value, sigma, parameter.unit)
+    sign = "" if shown.startswith("−") else "+"
+    return f"{parameter.name} by {sign}{shown} ± {uncertain} {shown_unit(parameter.unit)}".strip()
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
@@ -117,8 +121,7 @@ def write_comparison(comparison: Comparison, folder: str | Path) -> dict[str, An
         lines=sentences,
         figures=drawn,
     )
-    with whole_file(folder / "comparison.json") as path:
-        path.write_text(json_text(content), encoding="utf-8")
+    write_json(folder / "comparison.json", content)
     return content
 
 

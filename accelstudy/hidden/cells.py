@@ -198,14 +198,14 @@ def _kinds(config: HiddenConfig) -> Iterator[tuple[list[Case], int]]:
                 [
                     Case("two", *place, effect=pair, lam=(size, size))
                     for place in places
-                    for pair in _pairs(*place[:2])
+                    for pair in distinct_pairs(*place[:2])
                 ],
                 config.two.campaigns,
             )
 
 
 @cache
-def _pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
+def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
     """All two effects that a session can show, and that do not mean the same in it."""
     seen = atlas(design, approach)
     alike: dict[str, set[str]] = {name: set() for name in seen.visible}

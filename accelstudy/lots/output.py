@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import json_number, json_text
+from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
 from accelstudy.drawing.saving import save_all
@@ -36,7 +36,6 @@ from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import LEVEL, Found, Lot
 from accelstudy.pages import lines, write_page
 from accelstudy.sensors.models import MODEL_FILE
-from accelstudy.sensors.sensor import SensorModel
 
 EACH = "each"
 """Folder of the calibrations of the sensors."""
@@ -119,7 +118,6 @@ def write_lot(
     lot: Lot,
     found: Sequence[Found],
     fits: Sequence[CampaignFit | InputError],
-    model: SensorModel,
     approach: Approach,
     folder: str | Path,
     place: str | Path = "",
@@ -131,7 +129,6 @@ def write_lot(
     lot : Lot
     found : of `with_sizes`
     fits : of `calibrations`
-    model : SensorModel, of the diagnosis
     approach : Approach, of the first campaign
     folder : path, to write to
     place : path of the results, for the commands that the page gives
@@ -149,12 +146,10 @@ def write_lot(
             name = re.sub(r"[^\w.-]+", "-", fit.campaign.name)
             its_own = folder / EACH / f"{i:04d}-{name}"
             its_own.mkdir(parents=True)
-            with whole_file(its_own / "calibration.json") as path:
-                text = json_text(calibration_content(fit, assess(fit)))
-                path.write_text(text, encoding="utf-8")
-    whole, steps = lot.model, []
-    if lot.explained and len(whole.effects) > len(model.effects):
-        effects = [effect.spec for effect in whole.effects]
+            write_json(its_own / "calibration.json", calibration_content(fit, assess(fit)))
+    steps = []
+    if any(spec is not None for _, spec in lot.effects):
+        effects = [effect.spec for effect in lot.model.effects]
         with whole_file(folder / MODEL_FILE) as path:
             path.write_text(yaml.safe_dump({"models": {"type": effects}}), encoding="utf-8")
         command = suggested.calibrate("CAMPAIGN", Path(place) / MODEL_FILE, approach.name)
@@ -173,8 +168,7 @@ def write_lot(
         figures=drawn,
         next_steps=steps,
     )
-    with whole_file(folder / "lot.json") as path:
-        path.write_text(json_text(content), encoding="utf-8")
+    write_json(folder / "lot.json", content)
     return content
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.session import Campaign
+from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import compose
@@ -282,6 +284,12 @@ def json_number(value: Any) -> float | None:
 def json_text(content: Any) -> str:
     """JSON for a file; what is no finite number is null, or the file could not be read again."""
     return json.dumps(_without_nan(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Write a JSON file, whole or not at all."""
+    with whole_file(path) as part:
+        part.write_text(json_text(content), encoding="utf-8")
 
 
 def _without_nan(content: Any) -> Any:

@@ -16,14 +16,13 @@ from accelstudy.campaign.calibration.assessment import Assessment, assess
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
-    json_text,
     quality_document,
+    write_json,
 )
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import next_steps, verdict_lines
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, approach_colour, ink_on, new_figure, symbol
-from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
 
@@ -80,8 +79,7 @@ def write_calibration(
         figures=drawn,
         next_steps=next_steps(fit, assessment.state, source, Path(place) / HERE),
     )
-    with whole_file(folder / "calibration.json") as path:
-        path.write_text(json_text(content), encoding="utf-8")
+    write_json(folder / "calibration.json", content)
     return content
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
@@ -48,18 +49,23 @@ def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) ->
     """Open a log by the settings; see `open_log` for `untimed`."""
     source = open_source(path, settings.variable)
     settings = as_its_format(settings, source)
+    return open_layout(path, settings, source, untimed or settings.block is not None)
+
+
+def open_layout(path: str | Path, layout: LogLayout, source: Source, untimed: bool = False) -> Log:
+    """Open a log by its layout; see `open_log` for `untimed`."""
     return open_log(
         path,
-        columns=settings.columns,
-        time=settings.time,
-        rate=settings.rate_hz,
-        untimed=untimed or settings.block is not None,
-        unit=settings.unit,
-        scale=settings.scale,
-        offset=settings.offset,
-        time_unit=settings.time_unit,
-        variable=settings.variable,
-        frame=settings.axes,
+        columns=layout.columns,
+        time=layout.time,
+        rate=layout.rate_hz,
+        untimed=untimed,
+        unit=layout.unit,
+        scale=layout.scale,
+        offset=layout.offset,
+        time_unit=layout.time_unit,
+        variable=layout.variable,
+        frame=layout.axes,
         source=source,
     )
 

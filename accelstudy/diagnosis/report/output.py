@@ -17,7 +17,7 @@ from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.applying import needs_of
 from accelstudy.campaign.calibration.device import unknown
-from accelstudy.campaign.calibration.document import json_text
+from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.decision.priors import SURE
@@ -109,14 +109,12 @@ def write_diagnosis(
     write_frame(folder / "positions.parquet", positions)
     calibration = _calibration(diagnosis, document)
     if calibration is not None:
-        with whole_file(folder / "calibration.json") as path:
-            path.write_text(json_text(calibration), encoding="utf-8")
+        write_json(folder / "calibration.json", calibration)
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
     _write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
-    with whole_file(folder / "diagnosis.json") as path:
-        path.write_text(json_text(document), encoding="utf-8")
+    write_json(folder / "diagnosis.json", document)
     return document
 
 
