@@ -137,6 +137,10 @@ class CalibrationProblem:
         initial = np.zeros((len(forces), equations.n_parameters + shared))
         direct, weights = np.zeros_like(initial), np.zeros(initial.shape[1])
         weights[:u] = model.prior_weights
+        for k, name in enumerate(model.parameter_names):
+            if name in observed.known:
+                direct[:, k], sigma = observed.known[name]
+                weights[k] = sigma**-2
         weights[u : u + shared] = 1.0
         if observed.initial is not None:
             initial[:, :u] = observed.initial

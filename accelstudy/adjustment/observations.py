@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 
 AngleErrors = Callable[[Array], tuple[Array, Array]]
+Known = Mapping[str, tuple[float, float]]
+"""What is known of parameters a priori: mean and sigma, SI, by the name of the parameter."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Observations:
     sigma_gravity : float, m/s²; 0 holds gravity fixed
     hold : HoldConditions, of the positions
     initial : (u,) array, SI, initial values of the model's parameters; an ideal sensor if None
+    known : mapping of str to (mean, sigma), SI, what is known a priori of parameters, in place of
+        what effects say of them
     common : (n, 2, k) array, rad, errors of the angles that all positions share: derivatives by k
         unknown numbers that are 0 ± 1; None if the errors of the positions are independent
     angle_errors : function of angles (k, 2), rad, optional: `sigma_angle` and `common` in other
@@ -47,6 +51,7 @@ class Observations:
     sigma_gravity: float = 0.0
     hold: HoldConditions | None = None
     initial: Array | None = None
+    known: Known = field(default_factory=dict)
     common: Array | None = None
     angle_errors: AngleErrors | None = None
     slope: Array | None = None

@@ -24,14 +24,18 @@ def export(form: str, calibration: str | Path) -> str:
     return _line("export", Path(calibration), "--form", form)
 
 
-def calibrate(campaign: str | Path, model: str | Path, approach: str) -> str:
+def calibrate(
+    campaign: str | Path, model: str | Path, approach: str, prior: str | Path | None = None
+) -> str:
     """Calibrate a campaign."""
-    return _of_campaign("calibrate", campaign, model, approach, "calibrated")
+    return _of_campaign("calibrate", campaign, model, approach, prior, "calibrated")
 
 
-def diagnose(campaign: str | Path, model: str | Path, approach: str) -> str:
+def diagnose(
+    campaign: str | Path, model: str | Path, approach: str, prior: str | Path | None = None
+) -> str:
     """Find what a model lacks to explain a campaign."""
-    return _of_campaign("diagnose", campaign, model, approach, "diagnosis")
+    return _of_campaign("diagnose", campaign, model, approach, prior, "diagnosis")
 
 
 def study_again(configuration: Path) -> str:
@@ -55,9 +59,16 @@ def new_name(folder: str | Path, what: str) -> Path:
 
 
 def _of_campaign(
-    command: str, campaign: str | Path, model: str | Path, approach: str, what: str
+    command: str,
+    campaign: str | Path,
+    model: str | Path,
+    approach: str,
+    prior: str | Path | None,
+    what: str,
 ) -> str:
     path, chosen = Path(campaign), ["--model", model, "--approach", approach]
+    if prior is not None:
+        chosen += ["--prior", prior]
     out = new_name(path, what)
     if Path.cwd().is_relative_to(path.resolve()):  # nothing is written into a campaign
         out = path / os.pardir / new_name(path.resolve().name, what)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import COLUMNS, LogLayout
+from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.conversion import Conversion
@@ -39,6 +40,7 @@ class Campaign:
     angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
     sigma_angle : float, rad, of a level hold; None without a robot
     reference : ReferenceSensor, optional, which gave the angles instead of a robot
+    of_type : SensorType, optional, what other sensors of the type tell of this one
     n_samples : (n,) int array, optional
     sd : (n, 3) array, m/s², optional, sd of the samples within the holds
     slope, sd_slope : (n, 3) arrays, m/s²/s, optional, slope of the samples within the holds, and
@@ -80,6 +82,7 @@ class Campaign:
     reasons: Mapping[int, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
+    of_type: SensorType | None = None
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {counted(self.n_positions, 'position')})"

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 POLL = 1.0
 """Seconds between two looks at a growing table."""
+TYPES = (".yaml", ".yml")
+"""Endings of files of a type."""
 SECTIONS = {
     "What is wanted": ("tilt_accuracy", "tilt_range"),
     "The calibration": ("approach", "model", "prior"),
@@ -57,7 +59,11 @@ SECTIONS = {
 )
 @approach_option(None)
 @model_option
-@click.option("--prior", type=PATH, help="An earlier calibration.json with the same model.")
+@click.option(
+    "--prior",
+    type=PATH,
+    help="An earlier calibration.json with the same model, or the type.yaml of a lot.",
+)
 @click.option(
     "--attitudes",
     help="Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of "
@@ -132,7 +138,8 @@ def advise_command(
         for line in lines(advice, now, sensor, promise):
             show(f"  {line}")
         if advice.enough:
-            show(f"  calibrate: {calibrate(campaign, model, name)}")
+            of_type = prior if prior and prior.suffix in TYPES else None
+            show(f"  calibrate: {calibrate(campaign, model, name, of_type)}")
 
     for warning in now.warnings:
         warn(warning)
@@ -156,17 +163,21 @@ def advise_command(
 
 
 def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
-    """What an earlier calibration says; nothing without one."""
+    """What an earlier calibration, or a type, says; nothing without one."""
     if path is None:
         return ()
     import numpy as np
 
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.of_type import read_type
     from accelstudy.sensors.models import get_model
     from accelstudy.sequential.information import Prior
 
-    earlier, wanted = read_calibration(path), get_model(model)
+    wanted = get_model(model)
+    if path.suffix in TYPES:
+        return (Prior.of_known(read_type(path, wanted).known, wanted),)
+    earlier = read_calibration(path)
     if earlier.model.parameter_names != wanted.parameter_names:
         raise InputError(
             f"{path}: calibrates {', '.join(earlier.model.parameter_names)}, but the model "

@@ -14,6 +14,7 @@ from accelstudy.commands.options import (
     example,
     force_option,
     model_option,
+    prior_option,
     quiet_option,
 )
 
@@ -23,10 +24,13 @@ from accelstudy.commands.options import (
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
 @model_option
 @approach_option("gravity")
+@prior_option
 @force_option
 @angle_unit_option
 @quiet_option
-def calibrate_command(campaign: Path, model: str, approach: str, out: Path, force: bool) -> None:
+def calibrate_command(
+    campaign: Path, model: str, approach: str, prior: Path | None, out: Path, force: bool
+) -> None:
     """Calibrate a CAMPAIGN (a folder) and report on it.
 
     The folder of results gets report.html for you, calibration.json for `apply`, `export` and
@@ -40,13 +44,15 @@ def calibrate_command(campaign: Path, model: str, approach: str, out: Path, forc
     from accelstudy.campaign.calibration.output import write_calibration
     from accelstudy.campaign.calibration.wording import interval_words, next_steps
     from accelstudy.campaign.format import read_campaign
+    from accelstudy.campaign.of_type import with_type
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
     from accelstudy.sensors.models import get_model
 
     chosen = get_model(model), get_approach(approach)
-    with result_folder(out, CALIBRATION, [campaign], force) as folder, stage("calibration"):
-        measured = read_campaign(campaign)
+    inputs = [campaign] if prior is None else [campaign, prior]
+    with result_folder(out, CALIBRATION, inputs, force) as folder, stage("calibration"):
+        measured = with_type(read_campaign(campaign), prior, chosen[0])
         fit = fit_campaign(measured, *chosen)
         content = write_calibration(fit, folder, campaign, out)
     for warning in measured.warnings:

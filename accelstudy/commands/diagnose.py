@@ -15,6 +15,7 @@ from accelstudy.commands.options import (
     example,
     force_option,
     model_option,
+    prior_option,
     quiet_option,
     seed_option,
 )
@@ -25,6 +26,7 @@ from accelstudy.commands.options import (
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
 @model_option
 @approach_option(None)
+@prior_option
 @seed_option
 @click.option(
     "--replicates",
@@ -41,6 +43,7 @@ def diagnose_command(
     out: Path,
     model: str,
     approach: str | None,
+    prior: Path | None,
     seed: int,
     replicates: int,
     force: bool,
@@ -60,7 +63,7 @@ def diagnose_command(
         gc.freeze()
         gc.enable()
 
-    diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force)
+    diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force, prior)
     for warning in diagnosis.campaign.warnings:
         warn(warning)
     if diagnosis.recognised is not None:

@@ -142,6 +142,12 @@ def approach_option(default: str | None) -> Callable[[Command], Command]:
     )
 
 
+prior_option = click.option(
+    "--prior",
+    type=PATH,
+    help="The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
+)
+
 history_option = click.option(
     "--history",
     type=PATH,

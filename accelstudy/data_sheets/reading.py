@@ -13,6 +13,7 @@ from typing import Any
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.plugins import installed, label, one_line
 from accelstudy.basics.units import parse_quantity
+from accelstudy.campaign.of_type import TYPE_KEYS
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
 from accelstudy.files.reading import read_layer
 
@@ -60,7 +61,8 @@ def read_data_sheet(path: str | Path) -> DataSheet:
 def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> DataSheet:
     """Make a data sheet of the content of a YAML file.
 
-    A quantity is a text with its unit, or a mapping with such a `value` and its `source`.
+    A quantity is a text with its unit, or a mapping with such a `value` and its `source`. The file
+    of a type, which `accelstudy lot` writes, says more, which is left out.
 
     Raises
     ------
@@ -72,6 +74,8 @@ def parse_data_sheet(content: Mapping[str, Any], source: str = "data sheet") -> 
     sources: dict[str, str] = {}
     try:
         for key, given in content.items():
+            if key in TYPE_KEYS:
+                continue
             if key not in keys:
                 raise UnknownNameError("key", key, keys)
             if key not in TEXTS:

@@ -85,7 +85,7 @@ POLE = Kind(
 )
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
 HISTORY = Kind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
-LOT = Kind("lot", "lot.json", ("model.yaml", "report.html"), ("figures", "each"))
+LOT = Kind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
 PLAN = Kind(
     "plan",
     "plan.parquet",

@@ -126,10 +126,12 @@ class Pass:
     ----------
     sensors : tuple of SensorEvidence
     mean : SensorEvidence, of their mean; None if they were in different positions
+    noise : LotNoise, of the type; None where each campaign says its own
     """
 
     sensors: tuple[SensorEvidence, ...]
     mean: SensorEvidence | None = None
+    noise: LotNoise | None = None
 
     @cached_property
     def classes(self) -> list[tuple[str, ...]]:
@@ -386,7 +388,7 @@ def weigh_lot(
         if of_mean is not None:
             with suppress(InputError):  # the positions do not determine the model
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
-        return Pass(tuple(sensors), mean)
+        return Pass(tuple(sensors), mean, noise)
 
     def again(with_: SensorModel) -> Pass:
         fits = [_fitted(campaign, with_, model, approach) for campaign in campaigns]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from matplotlib.figure import Figure
 
 from accelstudy.approaches import Approach
@@ -20,6 +19,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
+from accelstudy.campaign.of_type import TYPE_FILE
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
     FULL,
@@ -31,11 +31,10 @@ from accelstudy.drawing.style import (
     say_empty,
     symbol,
 )
-from accelstudy.files.outputs import whole_file
 from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import LEVEL, Found, Lot
+from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
-from accelstudy.sensors.models import MODEL_FILE
 
 EACH = "each"
 """Folder of the calibrations of the sensors."""
@@ -122,7 +121,7 @@ def write_lot(
     folder: str | Path,
     place: str | Path = "",
 ) -> dict[str, Any]:
-    """Write lot.json, model.yaml, report.html, the figure, and a calibration of each sensor.
+    """Write lot.json, type.yaml, report.html, the figure, and a calibration of each sensor.
 
     Parameters
     ----------
@@ -148,12 +147,10 @@ def write_lot(
             its_own.mkdir(parents=True)
             write_json(its_own / "calibration.json", calibration_content(fit, assess(fit)))
     steps = []
-    if any(spec is not None for _, spec in lot.effects):
-        effects = [effect.spec for effect in lot.model.effects]
-        with whole_file(folder / MODEL_FILE) as path:
-            path.write_text(yaml.safe_dump({"models": {"type": effects}}), encoding="utf-8")
-        command = suggested.calibrate("CAMPAIGN", Path(place) / MODEL_FILE, approach.name)
-        steps.append(("Calibrate a sensor with the model of the type", command))
+    if write_type(lot, fits, folder):
+        of_type = Path(place) / TYPE_FILE
+        command = suggested.calibrate("CAMPAIGN", of_type, approach.name, of_type)
+        steps.append(("Calibrate the next sensor of the type, with what these tell", command))
     drawn = save_all({"sensors": lambda: sensors_figure(lot, found)}, folder / "figures")
     sentences = said(lot, found)
     state = "no_effect" if not lot.missing else "named" if found else "unknown"

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import cholesky
+from accelstudy.adjustment.observations import Known
 from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
 
@@ -54,6 +55,13 @@ class Prior:
         except np.linalg.LinAlgError:
             raise InputError("a covariance matrix must be positive definite") from None
         return cls(np.asarray(mean, dtype=float), np.linalg.inv(root))
+
+    @classmethod
+    def of_known(cls, known: Known, model: SensorModel) -> Prior:
+        """Return the prior of single parameters, which are independent of each other."""
+        pairs = [known.get(name, (0.0, np.inf)) for name in model.parameter_names]
+        mean, sigma = np.array(pairs).T
+        return cls(mean, np.diag(1 / sigma)[np.isfinite(sigma)])
 
     def start(self, model: SensorModel) -> Array:
         """Values of the parameters of a model, (u,); those of an ideal sensor if none are known."""

@@ -219,7 +219,7 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
         (tmp_path / "lot/each/0001-sensor-0/calibration.json").read_text(encoding="utf-8")
     )
     assert "b_T_x" in {p["name"] for p in calibrated["parameters"]}
-    model = tmp_path / "lot/model.yaml"
+    model = tmp_path / "lot/type.yaml"
     said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
     assert "ACCEPTED" in said
     assert "b_T_x" in said

@@ -48,6 +48,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "reference": None
         if fit.by_reference is None or campaign.reference is None
         else campaign.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
+        "type": None
+        if campaign.of_type is None
+        else {"file": campaign.of_type.file, "sensors": campaign.of_type.sensors},
         "axes": FRD.name,
         "unit": campaign.unit,
         "nominal": _nominal(fit),

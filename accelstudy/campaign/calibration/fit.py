@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
-from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.adjustment.observations import AngleErrors, Known
 from accelstudy.adjustment.quality import GlobalTest, global_test
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
@@ -188,7 +188,13 @@ def campaign_noise(campaign: Campaign) -> Noise:
         sigma_force=UNIT_SIGMA if campaign.sigma_force is None else campaign.sigma_force,
         sigma_angle=campaign.sigma_angle or 0.0,
         sigma_gravity=campaign.sigma_gravity,
+        known=_known(campaign),
     )
+
+
+def _known(campaign: Campaign) -> Known:
+    """What is known a priori of the parameters."""
+    return {} if campaign.of_type is None else campaign.of_type.known
 
 
 def least_sigma(campaign: Campaign, approach: Approach) -> float:
@@ -217,6 +223,7 @@ def campaign_observations(campaign: Campaign) -> Observations:
         # If the noise of the means is unknown, slopes have no weight relative to them.
         slope=campaign.slope if stated else None,
         sd_slope=campaign.sd_slope if stated else None,
+        known=_known(campaign),
     )
 
 
@@ -299,7 +306,7 @@ def fit_campaign(
             f"{_cause(campaign, theory, diagnosing)}"
         )
     fit = CampaignFit(campaign, model, approach, observed, adjustment, theory)
-    prior = model.prior_weights.any() or observed.common is not None
+    prior = model.prior_weights.any() or observed.common is not None or bool(observed.known)
     if campaign.sigma_force is None and prior and adjustment.redundancy > 0:
         # What is known a priori needs a sigma beside it: that of the residuals.
         for _ in range(3):

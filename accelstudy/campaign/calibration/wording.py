@@ -65,7 +65,8 @@ def next_steps(
     -------
     list of (purpose, command)
     """
-    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name)
+    prior = None if fit.campaign.of_type is None else fit.campaign.of_type.file
+    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name, prior)
     if state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [

@@ -19,6 +19,7 @@ from accelstudy.campaign.calibration.applying import needs_of
 from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.of_type import with_type
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.verdict import LEVEL_NOISE
@@ -51,6 +52,7 @@ def diagnose_folder(
     seed: int = 1,
     replicates: int = REPLICATES,
     force: bool = False,
+    prior: str | Path | None = None,
 ) -> Diagnosis:
     """Diagnose a campaign folder, close the loop, and write all of it.
 
@@ -61,6 +63,7 @@ def diagnose_folder(
     seed : int
     replicates : int, sessions simulated with the old and with the new model
     force : bool, as in `accelstudy.files.outputs.result_folder`
+    prior : path of the file of a type, what is known of the sensor a priori
 
     Raises
     ------
@@ -68,9 +71,10 @@ def diagnose_folder(
         If the input cannot be used, or `out` not be written; nothing is written then.
     """
     chosen = get_model(model), None if approach is None else get_approach(approach)
-    with result_folder(out, DIAGNOSIS, [campaign], force) as folder, stage("diagnosis"):
+    inputs = [campaign] if prior is None else [campaign, prior]
+    with result_folder(out, DIAGNOSIS, inputs, force) as folder, stage("diagnosis"):
         # The diagnosis, not the reader, looks for wrong units and axes.
-        measured = read_campaign(campaign, plausible=False)
+        measured = with_type(read_campaign(campaign, plausible=False), prior, chosen[0])
         with stage("search for what is missing"):
             diagnosis = diagnose(measured, *chosen, seed=seed)
         loop = close_loop(diagnosis, replicates, seed)
@@ -218,15 +222,16 @@ def next_steps(
     """
     d, steps = diagnosis, []
     chosen, result = (campaign, d.model.name, d.approach.name), Path(place) / suggested.HERE
+    prior = None if d.campaign.of_type is None else d.campaign.of_type.file
     if d.recognised is not None:
-        command = suggested.calibrate(*chosen)
+        command = suggested.calibrate(*chosen, prior)
         steps.append(("Correct the campaign, and calibrate it then", command))
     if d.verdict in ("narrowed", "unknown", "learned"):
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
-        steps.append((what, suggested.diagnose(*chosen)))
+        steps.append((what, suggested.diagnose(*chosen, prior)))
     if d.better_for_leveling == "base":
-        command = suggested.calibrate(*chosen)
+        command = suggested.calibrate(*chosen, prior)
         return [*steps, ("Calibrate with the base model, which levels better", command)]
     if calibration is None or not calibration["quality"]["plausible"]:
         return steps

@@ -1,0 +1,111 @@
+"""What other sensors of a type tell of the next one: the file that `accelstudy lot` writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from accelstudy.adjustment.observations import Known
+from accelstudy.basics.errors import InputError
+from accelstudy.files.reading import read_layer
+from accelstudy.files.validation import Finite, NotNegative, Number, checked
+from accelstudy.sensors.sensor import SensorModel
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.session import Campaign
+
+TYPE_FILE = "type.yaml"
+TYPE_KEYS = ("schema_version", "models", "sensors", "parameters")
+"""Keys of a file of a type that data sheets do not have."""
+FEWEST = 5
+"""Sensors whose scatter tells how far the next one may be away."""
+
+
+@dataclass(frozen=True)
+class SensorType:
+    """What sensors of a type tell of the next one.
+
+    Attributes
+    ----------
+    file : str
+    sensors : int, number of them
+    known : mapping of str to (mean, sigma), SI, of the parameters that all of them have
+    """
+
+    file: str
+    sensors: int
+    known: Known
+
+
+class TypicalParameter(BaseModel):
+    """A parameter over the sensors of a type, SI.
+
+    Attributes
+    ----------
+    mean : float, of the type
+    sigma : float, of the mean
+    scatter : float, from sensor to sensor, sd
+    scatter_below : float, bound of the scatter that holds in 9 of 10 lots
+    unit : str
+    in_all : bool, whether all sensors of the type have it
+    """
+
+    mean: Finite
+    sigma: NotNegative
+    scatter: NotNegative
+    scatter_below: NotNegative
+    unit: str
+    in_all: bool
+
+    @property
+    def sigma_next(self) -> float:
+        """Standard deviation of the next sensor about the mean; the scatter is at its bound."""
+        return float((self.scatter_below**2 + self.sigma**2) ** 0.5)
+
+
+class TypeFile(BaseModel):
+    """The part of a file of a type that is not that of a data sheet."""
+
+    schema_version: Annotated[Literal[1], Number]
+    models: dict[str, Any]
+    sensors: int = Field(ge=1)
+    parameters: dict[str, TypicalParameter]
+
+
+def read_type(path: str | Path, model: SensorModel) -> SensorType:
+    """Read what is known of the next sensor of a type.
+
+    Raises
+    ------
+    InputError
+        If the file is none of a type, its model is another one, or it tells of too few sensors.
+    """
+    content = read_layer(path)
+    if "parameters" not in content:
+        raise InputError(f"{path}: no file of a type; `accelstudy lot` writes one, {TYPE_FILE}")
+    known = {key: content[key] for key in TYPE_KEYS if key in content}
+    read = checked(TypeFile, known, path)
+    if tuple(read.parameters) != model.parameter_names:
+        raise InputError(
+            f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "
+            f"{', '.join(model.parameter_names)}; give --model {path}"
+        )
+    if read.sensors < FEWEST:
+        raise InputError(
+            f"{path}: sensors: {read.sensors} are too few to tell how far the next one may be "
+            f"away; {FEWEST} or more do"
+        )
+    known_of = {
+        name: (p.mean, p.sigma_next)
+        for name, p in read.parameters.items()
+        if p.in_all and p.sigma_next > 0
+    }
+    return SensorType(str(path), read.sensors, known_of)
+
+
+def with_type(campaign: Campaign, path: str | Path | None, model: SensorModel) -> Campaign:
+    """Campaign of a sensor whose type is known; as it is if there is no file of its type."""
+    return campaign if path is None else replace(campaign, of_type=read_type(path, model))

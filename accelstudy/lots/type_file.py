@@ -1,0 +1,121 @@
+"""The file of a type: its model, its parameters from sensor to sensor, and a data sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import recorded_unit, to_recorded
+from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
+from accelstudy.data_sheets import QUANTITIES
+from accelstudy.files.outputs import whole_file
+from accelstudy.lots.lot import Lot
+from accelstudy.sensors.models import compose
+
+SHEET = {
+    "bias": "bias",
+    "scale": "scale",
+    "nonorthogonality": "nonorthogonality",
+    "thermal_bias": "bias_per_kelvin",
+    "thermal_scale": "scale_per_kelvin",
+}
+"""Quantities of a data sheet, by the effect whose parameters are of that size."""
+BOUND = 0.9
+"""Probability with which the scatter is below its bound."""
+
+
+def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str | Path) -> bool:
+    """Write type.yaml: for `--model`, `--prior`, and as a data sheet for `plan --sensor`.
+
+    Odd sensors do not count.
+
+    Parameters
+    ----------
+    lot : Lot
+    fits : of `calibrations`
+    folder : path
+
+    Returns
+    -------
+    bool
+        Whether there is one; not if fewer than two sensors were calibrated.
+    """
+    odd = {one.campaign for one in lot.odd}
+    used = [
+        fit
+        for fit, sensor in zip(fits, lot.sensors, strict=True)
+        if isinstance(fit, CampaignFit) and sensor.campaign not in odd
+    ]
+    if len(used) < 2:
+        return False
+    parameters = _typical(lot, used)
+    title = f"{len(used)} sensors of a type"
+    content = {
+        "name": "type",
+        "title": title,
+        "source": "accelstudy lot",
+        **_sheet(lot, parameters, title),
+        **TypeFile(
+            schema_version=1,
+            models={"type": [effect.spec for effect in lot.model.effects]},
+            sensors=len(used),
+            parameters=parameters,
+        ).model_dump(),
+    }
+    with whole_file(Path(folder) / TYPE_FILE) as path:
+        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=96)
+        path.write_text(text, encoding="utf-8")
+    return True
+
+
+def _typical(lot: Lot, fits: Sequence[CampaignFit]) -> dict[str, TypicalParameter]:
+    """Mean and scatter of each parameter; of an effect, over the sensors that have it."""
+    lacks = {campaign: names for campaign, names, _ in lot.each()}
+    rows, in_all = {}, {}
+    for found, spec in lot.effects:
+        if spec is not None:
+            has = np.array([found.names[0] in lacks[fit.campaign.name] for fit in fits])
+            for name in compose(spec, (spec,)).parameter_names:
+                rows[name], in_all[name] = has, bool(has.all())
+    typical = {}
+    for j, (parameter, stays) in enumerate(zip(lot.model.parameters, lot.model.stays, strict=True)):
+        chosen = rows.get(parameter.name, np.ones(len(fits), dtype=bool))
+        of = [fit for fit, use in zip(fits, chosen, strict=True) if use]
+        values = np.array([fit.parameters[j] for fit in of])
+        variances = np.array([fit.sigma[j] ** 2 for fit in of])
+        of_type = RandomEffects(values, variances, np.ones((len(values), 1)))
+        some = of_type.dof > 0
+        typical[parameter.name] = TypicalParameter(
+            mean=float(of_type.estimates[0]),
+            sigma=float(np.sqrt(of_type.covariance[0, 0])),
+            scatter=of_type.scatter,
+            scatter_below=of_type.scatter_interval(2 * BOUND - 1)[1] if some else 0.0,
+            unit=parameter.unit,
+            in_all=some and bool(stays) and in_all.get(parameter.name, True),
+        )
+    return typical
+
+
+def _sheet(lot: Lot, parameters: dict[str, TypicalParameter], source: str) -> dict[str, Any]:
+    """Noise and errors before calibration, each as a number with its unit and its source."""
+    values = {}
+    if (noise := lot.passes[-1].noise) is not None:
+        values["position_sigma"] = noise.sigma
+    for effect in lot.model.effects:
+        if (quantity := SHEET.get(effect.name)) is not None:
+            names = compose(effect.spec, (effect.spec,)).parameter_names
+            squares = [parameters[n].mean ** 2 + parameters[n].scatter ** 2 for n in names]
+            values[quantity] = float(np.sqrt(np.mean(squares)))
+    sheet = {}
+    for quantity, value in values.items():
+        unit = QUANTITIES[quantity][0]
+        shown = f"{float(to_recorded(value, unit)):.4g} {recorded_unit(unit)}"
+        sheet[quantity] = {"value": shown, "source": source}
+    return sheet

@@ -1,0 +1,149 @@
+"""The file of a type: what it tells of the next sensor, for each command that takes it."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+from calling import refusal, succeed
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.of_type import SensorType, read_type
+from accelstudy.campaign.session import Campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.lots.type_file import write_type
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise, session
+
+STANDARD_ERRORS = 3.3
+MODEL = get_model("bias-scale-nonorthogonality")
+GRAVITY = 9.80665
+USUAL = 5e-4
+"""SI, the order of the sigmas in 24 positions."""
+
+
+def measured(scheme, parameters, rng, name="next"):
+    directions = get_scheme(scheme).directions
+    drawn = session(MODEL, parameters, directions, GRAVITY).draw(Noise(0.002), 1, rng)
+    return Campaign(
+        name=name, positions=np.arange(1, len(directions) + 1), forces=drawn.forces[0],
+        gravity=GRAVITY, sigma_force=0.002,
+    )  # fmt: skip
+
+
+def fitted(campaign):
+    return fit_campaign(campaign, MODEL, get_approach("gravity"))
+
+
+def type_of(sensors, folder):
+    """The file of a type of which nothing is missing and no sensor is odd."""
+    fits = [fitted(one) for one in sensors]
+    named = [SimpleNamespace(campaign=one.name) for one in sensors]
+    lot = SimpleNamespace(
+        odd=[], sensors=named, effects=(), model=MODEL, passes=[SimpleNamespace(noise=None)],
+        each=lambda: [(one.name, (), 1.0) for one in sensors],
+    )  # fmt: skip
+    assert write_type(lot, fits, folder)
+    return folder / "type.yaml"
+
+
+@pytest.mark.parametrize("scatter", [0.0, USUAL, 20 * USUAL])
+def test_intervals_with_a_type_hold_the_truth(scatter, tmp_path):
+    """Sensors of 30 types in six positions, which alone do not determine the model."""
+    rng, inside = np.random.default_rng(11), []
+    for _ in range(30):
+        mean = rng.normal(0, 5e-3, 9)
+        draws = mean + scatter * rng.standard_normal((12, 9))
+        sensors = [measured("mclaren-24", x, rng, f"s{i}") for i, x in enumerate(draws[:10])]
+        of_type = read_type(type_of(sensors, tmp_path), MODEL)
+        for truth in draws[10:]:
+            fit = fitted(replace(measured("faces-6", truth, rng), of_type=of_type))
+            inside.append(np.mean(abs(fit.parameters - truth) < fit.sigmas_95 * fit.sigma))
+    # The scatter of a type is taken at its bound: never too certain, and for no scatter too wide.
+    standard_error = np.std(inside) / np.sqrt(len(inside))
+    low, high = (0.95, 1.0) if scatter == 0.0 else (0.93, 0.99)
+    assert low < np.mean(inside) + STANDARD_ERRORS * standard_error
+    assert np.mean(inside) - STANDARD_ERRORS * standard_error < high
+
+
+def test_a_type_is_an_observation_of_the_parameters():
+    """With a prior the estimate is the weighted mean of the prior and of that without one."""
+    rng = np.random.default_rng(12)
+    campaign = measured("mclaren-24", np.zeros(9), rng)
+    mean, sigma = rng.normal(0, 1e-3, 9), 10 ** rng.uniform(-4, -3, 9)
+    known = dict(zip(MODEL.parameter_names, zip(mean, sigma, strict=True), strict=True))
+    free, bound = (
+        fitted(one) for one in (campaign, replace(campaign, of_type=SensorType("t", 9, known)))
+    )
+    assert bound.adjustment.redundancy == free.adjustment.redundancy + 9
+    cofactors = np.linalg.inv(np.linalg.inv(free.adjustment.cofactors[0]) + np.diag(sigma**-2))
+    np.testing.assert_allclose(bound.adjustment.cofactors[0], cofactors, rtol=2e-2, atol=1e-9)
+    right = np.linalg.solve(free.adjustment.cofactors[0], free.parameters) + mean / sigma**2
+    np.testing.assert_allclose(bound.parameters, cofactors @ right, atol=2e-2 * free.sigma.max())
+
+
+def test_a_sensor_that_is_not_of_the_type_is_refused():
+    rng = np.random.default_rng(13)
+    known = dict.fromkeys(MODEL.parameter_names, (0.0, 1e-3))
+    other = measured("mclaren-24", np.full(9, 1e-2), rng)
+    assert fitted(other).global_test.accepted
+    assert not fitted(replace(other, of_type=SensorType("t", 9, known))).global_test.accepted
+
+
+def test_each_command_takes_a_type(tmp_path):
+    for i in range(6):
+        made = simulate_campaign(CampaignSettings(name=f"s{i}", seed=i, approach="gravity"))[0]
+        write_campaign(made, tmp_path / f"s{i}")
+    succeed("lot", tmp_path / "s?", "--out", tmp_path / "lot")
+    of_type = tmp_path / "lot/type.yaml"
+    content = yaml.safe_load(of_type.read_text(encoding="utf-8"))
+    assert content["sensors"] == 6
+    assert list(content["parameters"]) == list(MODEL.parameter_names)
+    faces = simulate_campaign(
+        CampaignSettings(name="faces", seed=9, approach="gravity", scheme="faces-6")
+    )[0]
+    write_campaign(faces, tmp_path / "faces")
+    assert "do not determine" in refusal("calibrate", tmp_path / "faces", "--out", tmp_path / "c")
+    given = ("--model", of_type, "--prior", of_type)
+    succeed("calibrate", tmp_path / "faces", *given, "--out", tmp_path / "c")
+    document = json.loads((tmp_path / "c/calibration.json").read_text(encoding="utf-8"))
+    assert document["type"] == {"file": str(of_type), "sensors": 6}
+    page = (tmp_path / "c/report.html").read_text(encoding="utf-8")
+    assert "6 sensors of its type" in page
+    assert "--prior" in page
+    succeed("diagnose", tmp_path / "s0", *given, "--replicates", "100", "--out", tmp_path / "d")
+    advice = succeed(
+        "advise", tmp_path / "faces", "--tilt-accuracy", "100mgon", *given
+    ).stdout  # fmt: skip
+    assert "faces" in advice
+    question = ("--sensor", of_type, "--tilt-accuracy", "100mgon", "--json")
+    assert "type" in succeed("plan", *question).stdout
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"sensors": 4}, "4 are too few"),
+        ({"parameters": {}}, "give --model"),
+        ({"schema_version": 2}, "schema_version"),
+    ],
+)
+def test_a_file_that_tells_too_little_is_refused(change, said, tmp_path):
+    rng = np.random.default_rng(14)
+    path = type_of([measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)], tmp_path)
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    path.write_text(yaml.safe_dump({**content, **change}, sort_keys=False), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_type(path, MODEL)
+
+
+def test_other_files_are_no_types(tmp_path):
+    (tmp_path / "model.yaml").write_text("models: {a: [bias]}", encoding="utf-8")
+    with pytest.raises(InputError, match="no file of a type"):
+        read_type(tmp_path / "model.yaml", MODEL)
