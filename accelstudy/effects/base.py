@@ -83,6 +83,7 @@ class Effect(WithSettings):
     partial : bool, whether some of its parameters are left out
     drifts : bool, whether it grows in proportion to time, and is known within its session only
     informed : bool, whether something is known of its parameters a priori, see `deviations`
+    sudden : bool, whether it happens once, at a time that no other session has
     """
 
     kind = "effect"
@@ -94,6 +95,7 @@ class Effect(WithSettings):
     bounds: ClassVar[tuple[float, float]] = (-np.inf, np.inf)
     partial: ClassVar[bool] = False
     informed: ClassVar[bool] = False
+    sudden: ClassVar[bool] = False
 
     @property
     def equation(self) -> str:

@@ -17,6 +17,7 @@ class BiasJump(Effect):
     group = "slow_time"
     parameters = per_axis("c", "m/s^2", "c_%")
     takes = (Setting("t", "s", 600.0),)
+    sudden = True
     equation = "c_i for t > t_c"
     typical = (0.005, 0.05)
 

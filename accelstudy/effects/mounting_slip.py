@@ -19,6 +19,7 @@ class MountingSlip(Effect):
     family = "sudden change"
     parameters = per_axis("slip", "rad", "\\varepsilon_{s%}")
     takes = (Setting("t", "s", 600.0),)
+    sudden = True
     equation = "ε × f for t > t_c"
     typical = (80e-6, 3e-3)
     part = "rig"

@@ -48,8 +48,12 @@ PASSES = 3
 """Most times that what was found is added to the model."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
-FEW = 2
-"""Sensors that have to lack the same, or it is no matter of the lot."""
+FEW = 0.1
+"""Share of the sensors up to which what they lack makes them odd, and is no matter of the type."""
+AGREE = 0.02
+"""Relative change below which the noise of a type is found."""
+REFITS = 8
+"""Most calibrations of all sensors for it."""
 EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
@@ -217,7 +221,7 @@ class Pass:
     def found(self) -> list[tuple[int, Found]]:
         """What is missing and has a name that is sure enough, with its place in `classes`.
 
-        What a single sensor lacks makes that sensor odd.
+        What few sensors lack makes these odd.
         """
         if not self.missing:
             return []
@@ -236,10 +240,10 @@ class Pass:
 
     @cached_property
     def _rare(self) -> NDArray[np.bool_]:
-        """Whether fewer than two sensors lack it, if it is one of the lot, (K,)."""
+        """Whether few sensors lack it, if it is one of the lot, (K,)."""
         of = np.maximum(self.mixture.of_effects, 1e-300)
         surely = [np.sum(self.mixture.lacking(k) > HAS * of[k]) for k in range(len(of))]
-        return np.array(surely) < FEW
+        return np.array(surely) <= max(1, FEW * len(self.sensors))
 
     @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
@@ -318,6 +322,10 @@ class Lot:
         """Evidence of each campaign by itself."""
         return self.passes[0].sensors
 
+    def model_of(self, i: int) -> SensorModel:
+        """Model of the type for a sensor, with its own times of what is sudden."""
+        return _own(self.model, self.passes, i)
+
     @property
     def p_value(self) -> float:
         """Probability that sensors without anything missing would show as much evidence."""
@@ -385,17 +393,25 @@ def weigh_lot(
         odd, mean = {one.campaign for one in Pass(tuple(sensors)).odd}, None
         usual = [k for k, one in enumerate(sensors) if one.campaign not in odd]
         of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
-        if of_mean is not None:
+        # What happens to each sensor at a time of its own has no mean.
+        if of_mean is not None and not any(effect.sudden for effect in with_.effects):
             with suppress(InputError):  # the positions do not determine the model
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
         return Pass(tuple(sensors), mean, noise)
 
     def again(with_: SensorModel) -> Pass:
-        fits = [_fitted(campaign, with_, model, approach) for campaign in campaigns]
-        return weighed([fit.model for fit in fits], with_, lot_noise(fits))
+        own = [_own(with_, passes, i) for i in range(len(campaigns))]
 
-    now = weighed([model] * len(campaigns), model, None)
-    passes, whole = [now], model
+        def fits_of(measured: Sequence[Campaign]) -> list[Solution]:
+            each = zip(measured, own, strict=True)
+            return [_fitted(campaign, its, model, approach) for campaign, its in each]
+
+        fits = fits_of(campaigns)
+        return weighed([fit.model for fit in fits], with_, _settled(fits, fits_of, campaigns))
+
+    passes: list[Pass] = []
+    now, whole = weighed([model] * len(campaigns), model, None), model
+    passes.append(now)
     effects: list[tuple[Found, str | None]] = []
     new = _new(now, whole, effects)
     for _ in range(PASSES):
@@ -412,6 +428,40 @@ def weigh_lot(
         close = tuple(found.names for found, spec in effects if spec is not None)
         return Lot(tuple(passes), model, close=close, explained=False)
     return Lot(tuple(passes), whole, tuple(effects))
+
+
+def _settled(
+    fits: Sequence[Solution],
+    fits_of: Callable[[Sequence[Campaign]], list[Solution]],
+    campaigns: Sequence[Campaign],
+) -> LotNoise:
+    """Noise of the type by the calibrations of its sensors.
+
+    Beside angles the noise of the forces is not in proportion to the residuals, and is searched
+    for: with it the residuals are as large as it says.
+    """
+    noise, before = lot_noise(fits), None
+    for _ in range(REFITS if any(fit.approach.uses_angles for fit in fits) else 0):
+        sigma = noise.sigma
+        again = lot_noise(fits_of([replace(one, sigma_force=sigma) for one in campaigns]))
+        off = float(np.log(again.sigma / sigma))
+        if abs(off) < AGREE:
+            return again
+        step = off
+        if before is not None and (off - before[1]) * (np.log(sigma) - before[0]) < 0:
+            step = -off * (np.log(sigma) - before[0]) / (off - before[1])
+        before = float(np.log(sigma)), off
+        noise = replace(again, sigma=sigma * float(np.exp(np.clip(step, -2, 2))))
+    return noise
+
+
+def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
+    """Model of a sensor: what is sudden happened when the last pass that looked for it says."""
+    specs: dict[str, str] = {}
+    for one in passes:
+        specs |= one.sensors[i].specs
+    effects = [specs.get(e.name, e.spec) if e.sudden else e.spec for e in whole.effects]
+    return compose(whole.name, tuple(effects))
 
 
 def _fitted(
@@ -483,9 +533,10 @@ def calibrations(
     approach : Approach, as in `weigh_lot`
     """
     fits: list[CampaignFit | InputError] = []
-    for campaign in campaigns:
+    for i, campaign in enumerate(campaigns):
         try:
-            fits.append(fit_campaign(campaign, lot.model, approach or usual_approach(campaign)))
+            chosen = lot.model_of(i), approach or usual_approach(campaign)
+            fits.append(fit_campaign(campaign, *chosen))
         except InputError as error:
             fits.append(error)
     return fits

@@ -15,6 +15,7 @@ from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import QUANTITIES
+from accelstudy.effects import Effect
 from accelstudy.files.outputs import whole_file
 from accelstudy.lots.lot import Lot
 from accelstudy.sensors.models import compose
@@ -34,7 +35,7 @@ BOUND = 0.9
 def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str | Path) -> bool:
     """Write type.yaml: for `--model`, `--prior`, and as a data sheet for `plan --sensor`.
 
-    Odd sensors do not count.
+    Odd sensors do not count, and what is sudden is no matter of the type.
 
     Parameters
     ----------
@@ -55,7 +56,8 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
     ]
     if len(used) < 2:
         return False
-    parameters = _typical(lot, used)
+    lasting = [effect for effect in lot.model.effects if not effect.sudden]
+    parameters = _typical(lot, lasting, used)
     title = f"{len(used)} sensors of a type"
     content = {
         "name": "type",
@@ -64,7 +66,7 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
         **_sheet(lot, parameters, title),
         **TypeFile(
             schema_version=1,
-            models={"type": [effect.spec for effect in lot.model.effects]},
+            models={"type": [effect.spec for effect in lasting]},
             sensors=len(used),
             parameters=parameters,
         ).model_dump(),
@@ -75,7 +77,9 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
     return True
 
 
-def _typical(lot: Lot, fits: Sequence[CampaignFit]) -> dict[str, TypicalParameter]:
+def _typical(
+    lot: Lot, lasting: Sequence[Effect], fits: Sequence[CampaignFit]
+) -> dict[str, TypicalParameter]:
     """Mean and scatter of each parameter; of an effect, over the sensors that have it."""
     lacks = {campaign: names for campaign, names, _ in lot.each()}
     rows, in_all = {}, {}
@@ -85,7 +89,10 @@ def _typical(lot: Lot, fits: Sequence[CampaignFit]) -> dict[str, TypicalParamete
             for name in compose(spec, (spec,)).parameter_names:
                 rows[name], in_all[name] = has, bool(has.all())
     typical = {}
-    for j, (parameter, stays) in enumerate(zip(lot.model.parameters, lot.model.stays, strict=True)):
+    wanted = {parameter for effect in lasting for parameter in effect.parameters}
+    for j, parameter in enumerate(lot.model.parameters):
+        if parameter not in wanted:
+            continue
         chosen = rows.get(parameter.name, np.ones(len(fits), dtype=bool))
         of = [fit for fit, use in zip(fits, chosen, strict=True) if use]
         values = np.array([fit.parameters[j] for fit in of])
@@ -98,7 +105,7 @@ def _typical(lot: Lot, fits: Sequence[CampaignFit]) -> dict[str, TypicalParamete
             scatter=of_type.scatter,
             scatter_below=of_type.scatter_interval(2 * BOUND - 1)[1] if some else 0.0,
             unit=parameter.unit,
-            in_all=some and bool(stays) and in_all.get(parameter.name, True),
+            in_all=some and bool(lot.model.stays[j]) and in_all.get(parameter.name, True),
         )
     return typical
 

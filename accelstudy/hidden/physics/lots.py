@@ -50,7 +50,7 @@ def generate_lot(
 
     What an effect is, its setting and its typical parameters, belongs to the type, and each
     parameter of a sensor is a factor away from it, exp(N(0, `SCATTER`²)). Sudden events, a jump or
-    a slip, come to each sensor when and as they like.
+    a slip, come to each sensor when and as they like. What one sensor alone lacks has no type.
 
     Parameters
     ----------
@@ -86,6 +86,8 @@ def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:
     session = knowing.atlas.session
     conditions = Conditions.of(session, case.approach, Sensor())
     known = {
-        name: drawn(name, case.lam, session, conditions, knowing, rng) for name in case.effects
+        name: drawn(name, case.lam, session, conditions, knowing, rng)
+        for name, share in zip(case.effects, case.shares, strict=True)
+        if share > 0
     }
     return {name: one for name, one in known.items() if "t" not in one[0].settings}
