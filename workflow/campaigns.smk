@@ -4,7 +4,7 @@ from pathlib import Path
 
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.importing.public import next_attempt
-from accelstudy.files.outputs import BATCH_JOB
+from accelstudy.files.outputs import BATCH_JOB, LOT
 
 
 include: "rules/start.smk"
@@ -23,9 +23,9 @@ RECORDS = [
     f"{RESULTS}/public/{task.source}.json" for task in TASKS.values() if task.kind == "public"
 ]
 
-look_at_earlier(
-    OUTPUTS + RECORDS, folders={f"{RESULTS}/campaigns/{name}": BATCH_JOB for name in TASKS}
-)
+FOLDERS = {f"{RESULTS}/campaigns/{name}": BATCH_JOB for name in TASKS}
+TOGETHER = [] if BATCH.lot is None else [f"{RESULTS}/lot"]
+look_at_earlier(OUTPUTS + RECORDS, folders=FOLDERS | dict.fromkeys(TOGETHER, LOT))
 
 
 wildcard_constraints:
@@ -53,6 +53,7 @@ rule campaigns:
     default_target: True
     input:
         OUTPUTS,
+        TOGETHER,
 
 
 # The downloaded file is no output: Snakemake would delete it before a second try.
@@ -121,3 +122,27 @@ rule overview:
         "Summarise the campaigns"
     script:
         "scripts/overview.py"
+
+
+# One job for all: each pass over the sensors needs what the pass before found.
+rule lot:
+    input:
+        expand(f"{RESULTS}/campaigns/{{campaign}}", campaign=TASKS),
+    output:
+        directory(f"{RESULTS}/lot"),
+    log:
+        f"{RESULTS}/logs/lot.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/lot.tsv"
+    conda:
+        "envs/accelstudy.yaml"
+    threads: workflow.cores or 1
+    resources:
+        mem_mb=megabytes(2000),
+    params:
+        angle_unit=angle_unit(),
+        code=code_of("lot"),
+    message:
+        "Evaluate all campaigns together"
+    script:
+        "scripts/lot.py"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 from accelstudy.basics.errors import InputError, shown
 
@@ -33,3 +34,9 @@ def check_path_name(name: str) -> str:
     if len(name.encode()) > LONGEST:
         raise InputError(f"{shown(name)} is too long for a folder; use at most {LONGEST} letters")
     return name
+
+
+def natural(path: str | Path) -> list[tuple[int, str]]:
+    """Key by which numbers in names count as such: sensor-2 comes before sensor-10."""
+    parts = re.split(r"([0-9]+)", str(path))
+    return [(int(part), "") if part.isdigit() else (0, part) for part in parts]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import natural
 from accelstudy.basics.progress import say, warn
 from accelstudy.basics.units import UNITS
 from accelstudy.basics.wording import counted
@@ -252,19 +253,13 @@ def files_of(given: Sequence[Path]) -> list[Path]:
             continue
         if not inside:
             raise InputError(f"{path}: no file there")
-        files += sorted(inside, key=_natural)
+        files += sorted(inside, key=natural)
     if files == sorted(files):
-        files.sort(key=_natural)
+        files.sort(key=natural)
     twice = [path for path in files if files.count(path) > 1]
     if twice:
         raise InputError(f"{twice[0]}: the file is given twice")
     return files
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Key by which numbers in names count as such."""
-    parts = re.split(r"([0-9]+)", str(path))
-    return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
 
 
 def parse_columns(text: str, option: str = "--columns") -> dict[str, str]:

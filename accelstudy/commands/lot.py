@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import natural
 from accelstudy.basics.progress import say
 from accelstudy.commands.options import (
     PATH,
@@ -28,51 +29,76 @@ from accelstudy.commands.options import (
 @model_option
 @approach_option(None)
 @seed_option
+@click.option(
+    "--cores",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=1),
+    help="Processes that work at once; the results do not depend on it.",
+)
 @force_option
 @angle_unit_option
 @quiet_option
 def lot_command(
-    campaigns: tuple[Path, ...], model: str, approach: str | None, out: Path, seed: int, force: bool
+    campaigns: tuple[Path, ...],
+    model: str,
+    approach: str | None,
+    out: Path,
+    seed: int,
+    cores: int,
+    force: bool,
 ) -> None:
     """Say what sensors of one type lack together.
 
-    CAMPAIGN are folders, one per sensor, or patterns such as 'sensor-*'. They may differ in
-    positions, columns and approach. What one campaign alone cannot show, many show together:
-    whether anything is missing in the lot, at one level for all, in how many of the sensors, how
-    large it is, and which sensor is odd.
+    CAMPAIGN are folders, one per sensor, patterns such as 'sensor-*', or the list of a batch (a
+    YAML file). They may differ in positions, columns and approach. What one campaign alone cannot
+    show, many show together: whether anything is missing in the lot, at one level for all, in how
+    many of the sensors, how large it is, and which sensor is odd.
 
-    The folder of results gets report.html, lot.json, a figure and a calibration.json of each
-    sensor. If effects are missing, these have them, and model.yaml has them for `--model`.
+    The folder of results gets report.html, lot.json, a figure, a calibration.json of each sensor
+    with all that the lot lacks, and type.yaml: the model of the type for `--model`, what these
+    sensors tell of the next one for `--prior`, and a data sheet for `plan --sensor`.
     """
     from accelstudy.approaches import get_approach
-    from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.campaign.format import read_campaign
     from accelstudy.files.outputs import LOT, result_folder
-    from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
-    from accelstudy.lots.output import write_lot
+    from accelstudy.lots.run import FEWEST, evaluate_lot
     from accelstudy.sensors.models import get_model
 
     folders = [path for given in campaigns for path in _folders(given)]
-    if len(folders) < 2:
+    if len(folders) < FEWEST:
         raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
     given_once(folders, "sensor")
     chosen = get_model(model), None if approach is None else get_approach(approach)
     with result_folder(out, LOT, folders, force) as results:
         measured = [read_campaign(folder) for folder in folders]
-        lot = weigh_lot(measured, *chosen, seed=seed)
-        fits = calibrations(lot, measured, chosen[1])
-        found = with_sizes(lot, fits, chosen[0])
-        of_first = chosen[1] or usual_approach(measured[0])
-        content = write_lot(lot, found, fits, of_first, results, out)
+        content = evaluate_lot(measured, results, *chosen, seed, cores, out)
     click.echo(content["verdict"])
     say(f"report: {out / 'report.html'}")
 
 
 def _folders(given: Path) -> list[Path]:
-    """Folders that a pattern stands for, by name; anything else stands for itself."""
+    """Folders of a pattern, or of the list of a batch; anything else stands for itself."""
+    if given.suffix in (".yaml", ".yml") and given.is_file():
+        return _listed(given)
     if given.exists() or not has_magic(str(given)):
         return [given]
-    found = sorted(path for path in map(Path, glob(str(given))) if path.is_dir())
+    found = sorted((path for path in map(Path, glob(str(given))) if path.is_dir()), key=natural)
     if not found:
         raise InputError(f"{given}: no folder has such a name")
     return found
+
+
+def _listed(path: Path) -> list[Path]:
+    """Folders of the campaigns that the list of a batch names."""
+    from accelstudy.campaign.batch.config import parse_batch
+    from accelstudy.files.reading import read_layer
+
+    tasks = parse_batch(read_layer(path), str(path)).tasks()
+    for task in tasks:
+        if task.kind != "campaign":
+            raise InputError(
+                f"{path}: {task.source}: is a {task.kind}; only campaigns can be in a lot here. "
+                "Import it, or run the workflow of the campaigns with a section `lot`"
+            )
+    return [Path(task.source) for task in tasks]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -367,6 +370,7 @@ def weigh_lot(
     model: SensorModel,
     approach: Approach | None = None,
     seed: int = 1,
+    cores: int = 1,
 ) -> Lot:
     """Say what sensors of one type lack together.
 
@@ -376,20 +380,42 @@ def weigh_lot(
     model : SensorModel
     approach : Approach; by default robot-aided where a campaign has the robot's angles
     seed : int, of the draws
+    cores : int, processes that work at once; results do not depend on it
 
     Raises
     ------
     InputError
         If a campaign does not determine the model, or leaves no redundancy.
     """
+    with _processes(cores) as mapped:
+        return _weigh_lot(campaigns, model, approach, seed, mapped)
 
+
+@contextmanager
+def _processes(cores: int) -> Iterator[Callable[..., Iterator[SensorEvidence]]]:
+    """What maps a function over campaigns, in as many processes as there are cores.
+
+    Elsewhere than on Linux processes start anew, with all imports; there is one.
+    """
+    if cores == 1 or sys.platform != "linux":
+        yield map
+        return
+    with ProcessPoolExecutor(cores, mp_context=get_context("fork")) as pool:
+        yield partial(pool.map, chunksize=4)
+
+
+def _weigh_lot(
+    campaigns: Sequence[Campaign],
+    model: SensorModel,
+    approach: Approach | None,
+    seed: int,
+    mapped: Callable[..., Iterator[SensorEvidence]],
+) -> Lot:
     def weighed(models: Sequence[SensorModel], with_: SensorModel, noise: LotNoise | None) -> Pass:
-        each = zip(campaigns, models, strict=True)
-        progress = track(each, "evidence of the sensors", len(campaigns))
-        sensors = [
-            sensor_evidence(campaign, own, approach, seed + i, noise)
-            for i, (campaign, own) in enumerate(progress)
-        ]
+        n = len(campaigns)
+        seeds = range(seed, seed + n)
+        each = mapped(sensor_evidence, campaigns, models, [approach] * n, seeds, [noise] * n)
+        sensors = list(track(each, "evidence of the sensors", n))
         odd, mean = {one.campaign for one in Pass(tuple(sensors)).odd}, None
         usual = [k for k, one in enumerate(sensors) if one.campaign not in odd]
         of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,10 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
 
 
 def lot_document(
-    lot: Lot, found: Sequence[Found], calibrated: Sequence[str | None]
+    lot: Lot,
+    found: Sequence[Found],
+    calibrated: Sequence[str | None],
+    left_out: Mapping[str, str],
 ) -> dict[str, Any]:
     """Describe a lot, in SI.
 
@@ -73,6 +76,7 @@ def lot_document(
     lot : Lot
     found : of `with_sizes`
     calibrated : for each sensor, why it has no calibration; None if it has one
+    left_out : mapping of campaigns that are not in the lot to why
     """
     return {
         "schema_version": 1,
@@ -109,6 +113,7 @@ def lot_document(
             {"campaign": campaign, "names": list(names), "posterior": p, "failed": failed}
             for (campaign, names, p), failed in zip(lot.each(), calibrated, strict=True)
         ],
+        "left_out": [{"campaign": name, "reason": why} for name, why in left_out.items()],
         "verdict": " ".join(said(lot, found)),
     }  # fmt: skip
 
@@ -119,7 +124,8 @@ def write_lot(
     fits: Sequence[CampaignFit | InputError],
     approach: Approach,
     folder: str | Path,
-    place: str | Path = "",
+    place: str | Path,
+    left_out: Mapping[str, str],
 ) -> dict[str, Any]:
     """Write lot.json, type.yaml, report.html, the figure, and a calibration of each sensor.
 
@@ -131,6 +137,7 @@ def write_lot(
     approach : Approach, of the first campaign
     folder : path, to write to
     place : path of the results, for the commands that the page gives
+    left_out : as in `lot_document`
 
     Returns
     -------
@@ -139,7 +146,7 @@ def write_lot(
     """
     folder = Path(folder)
     failed = [str(fit) if isinstance(fit, InputError) else None for fit in fits]
-    content = lot_document(lot, found, failed)
+    content = lot_document(lot, found, failed, left_out)
     for i, fit in enumerate(fits, start=1):
         if isinstance(fit, CampaignFit):
             name = re.sub(r"[^\w.-]+", "-", fit.campaign.name)

@@ -30,6 +30,7 @@ from accelstudy.campaign.batch.run import run_task
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import public_data, record_public
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
 
@@ -269,6 +270,28 @@ def test_what_was_damaged_since_is_refused(changed):
     result = run(folder, BATCH)
     assert result.returncode != 0
     one_line(result.stdout, "results/bench/campaigns/aided: status.json is missing; delete it")
+
+
+def test_the_campaigns_of_a_type_are_evaluated_together(tmp_path):
+    """Three sensors and a log make a lot; what cannot be read is named, and not in it."""
+    for i in range(3):
+        made, _ = simulate_campaign(CampaignSettings(name="same name", seed=i, approach="gravity"))
+        write_campaign(made, tmp_path / "campaigns" / f"s-{8 + i}")
+    (tmp_path / "campaigns" / "spoilt").mkdir()
+    log = {"log": "log.parquet", "import": {"rate_hz": 100}}
+    write_log(tmp_path)
+    config = {"batch": "b", "campaigns": [{"campaign": "campaigns/*"}, log], "lot": {"seed": 3}}
+    text = succeed(tmp_path, config)
+    assert jobs(text) == {"calibrate": 5, "overview": 1, "lot": 1}
+    one_line(text, "Nothing is missing in these 4 sensors")
+    lot = json.loads((tmp_path / "results/b/lot/lot.json").read_text(encoding="utf-8"))
+    assert [one["campaign"] for one in lot["each"]] == ["s-8", "s-9", "s-10", "log"]
+    assert [one["campaign"] for one in lot["left_out"]] == ["spoilt"]
+    page = (tmp_path / "results/b/lot/report.html").read_text(encoding="utf-8")
+    assert "Which campaigns are not in the lot?" in page
+    assert jobs(succeed(tmp_path, config, "--dry-run")) == {}
+    (tmp_path / "results/b/lot/lot.json").unlink()
+    assert run(tmp_path, config).returncode != 0
 
 
 # --- public data ---------------------------------------------------------------------------------

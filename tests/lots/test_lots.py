@@ -223,7 +223,21 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     said = succeed("calibrate", folders[0], "--model", model, "--out", tmp_path / "c").stdout
     assert "ACCEPTED" in said
     assert "b_T_x" in said
+    # The list of a batch, in two processes: the same to the bit; what cannot be judged is named.
+    few = simulate_campaign(CampaignSettings(name="few", scheme="faces-6", approach="gravity"))[0]
+    write_campaign(few, tmp_path / "few")
+    listed = [{"campaign": str(path)} for path in (*folders, tmp_path / "few")]
+    batch = tmp_path / "batch.yaml"
+    batch.write_text(json.dumps({"batch": "b", "campaigns": listed}), encoding="utf-8")
+    succeed("lot", batch, "--cores", "2", "--out", tmp_path / "again")
+    again = json.loads((tmp_path / "again/lot.json").read_text(encoding="utf-8"))
+    (left_out,) = again.pop("left_out")
+    assert left_out["campaign"] == "few"
+    assert "do not determine" in left_out["reason"]
+    assert {**again, "left_out": []} == content
+    batch.write_text(json.dumps({"batch": "b", "campaigns": [{"log": "a.csv"}]}), encoding="utf-8")
     for given, said in (
+        ((batch,), "a.csv: is a log"),
         ((folders[0],), "two sensors or more"),
         ((folders[0], folders[1], folders[0]), "is given twice"),
         ((tmp_path / "other-*",), "no folder has such a name"),

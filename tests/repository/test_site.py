@@ -26,6 +26,7 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.of_type import TypeFile, TypicalParameter
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.comparison import compare
 from accelstudy.epochs.history import history_of
@@ -82,6 +83,10 @@ def test_each_key_of_a_calibration_is_described(pages):
         "history.json": set(_keys(history_document(history))),
         "history.parquet": set(history_table(history)),
         "lot.json": set(_keys(_lot())),
+        "type.yaml": {
+            *TypeFile.model_fields,
+            *(f"parameters.{n}" for n in TypicalParameter.model_fields),
+        },
         "positions.parquet": set(assessed_positions(assessment)),
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),
         "parameters.parquet": set(PARAMETER_COLUMNS),
@@ -122,7 +127,7 @@ def _lot():
     one = Pass(tuple(each))
     effects = tuple((found, name) for _, found in one.found)
     lot = Lot((one, one), get_model("bias-scale"), effects)
-    return lot_document(lot, [found for found, _ in effects], [None] * 3)
+    return lot_document(lot, [found for found, _ in effects], [None] * 3, {})
 
 
 def _keys(document):

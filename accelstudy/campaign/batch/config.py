@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import check_path_name
+from accelstudy.basics.names import check_path_name, natural
 from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
@@ -97,6 +97,24 @@ class Task(Block):
         return [str(source)] if self.kind == "log" and source.is_file() else []
 
 
+class LotSettings(Block):
+    """How the campaigns of a batch are evaluated together, as those of sensors of one type."""
+
+    model: ModelName | None = Field(None, description="model; by default that of the batch")
+    approach: str | None = Field(
+        None, description="approach; by default robot where a campaign has the robot's angles"
+    )
+    seed: int = Field(1, ge=0, description="seed of the draws")
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> Self:
+        try:
+            _check_names(self.model, self.approach)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
 class BatchConfig(Configuration):
     """Campaigns that are calibrated and summarised together."""
 
@@ -108,6 +126,9 @@ class BatchConfig(Configuration):
         description="folder with public files, in any subfolder; missing ones are downloaded to it",
     )
     campaigns: list[Entry] = Field(min_length=1)
+    lot: LotSettings | None = Field(
+        None, description="evaluates all campaigns together, as sensors of one type"
+    )
 
     @model_validator(mode="after")
     def _names_exist(self) -> Self:
@@ -141,7 +162,7 @@ class BatchConfig(Configuration):
             sources = [_path(entry)]
             if _is_pattern(entry):
                 wanted = os.path.isdir if entry.kind == "campaign" else os.path.isfile
-                matching = sorted(filter(wanted, glob.glob(sources[0])))
+                matching = sorted(filter(wanted, glob.glob(sources[0])), key=natural)
                 if not matching:
                     what = "folder" if entry.kind == "campaign" else "file"
                     raise InputError(f"campaigns.{index}: no {what} matches {sources[0]}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -90,10 +91,27 @@ def _remove_results(folder: Path) -> None:
     shutil.rmtree(folder / "figures", ignore_errors=True)
 
 
+def campaign_of(task: Task, folder: str | Path) -> Campaign:
+    """Campaign of a task by the name of the task; `folder` is that of `run_task`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or could not be imported.
+    """
+    if task.settings is None:
+        return replace(_read(task), name=task.name)
+    return replace(read_campaign(Path(folder) / "campaign"), name=task.name)
+
+
+def _read(task: Task) -> Campaign:
+    gravity = task.gravity
+    return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
+
+
 def _measured(task: Task, folder: Path, record: str | Path | None) -> Campaign:
     if task.settings is None:
-        gravity = task.gravity
-        return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
+        return _read(task)
     path = task.source if record is None else _recorded(record)
     return import_to(folder, path, task.settings)[0]
 

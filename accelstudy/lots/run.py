@@ -1,0 +1,104 @@
+"""The evaluation of a lot, from campaigns to files, as the command and the workflow run it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say
+from accelstudy.campaign.batch.config import BatchConfig
+from accelstudy.campaign.batch.run import campaign_of
+from accelstudy.campaign.calibration.fit import usual_approach
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.files.outputs import LOT, result_folder
+from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
+from accelstudy.lots.output import write_lot
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+
+FEWEST = 2
+"""Sensors of the smallest lot."""
+
+
+def evaluate_lot(
+    campaigns: Sequence[Campaign],
+    folder: str | Path,
+    model: SensorModel,
+    approach: Approach | None = None,
+    seed: int = 1,
+    cores: int = 1,
+    place: str | Path = "",
+    left_out: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
+    """Say what sensors of one type lack together, calibrate each of them, and write all of it.
+
+    Parameters
+    ----------
+    campaigns, model, approach, seed, cores : as in `weigh_lot`
+    folder : path, to write to
+    place : path of the results, for the commands that the page gives
+    left_out : mapping of campaigns that could not be read to what is wrong with them; what cannot
+        be judged by itself, as it leaves no redundancy, is left out as well
+
+    Returns
+    -------
+    dict
+        The content of lot.json.
+
+    Raises
+    ------
+    InputError
+        If fewer than two campaigns can be judged.
+    """
+    usable, without = [], dict(left_out or {})
+    for campaign in campaigns:
+        try:
+            fit_base(campaign, model, approach or usual_approach(campaign))
+            usable.append(campaign)
+        except InputError as error:
+            without[campaign.name] = str(error)
+    for name, why in without.items():
+        say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
+    if len(usable) < FEWEST:
+        why = next(iter(without.values()), "")
+        raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
+    lot = weigh_lot(usable, model, approach, seed, cores)
+    fits = calibrations(lot, usable, approach)
+    found = with_sizes(lot, fits, model)
+    usual = approach or usual_approach(usable[0])
+    return write_lot(lot, found, fits, usual, folder, place, without)
+
+
+def run_lot(
+    batch: BatchConfig, folders: Sequence[str | Path], out: str | Path, cores: int = 1
+) -> dict[str, Any]:
+    """Evaluate all campaigns of a batch together; those that cannot be read are named.
+
+    Parameters
+    ----------
+    batch : BatchConfig, with `lot`
+    folders : paths, written by `run_task`, in the order of its tasks
+    out : path of the folder to write
+    cores : int, processes that work at once
+
+    Returns
+    -------
+    dict
+        The content of lot.json.
+    """
+    settings = batch.lot
+    assert settings is not None
+    campaigns, unread = [], {}
+    for task, folder in zip(batch.tasks(), folders, strict=True):
+        try:
+            campaigns.append(campaign_of(task, folder))
+        except InputError as error:
+            unread[task.name] = str(error)
+    model = get_model(settings.model or batch.model)
+    approach = None if settings.approach is None else get_approach(settings.approach)
+    with result_folder(out, LOT) as new:
+        return evaluate_lot(campaigns, new, model, approach, settings.seed, cores, out, unread)
