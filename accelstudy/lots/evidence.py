@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,10 @@ from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level
+from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level, log_mean
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
+from accelstudy.diagnosis.space.residuals import VISIBLE
+from accelstudy.effects import Effect
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -38,6 +40,12 @@ ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
+SMALLEST = 1e-300
+"""‖z‖² that can be divided by."""
+NEAR = 0.3
+"""Largest difference of the logarithms of settings that are nearly the same."""
+LIKE = 0.2
+"""Largest difference of conditions that are the same, in parts of their range."""
 SAME = 0.15
 """Largest difference of the directions of forces in positions that are the same."""
 
@@ -95,6 +103,47 @@ class LotNoise:
 
 
 @dataclass(frozen=True)
+class Shown:
+    """The shapes of an effect in the residuals z of a campaign, in units of its noise.
+
+    Attributes
+    ----------
+    settings : (s, q) array, those of the shapes
+    normal : (s, k, k) array, DᵀD of the derivatives D of z by the parameters
+    right : (s, k) array, Dᵀz
+    squares : (s, k) array, of what D would be if no parameter of the model were estimated
+    """
+
+    settings: Array
+    normal: Array
+    right: Array
+    squares: Array
+
+    @classmethod
+    def of(cls, problem: Problem, effects: Sequence[Effect], variance: float) -> Shown:
+        """Of shapes of an effect, by a campaign whose residuals have a variance of unit weight."""
+        residuals = problem.residuals
+        columns = residuals.whitened(problem.frame.signatures(effects))
+        shape = (len(columns), len(effects), -1)
+        d = residuals.project(columns).reshape(shape)
+        return cls(
+            settings=np.array([[*effect.settings.values()] for effect in effects], dtype=float),
+            normal=np.einsum("msk,msl->skl", d, d) / variance,
+            right=np.einsum("msk,m->sk", d, residuals.z) / variance,
+            squares=np.sum(columns.reshape(shape) ** 2, axis=0) / variance,
+        )
+
+    def nearest(self, settings: Array) -> int | None:
+        """Place of the shape with these settings, or nearly so."""
+        if not settings.size:
+            return 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            apart = np.max(abs(np.nan_to_num(np.log(self.settings / settings))), axis=1)
+        best = int(np.argmin(apart))
+        return best if apart[best] < NEAR else None
+
+
+@dataclass(frozen=True)
 class SensorEvidence:
     """What one campaign says, as log odds against nothing.
 
@@ -112,6 +161,9 @@ class SensorEvidence:
     observed : (K,) array, their log odds in this campaign
     redundancy : int
     residuals : (m,) array, m/s², equally uncertain
+    square : float, ‖z‖² of the residuals, in units of the noise of the type; by its own noise it
+        is the redundancy
+    shown : dict of effect to what its shapes would show in the residuals, in the same units
     """
 
     campaign: str
@@ -125,6 +177,8 @@ class SensorEvidence:
     observed: Array
     redundancy: int
     residuals: Array
+    square: float = 0.0
+    shown: dict[str, Shown] = field(default_factory=dict)
 
 
 def sensor_evidence(
@@ -175,6 +229,9 @@ def sensor_evidence(
         names = tuple(sorted(h.name for h in together.best))
         if len(names) == 2 and OUTLIER not in names:
             pairs[names[0], names[1]] = together.log_density - nothing
+    variance = 1.0
+    if noise is None:
+        variance = max(float(z @ z), SMALLEST) / problem.residuals.redundancy
     names, by_chance = _by_chance(problem, chance, noise)
     return SensorEvidence(
         campaign=campaign.name,
@@ -190,8 +247,15 @@ def sensor_evidence(
         by_chance=by_chance,
         tested=names,
         observed=np.array([detection.densities[name] - nothing for name in names]),
-        redundancy=base.solution.redundancy,
+        redundancy=problem.residuals.redundancy,
         residuals=z * _sigma_stated(base.solution),
+        square=float(z @ z) / variance,
+        shown={
+            name: Shown.of(problem, effects, variance)
+            for name, shapes in problem.field.candidates.items()
+            if (effects := [h.effect for h in shapes if h.effect is not None])
+            and not effects[0].sudden
+        },
     )
 
 
@@ -202,7 +266,7 @@ def _sigma_stated(fit: Solution) -> float:
 def mean_sensor(
     campaigns: Sequence[Campaign], sensors: Sequence[SensorEvidence]
 ) -> tuple[Campaign, LotNoise] | None:
-    """Average sensors that were in the same positions, in one order.
+    """Average sensors that were in the same positions and conditions, in one order.
 
     What all of them lack is as large in their mean, and the noise is smaller by the root of their
     number. It is told by their scatter about the mean. None if the positions differ.
@@ -229,12 +293,49 @@ def mean_sensor(
     return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
 
 
+def together(sensors: Sequence[SensorEvidence]) -> dict[str, float]:
+    """Log odds of each effect that is equally large in all sensors, against nothing.
+
+    All campaigns are one: the normal equations of their residuals are added. Settings of an effect
+    are those of the first campaign, or nearly so.
+    """
+    redundancy = sum(each.redundancy for each in sensors)
+    evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), redundancy)
+    squares = sum(each.square for each in sensors)
+    nothing = float(evidence.of_noise(squares)[0])
+    odds = {}
+    for name in sorted({name for each in sensors for name in each.shown}):
+        shows = [each.shown[name] for each in sensors if name in each.shown]
+        if 2 * len(shows) <= len(sensors):
+            continue
+        logs = []
+        for settings in shows[0].settings:
+            near = [(one, k) for one in shows if (k := one.nearest(settings)) is not None]
+            normal, right, whole = (
+                np.sum([getattr(one, what)[k] for one, k in near], axis=0)
+                for what in ("normal", "right", "squares")
+            )
+            scale = np.sqrt(np.where(whole > 0, whole, 1.0))
+            values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+            seen = values > VISIBLE**2
+            part = np.sum((vectors.T @ (right / scale))[seen] ** 2 / values[seen])
+            if seen.any():
+                logs.append(evidence.of_spaces(part[None], [int(seen.sum())], squares)[0])
+        if logs:
+            odds[name] = float(log_mean(np.array(logs))) - nothing
+    return odds
+
+
 def _alike(one: Campaign, other: Campaign) -> bool:
-    """Whether two campaigns were in the same positions, and have the same columns."""
+    """Whether two campaigns were in the same positions, in the same conditions."""
     if one.forces.shape != other.forces.shape:
         return False
     if any((getattr(one, name) is None) != (getattr(other, name) is None) for name in COLUMNS):
         return False
+    for name in COLUMNS:
+        column, its = getattr(one, name), getattr(other, name)
+        if column is not None and np.max(abs(its - column)) > LIKE * np.ptp(column):
+            return False
     a, b = (c.forces / np.linalg.norm(c.forces, axis=1, keepdims=True) for c in (one, other))
     return bool(np.max(abs(a - b)) < SAME)
 

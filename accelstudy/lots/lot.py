@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from multiprocessing import get_context
 
@@ -35,6 +35,7 @@ from accelstudy.lots.evidence import (
     lot_noise,
     mean_sensor,
     sensor_evidence,
+    together,
 )
 from accelstudy.lots.mixture import Mixture, Names, lot_odds
 from accelstudy.sensors.models import compose, composition_name
@@ -134,11 +135,13 @@ class Pass:
     sensors : tuple of SensorEvidence
     mean : SensorEvidence, of their mean; None if they were in different positions
     noise : LotNoise, of the type; None where each campaign says its own
+    alike : mapping of effects to log odds if they are equally large in all; empty with a mean
     """
 
     sensors: tuple[SensorEvidence, ...]
     mean: SensorEvidence | None = None
     noise: LotNoise | None = None
+    alike: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def classes(self) -> list[tuple[str, ...]]:
@@ -163,7 +166,11 @@ class Pass:
                 pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        common: dict[Names, float] = {}
+        common: dict[Names, float] = {
+            (k,): self.alike[members[0]]
+            for k, members in enumerate(self.classes)
+            if members[0] in self.alike
+        }
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise.
             of_mean = {name: log for name, log in mean.odds.items() if not is_noise(name)}
@@ -423,7 +430,8 @@ def _weigh_lot(
         if of_mean is not None and not any(effect.sudden for effect in with_.effects):
             with suppress(InputError):  # the positions do not determine the model
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
-        return Pass(tuple(sensors), mean, noise)
+        alike = together([sensors[k] for k in usual]) if mean is None else {}
+        return Pass(tuple(sensors), mean, noise, alike)
 
     def again(with_: SensorModel) -> Pass:
         own = [_own(with_, passes, i) for i in range(len(campaigns))]

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import shown_unit, to_display
+from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import json_number, write_json
@@ -31,17 +32,20 @@ from accelstudy.drawing.style import (
     say_empty,
     symbol,
 )
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import LEVEL, Found, Lot
 from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
 
+Array = NDArray[np.float64]
+
 EACH = "each"
 """Folder of the calibrations of the sensors."""
 
 
-def said(lot: Lot, found: Sequence[Found]) -> list[str]:
-    """Say what the lot lacks, and which of its sensors are odd; the verdict comes first."""
+def said(lot: Lot, found: Sequence[Found], tilt: Array | None) -> list[str]:
+    """Say what the lot lacks, what it is worth, and which sensors are odd; the verdict is first."""
     alternatives = [
         f"{' or '.join(map(shown, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
     ]
@@ -60,6 +64,8 @@ def said(lot: Lot, found: Sequence[Found]) -> list[str]:
         sum(each.p_value < LEVEL for each in lot.sensors),
         single,
         close,
+        tilt,
+        MAX_TILT_GON * GON,
     )
 
 
@@ -67,6 +73,7 @@ def lot_document(
     lot: Lot,
     found: Sequence[Found],
     calibrated: Sequence[str | None],
+    tilt: Array | None,
     left_out: Mapping[str, str],
 ) -> dict[str, Any]:
     """Describe a lot, in SI.
@@ -76,6 +83,7 @@ def lot_document(
     lot : Lot
     found : of `with_sizes`
     calibrated : for each sensor, why it has no calibration; None if it has one
+    tilt : of `worth`, rad; None where nothing of the catalogue is missing
     left_out : mapping of campaigns that are not in the lot to why
     """
     return {
@@ -114,7 +122,14 @@ def lot_document(
             for (campaign, names, p), failed in zip(lot.each(), calibrated, strict=True)
         ],
         "left_out": [{"campaign": name, "reason": why} for name, why in left_out.items()],
-        "verdict": " ".join(said(lot, found)),
+        "tilt": None
+        if tilt is None
+        else {
+            "roll_mgon": float(tilt[0] / MGON),
+            "pitch_mgon": float(tilt[1] / MGON),
+            "max_tilt_gon": MAX_TILT_GON,
+        },
+        "verdict": " ".join(said(lot, found, tilt)),
     }  # fmt: skip
 
 
@@ -122,6 +137,7 @@ def write_lot(
     lot: Lot,
     found: Sequence[Found],
     fits: Sequence[CampaignFit | InputError],
+    tilt: Array | None,
     approach: Approach,
     folder: str | Path,
     place: str | Path,
@@ -134,6 +150,7 @@ def write_lot(
     lot : Lot
     found : of `with_sizes`
     fits : of `calibrations`
+    tilt : of `worth`, rad; None where nothing of the catalogue is missing
     approach : Approach, of the first campaign
     folder : path, to write to
     place : path of the results, for the commands that the page gives
@@ -146,7 +163,7 @@ def write_lot(
     """
     folder = Path(folder)
     failed = [str(fit) if isinstance(fit, InputError) else None for fit in fits]
-    content = lot_document(lot, found, failed, left_out)
+    content = lot_document(lot, found, failed, tilt, left_out)
     for i, fit in enumerate(fits, start=1):
         if isinstance(fit, CampaignFit):
             name = re.sub(r"[^\w.-]+", "-", fit.campaign.name)
@@ -159,7 +176,7 @@ def write_lot(
         command = suggested.calibrate("CAMPAIGN", of_type, approach.name, of_type)
         steps.append(("Calibrate the next sensor of the type, with what these tell", command))
     drawn = save_all({"sensors": lambda: sensors_figure(lot, found)}, folder / "figures")
-    sentences = said(lot, found)
+    sentences = said(lot, found, tilt)
     state = "no_effect" if not lot.missing else "named" if found else "unknown"
     write_page(
         folder / "report.html",

@@ -17,6 +17,7 @@ from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.files.outputs import LOT, result_folder
 from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
 from accelstudy.lots.output import write_lot
+from accelstudy.lots.worth import worth
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -69,8 +70,17 @@ def evaluate_lot(
     lot = weigh_lot(usable, model, approach, seed, cores)
     fits = calibrations(lot, usable, approach)
     found = with_sizes(lot, fits, model)
-    usual = approach or usual_approach(usable[0])
-    return write_lot(lot, found, fits, usual, folder, place, without)
+    lacks = any(spec is not None for _, spec in lot.effects)
+    return write_lot(
+        lot,
+        found,
+        fits,
+        worth(fits, model) if lacks else None,
+        approach or usual_approach(usable[0]),
+        folder,
+        place,
+        without,
+    )
 
 
 def run_lot(

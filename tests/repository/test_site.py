@@ -127,7 +127,7 @@ def _lot():
     one = Pass(tuple(each))
     effects = tuple((found, name) for _, found in one.found)
     lot = Lot((one, one), get_model("bias-scale"), effects)
-    return lot_document(lot, [found for found, _ in effects], [None] * 3, {})
+    return lot_document(lot, [found for found, _ in effects], [None] * 3, None, {})
 
 
 def _keys(document):
