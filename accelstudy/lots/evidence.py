@@ -41,7 +41,7 @@ ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
 SMALLEST = 1e-300
-"""‖z‖² that can be divided by."""
+"""Variance that can be divided by."""
 NEAR = 0.3
 """Largest difference of the logarithms of settings that are nearly the same."""
 LIKE = 0.2
@@ -161,8 +161,7 @@ class SensorEvidence:
     observed : (K,) array, their log odds in this campaign
     redundancy : int
     residuals : (m,) array, m/s², equally uncertain
-    square : float, ‖z‖² of the residuals, in units of the noise of the type; by its own noise it
-        is the redundancy
+    square : float, ‖z‖² of the residuals, in units of the noise: of the type where it is known
     shown : dict of effect to what its shapes would show in the residuals, in the same units
     """
 
@@ -179,6 +178,13 @@ class SensorEvidence:
     residuals: Array
     square: float = 0.0
     shown: dict[str, Shown] = field(default_factory=dict)
+
+    def nearest(self, name: str, settings: Array) -> tuple[Shown, int] | None:
+        """What is shown of an effect with these settings, or nearly so."""
+        if name not in self.shown:
+            return None
+        place = self.shown[name].nearest(settings)
+        return None if place is None else (self.shown[name], place)
 
 
 def sensor_evidence(
@@ -229,9 +235,7 @@ def sensor_evidence(
         names = tuple(sorted(h.name for h in together.best))
         if len(names) == 2 and OUTLIER not in names:
             pairs[names[0], names[1]] = together.log_density - nothing
-    variance = 1.0
-    if noise is None:
-        variance = max(float(z @ z), SMALLEST) / problem.residuals.redundancy
+    variance = max(problem.evidence.variance(float(z @ z)), SMALLEST) if noise is None else 1.0
     names, by_chance = _by_chance(problem, chance, noise)
     return SensorEvidence(
         campaign=campaign.name,
@@ -293,37 +297,64 @@ def mean_sensor(
     return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
 
 
-def together(sensors: Sequence[SensorEvidence]) -> dict[str, float]:
-    """Log odds of each effect that is equally large in all sensors, against nothing.
+@dataclass(frozen=True)
+class Joint:
+    """An effect in all campaigns together.
 
-    All campaigns are one: the normal equations of their residuals are added. Settings of an effect
-    are those of the first campaign, or nearly so.
+    Attributes
+    ----------
+    odds : float, log odds that it is equally large in all sensors, against nothing
+    shown : tuple of (Shown, int) or None: for each sensor, what it shows of the most probable shape
     """
-    redundancy = sum(each.redundancy for each in sensors)
+
+    odds: float
+    shown: tuple[tuple[Shown, int] | None, ...]
+
+
+def together(sensors: Sequence[SensorEvidence], counted: Sequence[int]) -> dict[str, Joint]:
+    """Weigh each effect by all campaigns as one: the normal equations of residuals are added.
+
+    Settings of an effect are those of the first campaign that shows it, or nearly so.
+
+    Parameters
+    ----------
+    sensors : SensorEvidence of each
+    counted : places of the sensors that count
+    """
+    used = [sensors[i] for i in counted]
+    redundancy = sum(each.redundancy for each in used)
     evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), redundancy)
-    squares = sum(each.square for each in sensors)
+    squares = sum(each.square for each in used)
     nothing = float(evidence.of_noise(squares)[0])
-    odds = {}
-    for name in sorted({name for each in sensors for name in each.shown}):
-        shows = [each.shown[name] for each in sensors if name in each.shown]
-        if 2 * len(shows) <= len(sensors):
-            continue
-        logs = []
-        for settings in shows[0].settings:
-            near = [(one, k) for one in shows if (k := one.nearest(settings)) is not None]
-            normal, right, whole = (
-                np.sum([getattr(one, what)[k] for one, k in near], axis=0)
-                for what in ("normal", "right", "squares")
-            )
-            scale = np.sqrt(np.where(whole > 0, whole, 1.0))
-            values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-            seen = values > VISIBLE**2
-            part = np.sum((vectors.T @ (right / scale))[seen] ** 2 / values[seen])
-            if seen.any():
-                logs.append(evidence.of_spaces(part[None], [int(seen.sum())], squares)[0])
+    joint = {}
+    for name in sorted({name for each in used for name in each.shown}):
+        first = next(each.shown[name] for each in used if name in each.shown)
+        logs, shapes = [], []
+        for settings in first.settings:
+            near = [each.nearest(name, settings) for each in sensors]
+            shown = [near[i] for i in counted]
+            part, dim = _joint_part([one for one in shown if one is not None])
+            if 2 * sum(one is not None for one in shown) > len(used) and dim:
+                logs.append(evidence.of_spaces(np.array([part]), [dim], squares)[0])
+                shapes.append(tuple(near))
         if logs:
-            odds[name] = float(log_mean(np.array(logs))) - nothing
-    return odds
+            odds = float(log_mean(np.array(logs))) - nothing
+            joint[name] = Joint(odds, shapes[int(np.argmax(logs))])
+    return joint
+
+
+def _joint_part(shown: Sequence[tuple[Shown, int]]) -> tuple[float, int]:
+    """‖Qᵀz‖² of all residuals in the space of an effect with one size, and its dimension."""
+    if not shown:
+        return 0.0, 0
+    normal = np.sum([one.normal[k] for one, k in shown], axis=0)
+    right = np.sum([one.right[k] for one, k in shown], axis=0)
+    whole = np.sum([one.squares[k] for one, k in shown], axis=0)
+    scale = np.sqrt(np.where(whole > 0, whole, 1.0))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    seen = values > VISIBLE**2
+    part = float(np.sum((vectors.T @ (right / scale))[seen] ** 2 / values[seen]))
+    return part, int(seen.sum())
 
 
 def _alike(one: Campaign, other: Campaign) -> bool:

@@ -28,6 +28,7 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.lots.evidence import (
     COMMON,
     DRAWS,
+    Joint,
     LotNoise,
     SensorEvidence,
     is_noise,
@@ -38,6 +39,7 @@ from accelstudy.lots.evidence import (
     together,
 )
 from accelstudy.lots.mixture import Mixture, Names, lot_odds
+from accelstudy.lots.sizes import odds_with_sizes
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
@@ -58,6 +60,8 @@ AGREE = 0.02
 """Relative change below which the noise of a type is found."""
 REFITS = 8
 """Most calibrations of all sensors for it."""
+WORTH = 3.0
+"""Log odds from which the sizes of an effect are looked at."""
 EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
@@ -135,13 +139,13 @@ class Pass:
     sensors : tuple of SensorEvidence
     mean : SensorEvidence, of their mean; None if they were in different positions
     noise : LotNoise, of the type; None where each campaign says its own
-    alike : mapping of effects to log odds if they are equally large in all; empty with a mean
+    together : mapping of effects to what all campaigns say of them together
     """
 
     sensors: tuple[SensorEvidence, ...]
     mean: SensorEvidence | None = None
     noise: LotNoise | None = None
-    alike: Mapping[str, float] = field(default_factory=dict)
+    together: Mapping[str, Joint] = field(default_factory=dict)
 
     @cached_property
     def classes(self) -> list[tuple[str, ...]]:
@@ -166,22 +170,29 @@ class Pass:
                 pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        common: dict[Names, float] = {
-            (k,): self.alike[members[0]]
+        joint = {
+            k: self.together[members[0]]
             for k, members in enumerate(self.classes)
-            if members[0] in self.alike
+            if members[0] in self.together
         }
+        common: dict[Names, float] = {(k,): one.odds for k, one in joint.items()}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise.
             of_mean = {name: log for name, log in mean.odds.items() if not is_noise(name)}
             of_mean[COMMON] = mean.odds[LEVEL_OF_NOISE]
-            common = {
+            common |= {
                 (k,): of_mean[members[0]]
                 for k, members in enumerate(self.classes)
                 if members[0] in of_mean
             }
             common |= self._pairs(mean)
-        return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common)
+        table = np.array(odds)
+        typical = {
+            k: sized
+            for k, one in joint.items()
+            if common[k,] > WORTH and (sized := _with_sizes(one, table[:, k])) is not None
+        }
+        return Mixture.of(table, pairs, prior / prior.sum(), common, typical)
 
     def _pairs(self, each: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
@@ -430,8 +441,7 @@ def _weigh_lot(
         if of_mean is not None and not any(effect.sudden for effect in with_.effects):
             with suppress(InputError):  # the positions do not determine the model
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
-        alike = together([sensors[k] for k in usual]) if mean is None else {}
-        return Pass(tuple(sensors), mean, noise, alike)
+        return Pass(tuple(sensors), mean, noise, together(sensors, usual))
 
     def again(with_: SensorModel) -> Pass:
         own = [_own(with_, passes, i) for i in range(len(campaigns))]
@@ -540,6 +550,22 @@ def _explained(
         whole, known = extended(whole, spec.values()), known + 1
         now = again(whole)
     return True
+
+
+def _with_sizes(joint: Joint, own: Array) -> Array | None:
+    """Odds of sensors with sizes of the type; None if sizes of their own explain them better."""
+    at = [i for i, one in enumerate(joint.shown) if one is not None]
+    shown = [one for one in joint.shown if one is not None]
+    normal = np.array([one.normal[k] for one, k in shown])
+    right = np.array([one.right[k] for one, k in shown])
+    odds, log_likelihood = odds_with_sizes(normal, right)
+    shares = np.linspace(0.02, 0.98, 49)[:, None]
+    by_own = np.logaddexp(np.log1p(-shares), np.log(shares) + own[at]).sum(axis=1).max()
+    if log_likelihood < by_own:
+        return None
+    table = own.copy()
+    table[at] = odds
+    return table
 
 
 def _kind(name: str) -> str:

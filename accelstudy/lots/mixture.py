@@ -18,7 +18,7 @@ only the sensors themselves do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations
@@ -72,6 +72,8 @@ class Mixture:
     pairs : mapping of two places, in order, to (n,) arrays of log odds of both together
     prior : (K,) array, prior probabilities of the effects, which sum to 1
     common : mapping of one or two places to the log odds of the mean of the sensors
+    typical : mapping of a place to (n,) array, log odds with sizes of the type, by which shares and
+        sensors are judged
     sets : list of Weighted, most probable first
     """
 
@@ -79,6 +81,7 @@ class Mixture:
     pairs: Mapping[Names, Array]
     prior: Array
     common: Mapping[Names, float]
+    typical: Mapping[int, Array]
     sets: list[Weighted]
 
     @classmethod
@@ -88,9 +91,10 @@ class Mixture:
         pairs: Mapping[Names, Array],
         prior: Array,
         common: Mapping[Names, float] | None = None,
+        typical: Mapping[int, Array] | None = None,
     ) -> Mixture:
         """Weigh the sets of effects, the strongest first."""
-        empty = cls(odds, pairs, prior, common or {}, [])
+        empty = cls(odds, pairs, prior, common or {}, typical or {}, [])
         k = odds.shape[1]
         found: dict[Names, float] = {(): np.log(1 - MISSING) + empty._evidence(())}
         for i in range(k):
@@ -166,7 +170,7 @@ class Mixture:
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the lot lacks some effects."""
         _, weights = self._posterior(names)
-        parts, strange = self._parts(names)
+        parts, strange = self._parts(names, self._judged)
         total = np.logaddexp.reduce([*parts.values(), strange])
 
         def mass(log: Array) -> Array:
@@ -184,6 +188,11 @@ class Mixture:
         """Log odds of each sensor for anything, (n,)."""
         return np.asarray(special.logsumexp(self.odds + np.log(self.prior), axis=1))
 
+    def _judged(self, subset: Names) -> Array:
+        """Log odds as of `_together`, with sizes of the type where these are known, (n,)."""
+        gains = (self.typical[k] - self.odds[:, k] for k in subset if k in self.typical)
+        return np.asarray(sum(gains, self._together(subset)))
+
     def _together(self, subset: Names) -> Array:
         """Log odds of the sensors for some effects together, (n,)."""
         if not subset:
@@ -196,7 +205,9 @@ class Mixture:
         found = self.pairs.get((one, other))
         return both if found is None else np.where(np.isnan(found), both, found)
 
-    def _parts(self, names: Names) -> tuple[dict[Names, Array], Array]:
+    def _parts(
+        self, names: Names, odds_of: Callable[[Names], Array]
+    ) -> tuple[dict[Names, Array], Array]:
         """Log of what each subset, and oddness, contributes: (n, nodes ...) arrays."""
         size = len(names)
         shape = (len(self.odds), *(len(_nodes(size)[0]),) * size) if size else (len(self.odds),)
@@ -206,12 +217,12 @@ class Mixture:
             log = np.full(shape[1:], np.log(1 - ODD))
             for place, i in enumerate(names):
                 log = log + (np.log(rho[place]) if i in subset else _log_of_rest(rho[place]))
-            parts[subset] = self._together(subset).reshape(-1, *[1] * size) + log
+            parts[subset] = odds_of(subset).reshape(-1, *[1] * size) + log
         strange = (np.log(ODD) + self._anything).reshape(-1, *[1] * size)
         return parts, np.broadcast_to(strange, shape)
 
-    def _log_likelihood(self, names: Names) -> Array:
-        parts, strange = self._parts(names)
+    def _log_likelihood(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
+        parts, strange = self._parts(names, odds_of)
         return np.asarray(np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0))
 
     def _evidence(self, names: Names) -> float:
@@ -219,7 +230,7 @@ class Mixture:
 
     def _ways(self, names: Names) -> tuple[float, float]:
         """Log evidence of effects with sizes of each sensor, and of the same one in all."""
-        logs = self._log_likelihood(names) + _log_weights(len(names))
+        logs = self._log_likelihood(names, self._together) + _log_weights(len(names))
         each = float(special.logsumexp(logs))
         if names not in self.common:
             return each, -np.inf
@@ -227,7 +238,7 @@ class Mixture:
 
     def _posterior(self, names: Names) -> tuple[list[Array], Array]:
         """Nodes of each share, and their posterior probabilities (nodes ...)."""
-        logs = self._log_likelihood(names) + _log_weights(len(names))
+        logs = self._log_likelihood(names, self._judged) + _log_weights(len(names))
         return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
 
 
