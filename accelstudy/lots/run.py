@@ -71,11 +71,13 @@ def evaluate_lot(
     fits = calibrations(lot, usable, approach)
     found = with_sizes(lot, fits, model)
     lacks = any(spec is not None for _, spec in lot.effects)
+    odd = {one.campaign for one in lot.odd}
+    usual = [fit for fit, one in zip(fits, lot.sensors, strict=True) if one.campaign not in odd]
     return write_lot(
         lot,
         found,
         fits,
-        worth(fits, model) if lacks else None,
+        worth(usual, model) if lacks else None,
         approach or usual_approach(usable[0]),
         folder,
         place,

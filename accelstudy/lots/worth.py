@@ -33,7 +33,7 @@ def worth(fits: Sequence[CampaignFit | InputError], model: SensorModel) -> Array
 
     Parameters
     ----------
-    fits : calibrations with the model of the type
+    fits : calibrations with the model of the type, of sensors that are not odd
     model : SensorModel, without what was found
     """
     squares = []

@@ -33,6 +33,7 @@ FIGURES = {
     "paper": ["paper.png"],
     "log": ["box.png", "box/segmentation.png", "calibrated/figures/residuals.png"],
     "hidden": ["diagnosed/figures/gap.png", "diagnosed/figures/evidence.png"],
+    "lot": ["lot/figures/sensors.png"],
 }
 """Figures of the examples that pages show."""
 
