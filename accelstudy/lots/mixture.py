@@ -10,10 +10,11 @@ with r_i(s) the odds of the campaign of sensor i for the set s against nothing, 
 over all that could be missing: a sensor may be odd, and then lack something of its own. Sets have
 up to three effects, and a sensor lacks up to two of them.
 
-The r_i take the sizes of the sensors for independent. If the sensors were in the same positions,
-one or two effects may as well be the same in all of them: then the evidence is that of their mean,
-and either is equally probable a priori. The mean tells what is missing; in which of the sensors,
-only the sensors themselves do.
+The r_i take the sizes of the sensors for independent. An effect may as well be the same in all of
+them: then the evidence is that of all campaigns as one, and either is equally probable a priori. If
+the sensors were in the same positions and conditions, it is that of their mean, also for two
+effects. It tells what is missing; in which of the sensors, only the sensors themselves do, with
+odds r_i in which the sizes are those of the type.
 """
 
 from __future__ import annotations

@@ -9,14 +9,24 @@ import numpy as np
 import pytest
 from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
-from scipy import integrate
+from scipy import integrate, stats
 
 from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.evidence import DRAWS, LotNoise, SensorEvidence, lot_classes, mean_sensor
+from accelstudy.diagnosis.evidence.size import AS_GIVEN, Evidence, Level
+from accelstudy.lots.evidence import (
+    DRAWS,
+    LotNoise,
+    SensorEvidence,
+    Shown,
+    lot_classes,
+    mean_sensor,
+    together,
+)
 from accelstudy.lots.lot import LEVEL, Lot, Pass, weigh_lot
 from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Mixture
+from accelstudy.lots.sizes import odds_with_sizes
 from accelstudy.sensors.models import get_model
 
 STANDARD_ERRORS = 3.3
@@ -109,6 +119,59 @@ def test_probabilities_of_sensors_are_right():
         p = np.mean(np.array(said)[chosen])
         apart = STANDARD_ERRORS * np.sqrt(p * (1 - p) / chosen.sum()) + 0.03
         assert np.mean(np.array(true)[chosen]) == pytest.approx(p, abs=apart)
+
+
+def shows(rng, sizes):
+    """What sensors with an effect of some sizes (n, 2) show of it, in 30 numbers of noise 1."""
+    derivatives = rng.standard_normal((len(sizes), 30, 2))
+    z = np.einsum("nmk,nk->nm", derivatives, sizes) + rng.standard_normal((len(sizes), 30))
+    normal = np.einsum("nmk,nml->nkl", derivatives, derivatives)
+    return derivatives, z, normal, np.einsum("nmk,nm->nk", derivatives, z)
+
+
+def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
+    """The evidence is that of one campaign with all residuals, by least squares."""
+    rng = np.random.default_rng(8)
+    derivatives, z, normal, right = shows(rng, np.full((4, 2), 0.3))
+    sensors = []
+    for d, one, n, b in zip(derivatives, z, normal, right, strict=True):
+        shown = Shown(np.zeros((1, 0)), n[None], b[None], np.sum(d**2, axis=0)[None])
+        none = np.zeros((DRAWS, 0))
+        sensors.append(SensorEvidence("c", 0.5, {}, {}, (), {}, none, (), np.zeros(0), 30, one,
+                                      float(one @ one), {"effect": shown}))  # fmt: skip
+    joint = together(sensors, range(4))["effect"]
+    d, one = derivatives.reshape(-1, 2), z.ravel()
+    fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
+    evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), 120)
+    part = evidence.of_spaces(np.array([fitted @ fitted]), [2], one @ one)[0]
+    assert joint.odds == pytest.approx(part - evidence.of_noise(one @ one)[0], rel=1e-6)
+    assert len(joint.shown) == 4
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.25])
+def test_sizes_of_the_type_say_which_sensors_have_it(scatter):
+    """Of what is said with a probability of p, a part p is so, and intervals hold the share."""
+    rng, said, true, inside, n = np.random.default_rng(9), [], [], [], 60
+    for _ in range(n):
+        share = 1.0 if rng.random() < ALL else rng.random()
+        lacks = rng.random(20) < share
+        sizes = np.array([0.35, -0.25]) * (1 + scatter * rng.standard_normal((20, 2)))
+        _, _, normal, right = shows(rng, sizes * lacks[:, None])
+        typical, _ = odds_with_sizes(normal, right)
+        mixture = Mixture.of(np.zeros((20, 1)), {}, np.ones(1), {(0,): 50.0}, {0: typical})
+        said += mixture.lacking(0).tolist()
+        true += lacks.tolist()
+        _, low, high = mixture.share(0)
+        inside.append(low <= share <= high)
+    for low, high in ((0.0, 0.2), (0.8, 1.0)):
+        chosen = (np.array(said) >= low) & (np.array(said) <= high)
+        p = np.mean(np.array(said)[chosen])
+        apart = STANDARD_ERRORS * np.sqrt(p * (1 - p) / chosen.sum()) + 0.05
+        assert np.mean(np.array(true)[chosen]) == pytest.approx(p, abs=apart)
+    assert np.mean(inside) > 0.95 - STANDARD_ERRORS * np.sqrt(0.0475 / n)
+    right = (np.array(said) > 0.5) == np.array(true)
+    # With sizes that are known, and as many sensors with it as without: Φ(√λ/2).
+    assert np.mean(right) > stats.norm.cdf(np.sqrt(30 * (0.35**2 + 0.25**2)) / 2) - 0.03
 
 
 def test_nothing_missing_is_called_so_at_one_level():
