@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -374,25 +375,27 @@ class Log:
         lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
         clock = self.places.get("time")
         start = None
-        for raw in self.source.read(list(self.places.values()), self.chunk_size, clock):
-            if clock is not None:
-                raw[:, keys.index("time")] *= self.time_factor
-            if "nanoseconds" in keys:
-                raw[:, keys.index("time")] += 1e-9 * raw[:, keys.index("nanoseconds")]
-            check_numbers(self.source, self.places, raw, row, self.conditions)
-            forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
-            if clock is not None:
-                start = raw[0, keys.index("time")] if start is None else start
-                time = raw[:, keys.index("time")] - start
-                self._check_order(time, last, row)
-                last = time[-1]
-            else:
-                assert self.rate is not None
-                time = np.arange(row, row + len(raw)) / self.rate
-            lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
-            highest = np.maximum(highest, raw[:, axes].max(axis=0))
-            row += len(raw)
-            yield Rows(time, forces, raw[:, others])
+        # What is wrong in the middle of a file must not leave it open.
+        with closing(self.source.read(list(self.places.values()), self.chunk_size, clock)) as rows:
+            for raw in rows:
+                if clock is not None:
+                    raw[:, keys.index("time")] *= self.time_factor
+                if "nanoseconds" in keys:
+                    raw[:, keys.index("time")] += 1e-9 * raw[:, keys.index("nanoseconds")]
+                check_numbers(self.source, self.places, raw, row, self.conditions)
+                forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
+                if clock is not None:
+                    start = raw[0, keys.index("time")] if start is None else start
+                    time = raw[:, keys.index("time")] - start
+                    self._check_order(time, last, row)
+                    last = time[-1]
+                else:
+                    assert self.rate is not None
+                    time = np.arange(row, row + len(raw)) / self.rate
+                lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
+                highest = np.maximum(highest, raw[:, axes].max(axis=0))
+                row += len(raw)
+                yield Rows(time, forces, raw[:, others])
         if row < 2:
             raise InputError(f"{self.path}: too few samples ({row})")
         for axis, constant in zip(AXES, lowest == highest, strict=True):

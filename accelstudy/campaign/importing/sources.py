@@ -8,7 +8,7 @@ import re
 import warnings
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 from itertools import islice
@@ -67,7 +67,7 @@ class Source(Protocol):
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Iterator[Array]:
+    ) -> Generator[Array, None, None]:
         """Rows of the columns at `places`, (k, len(places)), k > 0; NaN where there is no number.
 
         The column at the place `clock` counts from its first value, since a time in ns since 1970
@@ -156,7 +156,7 @@ class TextSource:
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Iterator[Array]:
+    ) -> Generator[Array, None, None]:
         """Rows of some columns; see `Source`."""
         import pandas as pd
 
@@ -343,7 +343,7 @@ def rows_of(
     places: Sequence[int],
     dates: Set[int],
     clock: int | None,
-) -> Iterator[Array]:
+) -> Generator[Array, None, None]:
     """Columns of each chunk as rows of `Source.read`; dates in ns become s."""
     origins: list[Any] = []
     for columns in chunks:
@@ -381,7 +381,7 @@ class ArraySource:
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Iterator[Array]:
+    ) -> Generator[Array, None, None]:
         """Rows of some columns; see `Source`."""
         starts = range(0, len(self.values), chunk_size)
         chunks = (self.values[i : i + chunk_size] for i in starts)
@@ -455,7 +455,7 @@ class ParquetSource:
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Iterator[Array]:
+    ) -> Generator[Array, None, None]:
         """Rows of some columns; see `Source`."""
         import pyarrow as pa
 
