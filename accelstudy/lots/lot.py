@@ -291,7 +291,15 @@ class Pass:
         """The same without the sensors that are odd."""
         if not (odd := {one.campaign for one in self.odd}):
             return self
-        return replace(self, sensors=tuple(e for e in self.sensors if e.campaign not in odd))
+        usual = [i for i, each in enumerate(self.sensors) if each.campaign not in odd]
+        return replace(
+            self,
+            sensors=tuple(self.sensors[i] for i in usual),
+            together={
+                name: replace(joint, shown=tuple(joint.shown[i] for i in usual))
+                for name, joint in self.together.items()
+            },
+        )
 
     @cached_property
     def each(self) -> list[tuple[tuple[str, ...], float]]:

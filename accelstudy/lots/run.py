@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -59,7 +60,8 @@ def evaluate_lot(
 
     Parameters
     ----------
-    campaigns, model, approach, seed, cores : as in `weigh_lot`
+    campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
+        numbers behind it
     folder : path, to write to
     place : path of the results, for the commands that the page gives
     left_out : mapping of campaigns that could not be read to what is wrong with them; what cannot
@@ -76,7 +78,10 @@ def evaluate_lot(
         If fewer than two campaigns can be judged.
     """
     usable, without = [], dict(left_out or {})
-    for campaign in campaigns:
+    names = Counter(campaign.name for campaign in campaigns)
+    for number, given in enumerate(campaigns, start=1):
+        name = given.name if names[given.name] == 1 else f"{given.name} ({number})"
+        campaign = replace(given, name=name)
         try:
             fit_base(campaign, model, approach or usual_approach(campaign))
             usable.append(campaign)

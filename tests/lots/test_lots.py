@@ -17,6 +17,7 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, Evidence, Level
 from accelstudy.lots.evidence import (
     DRAWS,
+    Joint,
     LotNoise,
     SensorEvidence,
     Shown,
@@ -195,6 +196,16 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     assert one.found == []
     assert [(o.campaign, o.names) for o in lot.odd] == [("sensor 7", ("quadratic_scale",))]
     assert [names for _, names, _ in lot.each() if names] == [("odd",)]
+    # Without it the others are weighed as before, also what all campaigns say together.
+    _, _, normal, right = shows(rng, np.full((20, 2), 0.5))
+    each = [
+        (Shown(np.zeros((1, 0)), n[None], b[None], np.ones((1, 2))), 0)
+        for n, b in zip(normal, right, strict=True)
+    ]
+    rest = replace(one, together={"warm_up": Joint(50.0, tuple(each))}).without_odd()
+    assert len(rest.sensors) == 19
+    assert rest.alternatives[0][0] == ("warm_up",)
+    assert rest.mixture.share(rest.classes.index(("warm_up",)))[0] > 0.9
 
 
 def test_names_that_no_campaign_tells_apart_are_one_class():
