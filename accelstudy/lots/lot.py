@@ -216,8 +216,8 @@ class Pass:
             return np.stack([known.get(name, nothing) for name in names], axis=-1)
 
         prior /= prior.sum()
-        seen = lot_odds([of_all(each, each.observed) for each in self.sensors], prior)
-        by_chance = lot_odds([of_all(each, each.by_chance) for each in self.sensors], prior)
+        seen = lot_odds((of_all(each, each.observed) for each in self.sensors), prior)
+        by_chance = lot_odds((of_all(each, each.by_chance) for each in self.sensors), prior)
         return float((1 + np.sum(by_chance >= seen)) / (DRAWS + 1))
 
     @property

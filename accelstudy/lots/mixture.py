@@ -19,7 +19,7 @@ odds r_i in which the sizes are those of the type.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations
@@ -266,7 +266,7 @@ def _log_weights(size: int) -> Array:
     return np.asarray(np.log(weights))
 
 
-def lot_odds(odds: Sequence[Array], prior: Array) -> Array:
+def lot_odds(odds: Iterable[Array], prior: Array) -> Array:
     """Log odds that one effect is missing in a share of the sensors, against nothing.
 
     Parameters
@@ -279,8 +279,8 @@ def lot_odds(odds: Sequence[Array], prior: Array) -> Array:
     (...) array
     """
     nodes, weights = _nodes(2)
-    logs = np.zeros((*odds[0].shape, len(nodes)))
+    logs = np.zeros(len(nodes))
     for each in odds:
-        logs += np.logaddexp(_log_of_rest(nodes), each[..., None] + np.log(nodes))
+        logs = logs + np.logaddexp(_log_of_rest(nodes), each[..., None] + np.log(nodes))
     by_effect = special.logsumexp(logs + np.log(weights), axis=-1)
     return np.asarray(special.logsumexp(by_effect + np.log(prior), axis=-1))
