@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import whitened_jacobian
+from accelstudy.adjustment.observations import Known
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
@@ -75,6 +76,7 @@ def estimability(
     parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
+    known: Known | None = None,
 ) -> Estimability:
     """Work out what a scheme determines, before any simulation.
 
@@ -91,11 +93,13 @@ def estimability(
     gravity : float, m/s²
     hold : HoldConditions, optional
         What a session knows of its positions beyond their directions (temperature, time, …).
+    known : mapping, optional, what is known of parameters a priori, as in `Observations`
     """
+    known = known or {}
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
-    a = _design(scheme.directions, model, approach, noise, ideal, gravity, hold)
+    a = _design(scheme.directions, model, approach, noise, ideal, gravity, hold, known)
     rank, condition, free = rank_of(a)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
@@ -111,7 +115,7 @@ def estimability(
     else:
         if parameters is not None:
             at = np.asarray(parameters, dtype=float)
-            a = _design(scheme.directions, model, approach, noise, at, gravity, hold)
+            a = _design(scheme.directions, model, approach, noise, at, gravity, hold, known)
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
     return Estimability(
@@ -135,17 +139,19 @@ def _design(
     parameters: Array,
     gravity: float,
     hold: HoldConditions | None,
+    known: Known,
 ) -> Array:
     """Design matrix (conditions, u) with unit weights."""
     ideal = session(model, parameters, directions, gravity, hold)
-    return whitened_jacobian(model, approach, ideal.observations(noise), parameters)
+    observed = replace(ideal.observations(noise), known=known)
+    return whitened_jacobian(model, approach, observed, parameters)
 
 
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
     """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
     ideal = np.zeros(model.n_parameters)
     hold = EVERYTHING_VARIES.hold(MANY)
-    a = _design(evenly_spread(MANY), model, approach, noise, ideal, gravity, hold)
+    a = _design(evenly_spread(MANY), model, approach, noise, ideal, gravity, hold, {})
     return rank_of(a)[0] < a.shape[1]
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
-from accelstudy.adjustment.observations import AngleErrors, Known
+from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of
@@ -34,7 +34,6 @@ class Noise:
     sigma_gravity : float, m/s², of the value of gravity; 0 holds it fixed in the adjustment
     gravity_error : float, m/s², error of the value of gravity, in addition to its noise
     effects : tuple of str, noise effects of the forces, in the order in which they act
-    known : mapping of str to (mean, sigma), SI, what is known a priori of parameters
     """
 
     sigma_force: float = 0.002
@@ -42,7 +41,6 @@ class Noise:
     sigma_gravity: float = 0.0
     gravity_error: float = 0.0
     effects: tuple[str, ...] = ()
-    known: Known = field(default_factory=dict, hash=False)
 
 
 def sigma_of_mean(sigma_sample: float, rate: float, duration: float) -> float:
@@ -103,7 +101,6 @@ class Session:
             gravity=np.array([self.gravity + noise.gravity_error]),
             sigma_gravity=noise.sigma_gravity,
             hold=self.hold,
-            known=noise.known,
         )
 
     def draw(

@@ -188,7 +188,6 @@ def campaign_noise(campaign: Campaign) -> Noise:
         sigma_force=UNIT_SIGMA if campaign.sigma_force is None else campaign.sigma_force,
         sigma_angle=campaign.sigma_angle or 0.0,
         sigma_gravity=campaign.sigma_gravity,
-        known=_known(campaign),
     )
 
 
@@ -331,6 +330,7 @@ def campaign_estimability(
         campaign_noise(campaign),
         gravity=campaign.gravity,
         hold=campaign.hold,
+        known=_known(campaign),
     )
 
 
