@@ -110,6 +110,11 @@ class Campaign:
         return len(self.forces)
 
     @property
+    def prior(self) -> str | None:
+        """File that tells what is known a priori; None if there is none."""
+        return None if self.of_type is None else self.of_type.file
+
+    @property
     def hold(self) -> HoldConditions:
         """What is known of the holds besides the forces, as the effects take it."""
         # The position before a hold acts on it, whether that position is used or not.

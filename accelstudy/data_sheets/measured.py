@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import recorded_unit, to_recorded
+from accelstudy.basics.units import recorded_unit
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
 from accelstudy.campaign.importing.logs import import_sensors
@@ -98,19 +98,7 @@ def sheet_of_campaign(folder: str | Path) -> DataSheet:
 
 def yaml_of(sheet: DataSheet) -> str:
     """Write a data sheet as YAML for `read_data_sheet`; unknown quantities are comments."""
-    content: dict[str, object] = {
-        "name": sheet.name,
-        "title": sheet.title,
-        "source": sheet.source,
-    }
-    for key in sheet.known:
-        unit = QUANTITIES[key][0]
-        value = float(to_recorded(getattr(sheet, key), unit))
-        content[key] = {
-            "value": f"{value:.4g} {recorded_unit(unit)}",
-            "source": sheet.sources.get(key, ""),
-        }
-    lines = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=96)
+    lines = yaml.safe_dump(sheet.content, sort_keys=False, allow_unicode=True, width=96)
     rest = [
         f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
         for key in sheet.unknown

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.units import STANDARD_GRAVITY, recorded_unit, to_recorded
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
@@ -99,6 +99,23 @@ class DataSheet:
         """Quantities without a value; the noise always has one."""
         noise = ("velocity_random_walk", "position_sigma")
         return tuple(n for n in QUANTITIES if n not in self.known and n not in noise)
+
+    @property
+    def content(self) -> dict[str, object]:
+        """What `read_data_sheet` reads; each known quantity with its unit and its source."""
+        content: dict[str, object] = {
+            "name": self.name,
+            "title": self.title,
+            "source": self.source,
+        }
+        for key in self.known:
+            unit = QUANTITIES[key][0]
+            value = float(to_recorded(getattr(self, key), unit))
+            content[key] = {
+                "value": f"{value:.4g} {recorded_unit(unit)}",
+                "source": self.sources.get(key, ""),
+            }
+        return content
 
     def sigma_mean(self, seconds: float, session: float | None = None) -> float:
         """Standard deviation of the mean of a hold, m/s².

@@ -376,6 +376,15 @@ class Lot:
         """Odd sensors, with all that was found in the model; the surest first."""
         return self.passes[-1].odd
 
+    def usual(self, fits: Sequence[CampaignFit | InputError]) -> list[CampaignFit]:
+        """Those of the `calibrations` that there are, without odd sensors."""
+        odd = {one.campaign for one in self.odd}
+        return [
+            fit
+            for fit, sensor in zip(fits, self.sensors, strict=True)
+            if isinstance(fit, CampaignFit) and sensor.campaign not in odd
+        ]
+
     def each(self) -> list[tuple[str, tuple[str, ...], float]]:
         """Campaign, names of what it lacks under the lot, and their posterior, for each sensor."""
         told = {found.names[0] for found, _ in self.effects}
@@ -444,9 +453,11 @@ def _weigh_lot(
         sensors = list(track(each, "evidence of the sensors", n))
         odd, mean = {one.campaign for one in Pass(tuple(sensors)).odd}, None
         usual = [k for k, one in enumerate(sensors) if one.campaign not in odd]
-        of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
+        of_mean = None
         # What happens to each sensor at a time of its own has no mean.
-        if of_mean is not None and not any(effect.sudden for effect in with_.effects):
+        if not any(effect.sudden for effect in with_.effects):
+            of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
+        if of_mean is not None:
             with suppress(InputError):  # the positions do not determine the model
                 mean = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
         return Pass(tuple(sensors), mean, noise, together(sensors, usual))

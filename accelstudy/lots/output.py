@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.approaches import Approach
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import path_name
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import probability
 from accelstudy.campaign.calibration.assessment import assess
@@ -166,8 +166,7 @@ def write_lot(
     content = lot_document(lot, found, failed, tilt, left_out)
     for i, fit in enumerate(fits, start=1):
         if isinstance(fit, CampaignFit):
-            name = re.sub(r"[^\w.-]+", "-", fit.campaign.name)
-            its_own = folder / EACH / f"{i:04d}-{name}"
+            its_own = folder / EACH / f"{i:04d}-{path_name(fit.campaign.name, 'sensor')}"
             its_own.mkdir(parents=True)
             write_json(its_own / "calibration.json", calibration_content(fit, assess(fit)))
     steps = []

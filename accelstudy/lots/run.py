@@ -96,13 +96,11 @@ def evaluate_lot(
     fits = calibrations(lot, usable, approach)
     found = with_sizes(lot, fits, model)
     lacks = any(spec is not None for _, spec in lot.effects)
-    odd = {one.campaign for one in lot.odd}
-    usual = [fit for fit, one in zip(fits, lot.sensors, strict=True) if one.campaign not in odd]
     return write_lot(
         lot,
         found,
         fits,
-        worth(usual, model) if lacks else None,
+        worth(lot.usual(fits), model) if lacks else None,
         approach or usual_approach(usable[0]),
         folder,
         place,
@@ -141,7 +139,7 @@ def run_lot(
         return evaluate_lot(campaigns, new, model, approach, settings.seed, cores, out, unread)
 
 
-def worth(fits: Sequence[CampaignFit | InputError], model: SensorModel) -> Array | None:
+def worth(fits: Sequence[CampaignFit], model: SensorModel) -> Array | None:
     """Rms tilt error of the sensors by what their model lacked, (2,), rad, of roll and of pitch.
 
     It is over tilts up to `MAX_TILT_GON`, in the conditions of the campaigns, and without what the
@@ -154,9 +152,8 @@ def worth(fits: Sequence[CampaignFit | InputError], model: SensorModel) -> Array
     """
     squares = []
     for fit in fits:
-        if isinstance(fit, CampaignFit):
-            with suppress(InputError):
-                squares.append(_of_sensor(fit, model))
+        with suppress(InputError):
+            squares.append(_of_sensor(fit, model))
     if not squares:
         return None
     return np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0))

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
-from accelstudy.data_sheets import QUANTITIES
+from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import Effect
 from accelstudy.files.outputs import whole_file
 from accelstudy.lots.lot import Lot
@@ -48,22 +48,13 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
     bool
         Whether there is one; not if fewer than two sensors were calibrated.
     """
-    odd = {one.campaign for one in lot.odd}
-    used = [
-        fit
-        for fit, sensor in zip(fits, lot.sensors, strict=True)
-        if isinstance(fit, CampaignFit) and sensor.campaign not in odd
-    ]
+    used = lot.usual(fits)
     if len(used) < 2:
         return False
     lasting = [effect for effect in lot.model.effects if not effect.sudden]
     parameters = _typical(lot, lasting, used)
-    title = f"{len(used)} sensors of a type"
     content = {
-        "name": "type",
-        "title": title,
-        "source": "accelstudy lot",
-        **_sheet(lot, parameters, title),
+        **_sheet(lot, parameters, f"{len(used)} sensors of a type").content,
         **TypeFile(
             schema_version=1,
             models={"type": [effect.spec for effect in lasting]},
@@ -82,22 +73,21 @@ def _typical(
 ) -> dict[str, TypicalParameter]:
     """Mean and scatter of each parameter; of an effect, over the sensors that have it."""
     lacks = {campaign: names for campaign, names, _ in lot.each()}
-    rows, in_all = {}, {}
+    rows: dict[str, NDArray[np.bool_]] = {}
     for found, spec in lot.effects:
         if spec is not None:
             has = np.array([found.names[0] in lacks[fit.campaign.name] for fit in fits])
-            for name in compose(spec, (spec,)).parameter_names:
-                rows[name], in_all[name] = has, bool(has.all())
+            rows |= dict.fromkeys(compose(spec, (spec,)).parameter_names, has)
+    everyone = np.ones(len(fits), dtype=bool)
+    values = np.array([fit.parameters for fit in fits])
+    variances = np.array([fit.sigma**2 for fit in fits])
     typical = {}
     wanted = {parameter for effect in lasting for parameter in effect.parameters}
     for j, parameter in enumerate(lot.model.parameters):
         if parameter not in wanted:
             continue
-        chosen = rows.get(parameter.name, np.ones(len(fits), dtype=bool))
-        of = [fit for fit, use in zip(fits, chosen, strict=True) if use]
-        values = np.array([fit.parameters[j] for fit in of])
-        variances = np.array([fit.sigma[j] ** 2 for fit in of])
-        of_type = RandomEffects(values, variances, np.ones((len(values), 1)))
+        has = rows.get(parameter.name, everyone)
+        of_type = RandomEffects(values[has, j], variances[has, j], np.ones((has.sum(), 1)))
         some = of_type.dof > 0
         typical[parameter.name] = TypicalParameter(
             mean=float(of_type.estimates[0]),
@@ -105,24 +95,20 @@ def _typical(
             scatter=of_type.scatter,
             scatter_below=of_type.scatter_interval(2 * BOUND - 1)[1] if some else 0.0,
             unit=parameter.unit,
-            in_all=some and bool(lot.model.stays[j]) and in_all.get(parameter.name, True),
+            in_all=some and bool(lot.model.stays[j] and has.all()),
         )
     return typical
 
 
-def _sheet(lot: Lot, parameters: dict[str, TypicalParameter], source: str) -> dict[str, Any]:
-    """Noise and errors before calibration, each as a number with its unit and its source."""
-    values = {}
-    if (noise := lot.passes[-1].noise) is not None:
-        values["position_sigma"] = noise.sigma
+def _sheet(lot: Lot, parameters: dict[str, TypicalParameter], title: str) -> DataSheet:
+    """Noise of a position mean, and errors before calibration."""
+    noise = lot.passes[-1].noise
+    assert noise is not None
+    values: dict[str, Any] = {"position_sigma": noise.sigma}
     for effect in lot.model.effects:
         if (quantity := SHEET.get(effect.name)) is not None:
-            names = compose(effect.spec, (effect.spec,)).parameter_names
-            squares = [parameters[n].mean ** 2 + parameters[n].scatter ** 2 for n in names]
+            of_effect = [parameters[parameter.name] for parameter in effect.parameters]
+            squares = [one.mean**2 + one.scatter**2 for one in of_effect]
             values[quantity] = float(np.sqrt(np.mean(squares)))
-    sheet = {}
-    for quantity, value in values.items():
-        unit = QUANTITIES[quantity][0]
-        shown = f"{float(to_recorded(value, unit)):.4g} {recorded_unit(unit)}"
-        sheet[quantity] = {"value": shown, "source": source}
-    return sheet
+    sources = dict.fromkeys(values, title)
+    return DataSheet("type", title, "accelstudy lot", sources=sources, **values)

@@ -52,8 +52,8 @@ class Entry(Block):
             raise ValueError(f"give exactly one of {', '.join(KINDS)}")
         if self.campaign is not None and self.settings is not None:
             raise ValueError("import: goes with log or public; a campaign is imported already")
+        _check_names(self.model, self.approach)
         try:
-            _check_names(self.model, self.approach)
             if self.public is not None:
                 import_settings(self.public)
         except InputError as error:
@@ -108,10 +108,7 @@ class LotSettings(Block):
 
     @model_validator(mode="after")
     def _names_exist(self) -> Self:
-        try:
-            _check_names(self.model, self.approach)
-        except InputError as error:
-            raise ValueError(str(error)) from None
+        _check_names(self.model, self.approach)
         return self
 
 
@@ -132,8 +129,8 @@ class BatchConfig(Configuration):
 
     @model_validator(mode="after")
     def _names_exist(self) -> Self:
+        _check_names(self.model, self.approach)
         try:
-            _check_names(self.model, self.approach)
             twice = [name for name, n in Counter(t.name for t in self.tasks()).items() if n > 1]
         except InputError as error:
             raise ValueError(str(error)) from None
@@ -190,10 +187,14 @@ def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConf
 
 
 def _check_names(model: str | None, approach: str | None) -> None:
-    if model is not None:
-        get_model(model)
-    if approach is not None:
-        get_approach(approach)
+    """Raise `ValueError`, as pydantic wants it, for a name that does not exist."""
+    try:
+        if model is not None:
+            get_model(model)
+        if approach is not None:
+            get_approach(approach)
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 def _path(entry: Entry) -> str:

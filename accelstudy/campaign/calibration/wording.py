@@ -65,8 +65,8 @@ def next_steps(
     -------
     list of (purpose, command)
     """
-    prior = None if fit.campaign.of_type is None else fit.campaign.of_type.file
-    diagnose = suggested.diagnose(campaign, fit.model.name, fit.approach.name, prior)
+    chosen = fit.model.name, fit.approach.name, fit.campaign.prior
+    diagnose = suggested.diagnose(campaign, *chosen)
     if state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [

@@ -221,17 +221,17 @@ def next_steps(
     campaign, place : paths of the folders of the campaign and of the results
     """
     d, steps = diagnosis, []
-    chosen, result = (campaign, d.model.name, d.approach.name), Path(place) / suggested.HERE
-    prior = None if d.campaign.of_type is None else d.campaign.of_type.file
+    chosen = (campaign, d.model.name, d.approach.name, d.campaign.prior)
+    result = Path(place) / suggested.HERE
     if d.recognised is not None:
-        command = suggested.calibrate(*chosen, prior)
+        command = suggested.calibrate(*chosen)
         steps.append(("Correct the campaign, and calibrate it then", command))
     if d.verdict in ("narrowed", "unknown", "learned"):
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
-        steps.append((what, suggested.diagnose(*chosen, prior)))
+        steps.append((what, suggested.diagnose(*chosen)))
     if d.better_for_leveling == "base":
-        command = suggested.calibrate(*chosen, prior)
+        command = suggested.calibrate(*chosen)
         return [*steps, ("Calibrate with the base model, which levels better", command)]
     if calibration is None or not calibration["quality"]["plausible"]:
         return steps
