@@ -86,7 +86,9 @@ def _typical(
     for j, parameter in enumerate(lot.model.parameters):
         if parameter not in wanted:
             continue
-        has = rows.get(parameter.name, everyone)
+        told = rows.get(parameter.name, everyone)
+        # Where no campaign of those that have it could be calibrated, the others tell of it.
+        has = told if told.any() else everyone
         of_type = RandomEffects(values[has, j], variances[has, j], np.ones((has.sum(), 1)))
         some = of_type.dof > 0
         typical[parameter.name] = TypicalParameter(
@@ -95,7 +97,7 @@ def _typical(
             scatter=of_type.scatter,
             scatter_below=of_type.scatter_interval(2 * BOUND - 1)[1] if some else 0.0,
             unit=parameter.unit,
-            in_all=some and bool(lot.model.stays[j] and has.all()),
+            in_all=some and bool(lot.model.stays[j] and told.all()),
         )
     return typical
 
