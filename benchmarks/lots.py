@@ -2,9 +2,10 @@
 
     python benchmarks/lots.py [LOTS] [SEED]       # 40 lots of each kind: half an hour of two cores
 
-Prints, for each kind, how often something is found, named rightly and named wrongly, how often
-intervals of shares hold them, how many sensors are judged rightly, and how often sensors are odd.
-Each lot has a design, an approach and an effect at random.
+Prints, for each kind, how often something is found, named rightly (and by an oracle that knows all
+but the name, and always gives one) and named wrongly, how often intervals of shares hold them, how
+many sensors are judged rightly, and how often sensors are odd. Each lot has a design, an approach
+and an effect at random.
 """
 
 import logging
@@ -18,7 +19,7 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.hidden.cells import distinct_pairs
-from accelstudy.hidden.judging import all_true
+from accelstudy.hidden.judging import all_true, same_effects
 from accelstudy.hidden.physics import (
     APPROACHES,
     DESIGNS,
@@ -27,7 +28,7 @@ from accelstudy.hidden.physics import (
     visible_outside,
     visible_unforeseen,
 )
-from accelstudy.hidden.physics.lots import LotCase, generate_lot
+from accelstudy.hidden.physics.lots import LotCase, generate_lot, lot_oracle
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
 from timing import table
@@ -130,6 +131,8 @@ def judged(job):
         "sensors": [
             bool({*names} & classes[case.effects[0]]) for _, names, _ in lot.each()
         ] if kind.shares == (1.0,) and kind.named else [],
+        "oracle": same_effects(lot_oracle(case, made).told, [*classes.values()])
+                  if kind.named and len(kind.shares) == 1 and of_type else None,
         "odd": None if of_type else carriers <= odd,
         "odd wrongly": bool(odd - carriers),
     }  # fmt: skip
@@ -156,12 +159,13 @@ def main(lots, seed):
         inside, sensors = ([x for one in of_kind for x in one[k]] for k in ("shares", "sensors"))
         rows.append([
             kind.title, f"{kind.lam:g}" if kind.lam else "", str(len(of_kind)),
-            *(share([one[k] for one in of_kind]) for k in ("missing", "named", "wrong")),
+            *(share([one[k] for one in of_kind]) for k in ("missing", "named", "oracle", "wrong")),
             share(inside), f"{np.mean(sensors):.2f}" if sensors else "",
             *(share([one[k] for one in of_kind]) for k in ("odd", "odd wrongly")),
         ])  # fmt: skip
     head = [
-        "what the lot lacks", "λ", "lots", "anything missing", "named rightly", "a wrong name",
+        "what the lot lacks", "λ", "lots", "anything missing", "named rightly", "by the oracle",
+        "a wrong name",
         "share inside", "sensors rightly", "odd found", "odd wrongly",
     ]  # fmt: skip
     print(table(head, *rows))

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -21,23 +19,15 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level, log_mean
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import VISIBLE
 from accelstudy.effects import Effect
+from accelstudy.lots.noise import LEAST_SIGMA, LotNoise, sigma_stated, with_noise
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEAST_SIGMA = 1e-9
-"""m/s², of readings that are their own model."""
 DRAWS = 1000
 """Sets of residuals without any effect, of each campaign."""
-FREEDOMS = (AS_GIVEN, 60.0, 20.0, 8.0, DOUBTED)
-"""ν of a type, the most first."""
-ALIKE = 1.0
-"""Difference of log likelihoods that says nothing."""
-ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
-"""Share of sensors whose variance may be anything, and ν of these."""
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
 SMALLEST = 1e-300
@@ -51,69 +41,19 @@ SAME = 0.15
 
 
 @dataclass(frozen=True)
-class LotNoise:
-    """The noise of a type: variances of its sensors are σ² times an inverse-gamma(ν/2, ν/2).
-
-    Attributes
-    ----------
-    sigma : float, m/s², of a position mean
-    freedom : float, ν: few where sensors differ in noise
-    doubt : float, prior probability that a sensor has a noise of its own
-    """
-
-    sigma: float
-    freedom: float
-    doubt: float = 0.02
-
-    @classmethod
-    def of(cls, sigmas: Array, redundancies: Array) -> LotNoise:
-        """Of the variances s² of calibrations, of which s²/σ² is of F(r, ν), but for odd ones.
-
-        Of the ν that explain them equally well the largest one is taken.
-
-        Parameters
-        ----------
-        sigmas, redundancies : (n,) arrays, s in m/s² and r, of the sensors
-        """
-        squares = np.square(sigmas)
-
-        def less_likely(log: float, freedom: float) -> float:
-            ratios = squares / np.exp(log)
-            usual, odd = (stats.f.logpdf(ratios, redundancies, nu) for nu in (freedom, ODD_FREEDOM))
-            usual, odd = usual + np.log(1 - ODD_SHARE), odd + np.log(ODD_SHARE)
-            return float(len(squares) * log - np.sum(np.logaddexp(usual, odd)))
-
-        middle = float(np.median(np.log(squares)))
-        best = [
-            optimize.minimize_scalar(less_likely, (middle - 0.2, middle + 0.2), args=(nu,))
-            for nu in FREEDOMS
-        ]
-        least = min(one.fun for one in best)
-        log, freedom = next(
-            (one.x, nu) for one, nu in zip(best, FREEDOMS, strict=True) if one.fun < least + ALIKE
-        )
-        return cls(float(np.exp(log / 2)), freedom)
-
-    @property
-    def level(self) -> Level:
-        """What a campaign knows of its noise by that of the others."""
-        if not self.doubt:
-            return Level((1.0,), (self.freedom,), known=True)
-        return Level((1 - self.doubt, self.doubt), (self.freedom, DOUBTED), known=True)
-
-
-@dataclass(frozen=True)
 class Shown:
     """The shapes of an effect in the residuals z of a campaign, in units of its noise.
 
     Attributes
     ----------
+    specs : tuple of str, the effect in each of its shapes
     settings : (s, q) array, those of the shapes
     normal : (s, k, k) array, DᵀD of the derivatives D of z by the parameters
     right : (s, k) array, Dᵀz
     squares : (s, k) array, of what D would be if no parameter of the model were estimated
     """
 
+    specs: tuple[str, ...]
     settings: Array
     normal: Array
     right: Array
@@ -127,6 +67,7 @@ class Shown:
         shape = (len(columns), len(effects), -1)
         d = residuals.project(columns).reshape(shape)
         return cls(
+            specs=tuple(effect.spec for effect in effects),
             settings=np.array([[*effect.settings.values()] for effect in effects], dtype=float),
             normal=np.einsum("msk,msl->skl", d, d) / variance,
             right=np.einsum("msk,m->sk", d, residuals.z) / variance,
@@ -156,13 +97,11 @@ class SensorEvidence:
     pairs : dict of two names to the log odds of both together
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting
-    by_chance : (s, K) array, log odds of `tested` in noise alone
-    tested : tuple of str, candidates and the unknown as a whole, K
-    observed : (K,) array, their log odds in this campaign
     redundancy : int
     residuals : (m,) array, m/s², equally uncertain
     square : float, ‖z‖² of the residuals, in units of the noise: of the type where it is known
     shown : dict of effect to what its shapes would show in the residuals, in the same units
+    pair_specs : dict of two names to their best settings beside each other
     """
 
     campaign: str
@@ -171,13 +110,11 @@ class SensorEvidence:
     pairs: dict[tuple[str, str], float]
     classes: tuple[tuple[str, ...], ...]
     specs: dict[str, str]
-    by_chance: Array
-    tested: tuple[str, ...]
-    observed: Array
     redundancy: int
     residuals: Array
     square: float = 0.0
     shown: dict[str, Shown] = field(default_factory=dict)
+    pair_specs: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
 
     def nearest(self, name: str, settings: Array) -> tuple[Shown, int] | None:
         """What is shown of an effect with these settings, or nearly so."""
@@ -187,19 +124,33 @@ class SensorEvidence:
         return None if place is None else (self.shown[name], place)
 
 
+@dataclass(frozen=True)
+class AnythingOdds:
+    """What tells whether anything is missing in a campaign.
+
+    Attributes
+    ----------
+    names : tuple of str, candidates and the unknown as a whole, K
+    odds : (1 + s, K) array, their log odds in the campaign, and in noise alone
+    """
+
+    names: tuple[str, ...]
+    odds: NDArray[np.float32]
+
+
 def sensor_evidence(
     campaign: Campaign,
-    model: SensorModel,
+    model: SensorModel | None,
     approach: Approach | None = None,
     seed: int = 1,
     noise: LotNoise | None = None,
-) -> SensorEvidence:
+) -> tuple[SensorEvidence, AnythingOdds]:
     """Weigh everything that a model may lack to explain a campaign.
 
     Parameters
     ----------
     campaign : Campaign
-    model : SensorModel
+    model : SensorModel; None for one that the campaign does not determine: then it says nothing
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     seed : int, of the draws
     noise : LotNoise, in place of what the campaign says of its noise
@@ -209,8 +160,10 @@ def sensor_evidence(
     InputError
         If the positions do not determine the model, or leave no redundancy.
     """
-    if noise is not None:
-        campaign = replace(campaign, sigma_force=noise.sigma)
+    if model is None:
+        silent = SensorEvidence(campaign.name, 1.0, {}, {}, (), {}, 0, np.zeros(0))
+        return silent, AnythingOdds((), np.zeros((1 + DRAWS, 0), dtype=np.float32))
+    campaign = with_noise(campaign, noise)
     base = fit_base(campaign, model, approach or usual_approach(campaign))
     problem = pose(base if noise is None else replace(base, level=noise.level))
     chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
@@ -230,14 +183,15 @@ def sensor_evidence(
             called(place): log - nothing
             for place, log in unknown.by_place(problem.evidence, z).items()
         }
-    pairs = {}
+    pairs, pair_specs = {}, {}
     for together in weighing.together:
-        names = tuple(sorted(h.name for h in together.best))
-        if len(names) == 2 and OUTLIER not in names:
-            pairs[names[0], names[1]] = together.log_density - nothing
+        effects = sorted((h.effect for h in together.best if h.effect), key=lambda e: e.name)
+        if len(effects) == len(together.best) == 2:
+            one, other = effects
+            pairs[one.name, other.name] = together.log_density - nothing
+            pair_specs[one.name, other.name] = one.spec, other.spec
     variance = max(problem.evidence.variance(float(z @ z)), SMALLEST) if noise is None else 1.0
-    names, by_chance = _by_chance(problem, chance, noise)
-    return SensorEvidence(
+    evidence = SensorEvidence(
         campaign=campaign.name,
         p_value=detection.p_value,
         odds=odds,
@@ -248,11 +202,9 @@ def sensor_evidence(
             for name, best in weighing.singles.best.items()
             if best.effect is not None
         },
-        by_chance=by_chance,
-        tested=names,
-        observed=np.array([detection.densities[name] - nothing for name in names]),
+        pair_specs=pair_specs,
         redundancy=problem.residuals.redundancy,
-        residuals=z * _sigma_stated(base.solution),
+        residuals=z * sigma_stated(base.solution),
         square=float(z @ z) / variance,
         shown={
             name: Shown.of(problem, effects, variance)
@@ -261,10 +213,10 @@ def sensor_evidence(
             and not effects[0].sudden
         },
     )
-
-
-def _sigma_stated(fit: Solution) -> float:
-    return float(np.mean(np.asarray(fit.observed.sigma_force)))
+    observed = [detection.densities[name] - nothing for name in problem.field.names]
+    by_chance = _by_chance(problem, chance, noise)
+    odds_of_all = np.concatenate([np.reshape(observed, (1, -1)), by_chance])
+    return evidence, AnythingOdds(problem.field.names, odds_of_all.astype(np.float32))
 
 
 def mean_sensor(
@@ -304,24 +256,22 @@ class Joint:
     Attributes
     ----------
     odds : float, log odds that it is equally large in all sensors, against nothing
-    shown : tuple of (Shown, int) or None: for each sensor, what it shows of the most probable shape
+    spec : str, its most probable shape
     """
 
     odds: float
-    shown: tuple[tuple[Shown, int] | None, ...]
+    spec: str
 
 
-def together(sensors: Sequence[SensorEvidence], counted: Sequence[int]) -> dict[str, Joint]:
+def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
     """Weigh each effect by all campaigns as one: the normal equations of residuals are added.
 
     Settings of an effect are those of the first campaign that shows it, or nearly so.
 
     Parameters
     ----------
-    sensors : SensorEvidence of each
-    counted : places of the sensors that count
+    used : of the sensors that count
     """
-    used = [sensors[i] for i in counted]
     redundancy = sum(each.redundancy for each in used)
     evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), redundancy)
     squares = sum(each.square for each in used)
@@ -329,17 +279,17 @@ def together(sensors: Sequence[SensorEvidence], counted: Sequence[int]) -> dict[
     joint = {}
     for name in sorted({name for each in used for name in each.shown}):
         first = next(each.shown[name] for each in used if name in each.shown)
-        logs, shapes = [], []
-        for settings in first.settings:
-            near = [each.nearest(name, settings) for each in sensors]
-            shown = [near[i] for i in counted]
-            part, dim = _joint_part([one for one in shown if one is not None])
-            if 2 * sum(one is not None for one in shown) > len(used) and dim:
+        logs, specs = [], []
+        for spec, settings in zip(first.specs, first.settings, strict=True):
+            near = [each.nearest(name, settings) for each in used]
+            shown = [one for one in near if one is not None]
+            part, dim = _joint_part(shown)
+            if 2 * len(shown) > len(used) and dim:
                 logs.append(evidence.of_spaces(np.array([part]), [dim], squares)[0])
-                shapes.append(tuple(near))
+                specs.append(spec)
         if logs:
             odds = float(log_mean(np.array(logs))) - nothing
-            joint[name] = Joint(odds, shapes[int(np.argmax(logs))])
+            joint[name] = Joint(odds, specs[int(np.argmax(logs))])
     return joint
 
 
@@ -371,14 +321,6 @@ def _alike(one: Campaign, other: Campaign) -> bool:
     return bool(np.max(abs(a - b)) < SAME)
 
 
-def lot_noise(fits: Sequence[Solution]) -> LotNoise:
-    """Noise of a type by the calibrations of its sensors."""
-    redundancies = np.array([fit.redundancy for fit in fits])
-    factors = np.sqrt(np.array([fit.omega for fit in fits]) / redundancies)
-    sigmas = np.array([_sigma_stated(fit) for fit in fits]) * factors
-    return LotNoise.of(np.maximum(sigmas, LEAST_SIGMA), redundancies)
-
-
 def called(place: tuple[str, str]) -> str:
     """Name of something without a name that is a function of a coordinate, in a target."""
     return f"{UNKNOWN}({place[0]} → {place[1]})"
@@ -400,9 +342,7 @@ def is_noise(name: str) -> bool:
     return name in NOISES
 
 
-def _by_chance(
-    problem: Problem, chance: Chance, noise: LotNoise | None
-) -> tuple[tuple[str, ...], Array]:
+def _by_chance(problem: Problem, chance: Chance, noise: LotNoise | None) -> Array:
     """Log odds of what is tested in noise alone, whose level is that of a sensor of the lot."""
     field, evidence = problem.field, problem.evidence
     of_levels = np.random.SeedSequence(chance.seed.entropy, spawn_key=(*chance.seed.spawn_key, 1))
@@ -415,8 +355,8 @@ def _by_chance(
         return field.odds(evidence, field.parts(errors), np.sum(errors**2, axis=-1))
 
     if not field.names:
-        return (), np.zeros((DRAWS, 0))
-    return field.names, chance.statistic(problem.residuals, odds).astype(np.float32)
+        return np.zeros((DRAWS, 0))
+    return chance.statistic(problem.residuals, odds)
 
 
 def lot_classes(sensors: Sequence[SensorEvidence]) -> list[tuple[str, ...]]:

@@ -13,20 +13,23 @@ up to three effects, and a sensor lacks up to two of them.
 The r_i take the sizes of the sensors for independent. An effect may as well be the same in all of
 them: then the evidence is that of all campaigns as one, and either is equally probable a priori. If
 the sensors were in the same positions and conditions, it is that of their mean, also for two
-effects. It tells what is missing; in which of the sensors, only the sensors themselves do, with
-odds r_i in which the sizes are those of the type.
+effects. Where the sizes of the type are known (`sizes`), B_Z is the integral with odds r_i of these
+sizes, times what their being fitted takes away: the evidence of one size over the likelihood of the
+best one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
+
+from accelstudy.lots.sizes import OfType
 
 Array = NDArray[np.float64]
 Names = tuple[int, ...]
@@ -73,8 +76,8 @@ class Mixture:
     pairs : mapping of two places, in order, to (n,) arrays of log odds of both together
     prior : (K,) array, prior probabilities of the effects, which sum to 1
     common : mapping of one or two places to the log odds of the mean of the sensors
-    typical : mapping of a place to (n,) array, log odds with sizes of the type, by which shares and
-        sensors are judged
+    typical : function of one or two places that gives odds with sizes of the type; None where they
+        are not known
     sets : list of Weighted, most probable first
     """
 
@@ -82,7 +85,7 @@ class Mixture:
     pairs: Mapping[Names, Array]
     prior: Array
     common: Mapping[Names, float]
-    typical: Mapping[int, Array]
+    typical: Callable[[Names], OfType | None]
     sets: list[Weighted]
 
     @classmethod
@@ -92,10 +95,10 @@ class Mixture:
         pairs: Mapping[Names, Array],
         prior: Array,
         common: Mapping[Names, float] | None = None,
-        typical: Mapping[int, Array] | None = None,
+        typical: Callable[[Names], OfType | None] = lambda names: None,
     ) -> Mixture:
         """Weigh the sets of effects, the strongest first."""
-        empty = cls(odds, pairs, prior, common or {}, typical or {}, [])
+        empty = cls(odds, pairs, prior, common or {}, typical, [])
         k = odds.shape[1]
         found: dict[Names, float] = {(): np.log(1 - MISSING) + empty._evidence(())}
         for i in range(k):
@@ -105,6 +108,10 @@ class Mixture:
         strongest: list[Names] = [*singles]
         for size in (2, 3):
             tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
+            if size == 2:
+                # What is small beside the strongest one may be nothing by itself.
+                first = strongest[:FURTHER]
+                tried |= {tuple(sorted({*s, i})) for s in first for i in range(k) if i not in s}
             if not tried:
                 break
             log = np.log(MISSING * MORE ** (size - 1)) - np.log(special.comb(k, size))
@@ -132,6 +139,11 @@ class Mixture:
         for one, p in zip(self.sets, self.probabilities, strict=True):
             each[[*one.names]] += p
         return each
+
+    def of_any(self, places: Collection[int]) -> float:
+        """Posterior probability that any of some effects is one of the lot."""
+        each = zip(self.sets, self.probabilities, strict=True)
+        return float(sum(p for one, p in each if {*one.names} & {*places}))
 
     def share(self, k: int) -> tuple[float, float, float]:
         """Share of the sensors that lack an effect: mean, and the interval that holds 95 %."""
@@ -171,7 +183,7 @@ class Mixture:
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the lot lacks some effects."""
         _, weights = self._posterior(names)
-        parts, strange = self._parts(names, self._judged)
+        parts, strange = self._parts(names, self._judging(names))
         total = np.logaddexp.reduce([*parts.values(), strange])
 
         def mass(log: Array) -> Array:
@@ -189,10 +201,12 @@ class Mixture:
         """Log odds of each sensor for anything, (n,)."""
         return np.asarray(special.logsumexp(self.odds + np.log(self.prior), axis=1))
 
-    def _judged(self, subset: Names) -> Array:
-        """Log odds as of `_together`, with sizes of the type where these are known, (n,)."""
-        gains = (self.typical[k] - self.odds[:, k] for k in subset if k in self.typical)
-        return np.asarray(sum(gains, self._together(subset)))
+    def _judging(self, names: Names) -> Callable[[Names], Array]:
+        """Odds of subsets by which sensors and shares are judged: those that explain more."""
+        of_type = self.typical(names)
+        if of_type is None or self._typical_way(names, of_type) < self._own_way(names):
+            return self._together
+        return partial(_looked_up, of_type)
 
     def _together(self, subset: Names) -> Array:
         """Log odds of the sensors for some effects together, (n,)."""
@@ -227,20 +241,40 @@ class Mixture:
         return np.asarray(np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0))
 
     def _evidence(self, names: Names) -> float:
-        return float(np.logaddexp(*self._ways(names))) if names else self._ways(names)[0]
+        """Log evidence of effects: with sizes of each sensor, or of the type."""
+        own, of_type = self._own_way(names), self.typical(names)
+        if of_type is not None:
+            alike = self._typical_way(names, of_type)
+        elif names in self.common:
+            alike = self.common[names]
+        else:
+            return own
+        return float(np.logaddexp(own + np.log(1 - ALIKE), alike + np.log(ALIKE)))
 
-    def _ways(self, names: Names) -> tuple[float, float]:
-        """Log evidence of effects with sizes of each sensor, and of the same one in all."""
-        logs = self._log_likelihood(names, self._together) + _log_weights(len(names))
-        each = float(special.logsumexp(logs))
-        if names not in self.common:
-            return each, -np.inf
-        return each + np.log(1 - ALIKE), self.common[names] + np.log(ALIKE)
+    def _own_way(self, names: Names) -> float:
+        """Log evidence with sizes of each sensor."""
+        logs = self._log_likelihood(names, self._together)
+        return float(special.logsumexp(logs + _log_weights(len(names))))
+
+    def _typical_way(self, names: Names, of_type: OfType) -> float:
+        """Log evidence with sizes of the type."""
+        logs = self._log_likelihood(names, partial(_looked_up, of_type))
+        if names in self.common:
+            fitted = self.common[names] - of_type.alike
+        else:
+            each = [(self.common[k,], self.typical((k,))) for k in names]
+            fitted = sum(common - one.alike for common, one in each if one is not None)
+        return float(special.logsumexp(logs + _log_weights(len(names)))) + fitted
 
     def _posterior(self, names: Names) -> tuple[list[Array], Array]:
         """Nodes of each share, and their posterior probabilities (nodes ...)."""
-        logs = self._log_likelihood(names, self._judged) + _log_weights(len(names))
+        logs = self._log_likelihood(names, self._judging(names)) + _log_weights(len(names))
         return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
+
+
+def _looked_up(of_type: OfType, subset: Names) -> Array:
+    """Log odds of the sensors for a subset of effects, with sizes of the type, (n,)."""
+    return of_type.odds[subset] if subset else np.zeros(len(next(iter(of_type.odds.values()))))
 
 
 @cache
@@ -266,21 +300,60 @@ def _log_weights(size: int) -> Array:
     return np.asarray(np.log(weights))
 
 
-def lot_odds(odds: Iterable[Array], prior: Array) -> Array:
-    """Log odds that one effect is missing in a share of the sensors, against nothing.
+@dataclass(frozen=True)
+class Anything:
+    """The test whether anything is missing in a lot, to which sensors are added one by one.
 
-    Parameters
+    The statistic is the evidence that one effect is missing in a share of the sensors. Lots of
+    simulated noise say how large it is if nothing is missing.
+
+    Attributes
     ----------
-    odds : n arrays (..., K), log odds of the sensors
-    prior : (K,) array
-
-    Returns
-    -------
-    (...) array
+    logs : dict of what is tested to (1 + s, nodes) array, log likelihood of each share in the lot,
+        and in s lots of noise
     """
-    nodes, weights = _nodes(2)
-    logs = np.zeros(len(nodes))
-    for each in odds:
-        logs = logs + np.logaddexp(_log_of_rest(nodes), each[..., None] + np.log(nodes))
-    by_effect = special.logsumexp(logs + np.log(weights), axis=-1)
-    return np.asarray(special.logsumexp(by_effect + np.log(prior), axis=-1))
+
+    logs: dict[str, Array] = field(default_factory=dict)
+
+    def add(self, names: Iterable[str], odds: NDArray[np.floating]) -> None:
+        """Add what a sensor says.
+
+        Parameters
+        ----------
+        names : K, of what is tested
+        odds : (1 + s, K) array, their log odds in the campaign, and in noise alone
+        """
+        for name, log in _of_shares(names, odds):
+            self.logs[name] = self.logs.get(name, 0.0) + log
+
+    def without(self, each: Iterable[tuple[Iterable[str], NDArray[np.floating]]]) -> Anything:
+        """Return the test without some sensors, of which it is given what was added."""
+        logs = dict(self.logs)
+        for names, odds in each:
+            for name, log in _of_shares(names, odds):
+                logs[name] = logs[name] - log
+        return Anything(logs)
+
+    def p_value(self, weights: Mapping[str, float]) -> float:
+        """Probability that sensors without anything missing would show as much evidence.
+
+        Parameters
+        ----------
+        weights : prior weights of what shares none with the others, relative to all of these
+        """
+        names = sorted(self.logs)
+        if not names:
+            return 1.0
+        prior = np.array([weights.get(name, 1 / len(names)) for name in names])
+        by_effect = [
+            special.logsumexp(self.logs[name] + np.log(_nodes(2)[1]), axis=-1) for name in names
+        ]
+        total = special.logsumexp(np.array(by_effect) + np.log(prior)[:, None], axis=0)
+        return float((1 + np.sum(total[1:] >= total[0])) / len(total))
+
+
+def _of_shares(names: Iterable[str], odds: NDArray[np.floating]) -> Iterator[tuple[str, Array]]:
+    """Log likelihood of each share in a sensor, (1 + s, nodes), of what is tested."""
+    nodes, _ = _nodes(2)
+    for name, column in zip(names, odds.T, strict=True):
+        yield name, np.logaddexp(_log_of_rest(nodes), column[:, None] + np.log(nodes))

@@ -34,7 +34,8 @@ from accelstudy.drawing.style import (
 )
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.lots.evidence import shown
-from accelstudy.lots.lot import LEVEL, Found, Lot
+from accelstudy.lots.lot import Lot
+from accelstudy.lots.passes import LEVEL, Found
 from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
 

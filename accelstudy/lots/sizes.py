@@ -1,79 +1,299 @@
-"""Sizes of an effect as those of a type: which sensors have it, as large as it is in the others.
+"""Sizes of effects as those of a type: who has them, as large as they are in the others.
 
-Sensor i tells of its parameters β by ℓ_i(β) = βᵀ b_i − βᵀ N_i β / 2 (`evidence.Shown`). In a type
-they are β ~ N(μ, S), S = τ² ‖μ‖²/k · I, in a part ρ of the sensors, and 0 in the others. So the
-odds of sensor i are
+Sensor i tells of the parameters β of some effects by ℓ_i(β) = βᵀ b_i − βᵀ N_i β / 2, in units of
+its noise. In a type each effect has sizes β ~ N(μ, S), S = τ² ‖μ‖²/k · I, in a part ρ of the
+sensors, and 0 in the others, independently of other effects. So the odds of sensor i for a set are
 
     log r_i = (b_i + S⁻¹μ)ᵀ (S⁻¹ + N_i)⁻¹ (b_i + S⁻¹μ)/2 − μᵀ S⁻¹ μ/2 − log|I + S N_i|/2,
 
-with μ, ρ and τ that make Σ log(1 − ρ + ρ r_i) largest.
+with the μ, ρ and τ that make the likelihood of all sensors largest.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.fit import usual_approach
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.residuals import VISIBLE
+from accelstudy.effects import get_effect
+from accelstudy.lots.noise import LotNoise, with_noise
+from accelstudy.sensors.sensor import SensorModel
 
-SCATTERS = (0.1, 0.25, 0.5, 1.0)
+Array = NDArray[np.float64]
+Names = tuple[int, ...]
+
+SCATTERS = (0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size."""
+SHARES = (0.9, 0.35)
+"""ρ from which the search begins, for each effect."""
+ENOUGH = 20
+"""Degrees of freedom that tell the noise."""
 STEPS = 60
 """Most steps of the search for μ and ρ."""
-SETTLED = 1e-4
+SETTLED = 1e-3
 """Change of the log likelihood below which they are found."""
 
 
-def odds_with_sizes(normal: Array, right: Array) -> tuple[Array, float]:
-    """Log odds of each sensor for an effect whose sizes are those of a type.
+@dataclass(frozen=True)
+class Told:
+    """What a sensor tells of the parameters of some effects, side by side.
+
+    Attributes
+    ----------
+    normal : (k, k) array, DᵀD of the derivatives D of the residuals z by the parameters
+    right : (k,) array, Dᵀz
+    squares : (k,) array, of what D would be if no parameter of the model were estimated
+    square : float, ‖z‖²
+    redundancy : int
+    """
+
+    normal: Array
+    right: Array
+    squares: Array
+    square: float
+    redundancy: int
+
+
+def told(
+    campaign: Campaign,
+    model: SensorModel | None,
+    approach: Approach | None,
+    noise: LotNoise | None,
+    specs: Sequence[str],
+) -> Told:
+    """Say what a campaign tells of effects; nothing of those that it cannot show.
 
     Parameters
     ----------
-    normal, right : (n, k, k) and (n, k) arrays, N_i and b_i
-
-    Returns
-    -------
-    odds : (n,) array
-    log_likelihood : float, less what the fitted parameters are worth (BIC)
+    campaign, model, approach, noise : as in `evidence.sensor_evidence`
+    specs : effects with their settings
     """
-    n, k = right.shape
-    # In units in which parameters show equally well.
-    unit = np.sqrt(np.maximum(np.einsum("nkk->k", normal), 1e-300) / n)
-    normal, right = normal / np.outer(unit, unit), right / unit
-    best = np.zeros(n), -np.inf
-    pooled = np.linalg.pinv(normal.sum(axis=0), rcond=1e-6) @ right.sum(axis=0)
-    for scatter in SCATTERS:
-        for share in (0.25, 0.9):
-            found = _searched(normal, right, pooled / share, share, scatter)
-            best = max(best, found, key=lambda one: one[1])
-    return best[0], best[1] - (k + 2) / 2 * float(np.log(n))
+    if model is None:
+        k = sum(len(get_effect(spec).parameters) for spec in specs)
+        return Told(np.zeros((k, k)), np.zeros(k), np.zeros(k), 0.0, 0)
+    campaign = with_noise(campaign, noise)
+    frame = Frame.of(fit_base(campaign, model, approach or usual_approach(campaign)).solution)
+    residuals, columns = frame.residuals, []
+    for spec in specs:
+        effect = get_effect(spec)
+        try:
+            columns.append(residuals.whitened(frame.signature(effect)))
+        except InputError:  # a column is absent
+            columns.append(np.zeros((len(residuals.z), len(effect.parameters))))
+    whole = np.concatenate(columns, axis=1)
+    d, z = residuals.project(whole), residuals.z
+    return Told(d.T @ d, d.T @ z, np.sum(whole**2, axis=0), float(z @ z), residuals.redundancy)
 
 
-def _searched(
-    normal: Array, right: Array, mean: Array, share: float, scatter: float
-) -> tuple[Array, float]:
-    """Odds and log likelihood at the μ and ρ that are found from given ones."""
-    k, before = len(mean), -np.inf
-    odds = np.zeros(len(right))
-    for _ in range(STEPS):
-        s = scatter**2 * max(float(mean @ mean) / k, 1e-12)
-        inverse = np.linalg.inv(normal + np.eye(k) / s)
-        pull = right + mean / s
-        odds = (
-            np.einsum("nk,nkl,nl->n", pull, inverse, pull) / 2
-            - mean @ mean / (2 * s)
-            - np.linalg.slogdet(np.eye(k) + s * normal)[1] / 2
+@dataclass(frozen=True)
+class OfType:
+    """A set of effects in the sensors of a type.
+
+    Attributes
+    ----------
+    odds : mapping of each subset but the empty one, as places in the set, to (n,) array, log odds
+        of the sensors
+    alike : float, log likelihood ratio of one size in all sensors, the most probable one
+    mean, shares : (k,) and (e,) arrays, μ of all parameters and ρ of each effect
+    """
+
+    odds: Mapping[Names, Array]
+    alike: float
+    mean: Array
+    shares: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TypeSizes:
+    """What all sensors of a lot tell of effects.
+
+    Attributes
+    ----------
+    normal, right : (n, K, K) and (n, K) arrays, of all parameters that show, in units in which they
+        show equally well
+    columns : mapping of each effect to its parameters among the K
+    usual : int array, places of the sensors that tell what is typical
+    """
+
+    normal: Array
+    right: Array
+    columns: Mapping[str, NDArray[np.int_]]
+    usual: NDArray[np.int_]
+
+    @classmethod
+    def of(cls, each: Sequence[Told], specs: Sequence[str], usual: Sequence[int]) -> TypeSizes:
+        """Gather what sensors tell of effects.
+
+        The noise is that which the one or two effects leave that explain most.
+
+        Parameters
+        ----------
+        each : what the sensors tell of the effects
+        specs : effects with their settings
+        usual : places of the sensors that tell what is typical
+        """
+        normal = np.array([one.normal for one in each])
+        right = np.array([one.right for one in each])
+        whole = np.sum([one.squares for one in each], axis=0)
+        ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)])
+        turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
+        for spec, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
+            scale = np.sqrt(np.where(whole[first:end] > 0, whole[first:end], 1.0))
+            shown = normal[:, first:end, first:end].sum(axis=0) / np.outer(scale, scale)
+            values, vectors = np.linalg.eigh(shown)
+            seen = values > VISIBLE**2
+            # In these directions and units the sensors together tell as much of each.
+            block = np.zeros((ends[-1], int(seen.sum())))
+            block[first:end] = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen] / len(each))
+            turned.append(block)
+            columns[spec] = place + np.arange(block.shape[1])
+            place += block.shape[1]
+        turn = np.concatenate(turned, axis=1)
+        raw = cls(turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
+        counted = [each[i] for i in usual]
+        variance = raw.only(usual)._variance(
+            sum(one.square for one in counted), sum(one.redundancy for one in counted)
         )
-        logs = np.logaddexp(np.log1p(-share), np.log(share) + odds)
-        now = float(logs.sum())
-        if now < before + SETTLED:
-            break
-        before = now
-        weights = np.exp(np.log(share) + odds - logs)
-        share = float(np.clip(weights.mean(), 0.01, 0.999))
-        # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
-        taken = normal - normal @ inverse @ normal
-        seen = right - np.einsum("nkl,nlm,nm->nk", normal, inverse, right)
-        whole = np.einsum("n,nkl->kl", weights, taken)
-        mean = np.linalg.pinv(whole, rcond=1e-6) @ (weights @ seen)
-    return odds, before
+        return replace(raw, normal=raw.normal / variance, right=raw.right / variance)
+
+    def only(self, places: Sequence[int]) -> TypeSizes:
+        """Return what some of the sensors tell, all of which are usual."""
+        at = [*places]
+        return replace(self, normal=self.normal[at], right=self.right[at], usual=np.arange(len(at)))
+
+    def _variance(self, squares: float, redundancy: int) -> float:
+        """Noise that the one or two effects leave that explain most."""
+        left = [squares / redundancy]
+        for specs in (s for r in (1, 2) for s in combinations(self.columns, r)):
+            at = np.concatenate([self.columns[spec] for spec in specs])
+            inverse = np.linalg.pinv(self.normal[:, at[:, None], at], rcond=1e-8, hermitian=True)
+            b = self.right[:, at]
+            part = float(np.einsum("nk,nkl,nl->", b, inverse, b))
+            rank = float(np.einsum("nkl,nlk->", inverse, self.normal[:, at[:, None], at]))
+            if redundancy - rank >= ENOUGH:
+                left.append((squares - part) / (redundancy - rank))
+        return max(min(left), 1e-12)
+
+    def of_set(self, specs: Sequence[str]) -> OfType:
+        """Odds of each sensor for the subsets of some effects, with sizes of the type."""
+        parts = [self.columns[spec] for spec in specs]
+        at = np.concatenate(parts)
+        counts = [len(part) for part in parts]
+        search = _Search(self.normal[:, at[:, None], at], self.right[:, at], counts, self.usual)
+        mean, alike = search.pooled
+        best = -np.inf, list[Array](), mean, np.ones(len(specs))
+        # From many that have each effect, and from few that have one of them.
+        most, few = SHARES
+        starts = [np.full(len(specs), most)]
+        starts += [np.where(np.arange(len(specs)) == k, few, most) for k in range(len(specs))]
+        for scatter in SCATTERS:
+            for shares in starts:
+                whole = mean / np.repeat(shares, search.counts)
+                found = search.found(whole, shares, scatter)
+                best = max(best, found, key=lambda one: one[0])
+        _, odds, mean, shares = best
+        return OfType(dict(zip(search.subsets, odds, strict=True)), alike, mean, shares)
+
+    def apart(self, specs: Sequence[str], of_type: OfType, place: int, rival: str) -> float:
+        """Noncentrality that an effect leaves beside a rival of it.
+
+        Parameters
+        ----------
+        specs : set of effects
+        of_type : OfType of the set
+        place : int, of the effect in the set
+        rival : str, another effect that may be there in its place
+        """
+        normal = self.normal[self.usual].sum(axis=0)
+        ends = np.cumsum([0, *(len(self.columns[spec]) for spec in specs)])
+        others = [spec for k, spec in enumerate(specs) if k != place]
+        own = self.columns[specs[place]]
+        rest = np.concatenate([self.columns[spec] for spec in (*others, rival)])
+        cross = normal[np.ix_(own, rest)]
+        inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
+        left = normal[np.ix_(own, own)] - cross @ inverse @ cross.T
+        mean = of_type.mean[ends[place] : ends[place + 1]]
+        return float(of_type.shares[place] * mean @ left @ mean)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search for sizes and shares of effects, side by side, with `counts` of parameters."""
+
+    normal: Array
+    right: Array
+    counts: list[int]
+    usual: NDArray[np.int_]
+
+    @cached_property
+    def subsets(self) -> list[Names]:
+        """All sets of the effects but the empty one."""
+        effects = range(len(self.counts))
+        return [s for r in effects for s in combinations(effects, r + 1)]
+
+    @cached_property
+    def has(self) -> NDArray[np.bool_]:
+        """Which effects the empty set and the `subsets` have."""
+        return np.array([[k in s for k in range(len(self.counts))] for s in ((), *self.subsets)])
+
+    @cached_property
+    def pooled(self) -> tuple[Array, float]:
+        """Sizes that are the same in all sensors, and their log likelihood ratio."""
+        normal, right = (a[self.usual].sum(axis=0) for a in (self.normal, self.right))
+        mean = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right
+        return mean, float(right @ mean) / 2
+
+    def found(
+        self, mean: Array, shares: Array, scatter: float
+    ) -> tuple[float, list[Array], Array, Array]:
+        """Log likelihood, odds of each subset (n,), sizes and shares, from given ones on."""
+        before, odds = -np.inf, list[Array]()
+        of = np.repeat(np.arange(len(self.counts)), self.counts)
+        for _ in range(STEPS):
+            variances = np.array([
+                max(scatter**2 * float(np.mean(mean[of == k] ** 2)), 1e-12)
+                for k in range(len(self.counts))
+            ])[of]  # fmt: skip
+            odds, taken, seen = [], [], []
+            for subset in self.subsets:
+                at = np.flatnonzero(np.isin(of, subset))
+                n, b = self.normal[:, at[:, None], at], self.right[:, at]
+                m, s = mean[at], variances[at]
+                inverse = np.linalg.inv(n + np.diag(1 / s))
+                pull = b + m / s
+                odds.append(
+                    np.einsum("nk,nkl,nl->n", pull, inverse, pull) / 2
+                    - m @ (m / s) / 2
+                    - np.linalg.slogdet(np.eye(len(at)) + s[:, None] * n)[1] / 2
+                )
+                # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
+                lost = n @ inverse
+                taken.append(n - lost @ n)
+                seen.append(b - np.einsum("nkl,nl->nk", lost, b))
+            prior = np.where(self.has, np.log(shares), np.log1p(-shares)).sum(axis=1)
+            logs = np.array([0 * odds[0], *odds]) + prior[:, None]
+            total = np.logaddexp.reduce(logs)
+            if (now := float(total[self.usual].sum())) < before + SETTLED:
+                break
+            before = now
+            weights = np.zeros((len(self.subsets), len(total)))
+            weights[:, self.usual] = np.exp(logs[1:] - total)[:, self.usual]
+            whole, pulled = np.zeros((len(mean),) * 2), np.zeros(len(mean))
+            for subset, w, a, b in zip(self.subsets, weights, taken, seen, strict=True):
+                at = np.flatnonzero(np.isin(of, subset))
+                whole[np.ix_(at, at)] += np.einsum("n,nkl->kl", w, a)
+                pulled[at] += w @ b
+            shares = np.clip(weights.sum(axis=1) @ self.has[1:] / len(self.usual), 0.01, 0.999)
+            mean = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
+        return before, odds, mean, shares

@@ -17,17 +17,19 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, Evidence, Level
 from accelstudy.lots.evidence import (
     DRAWS,
+    AnythingOdds,
     Joint,
-    LotNoise,
     SensorEvidence,
     Shown,
     lot_classes,
     mean_sensor,
     together,
 )
-from accelstudy.lots.lot import LEVEL, Lot, Pass, weigh_lot
-from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Mixture
-from accelstudy.lots.sizes import odds_with_sizes
+from accelstudy.lots.lot import Lot, weigh_lot
+from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Anything, Mixture
+from accelstudy.lots.noise import LotNoise
+from accelstudy.lots.passes import LEVEL, Pass
+from accelstudy.lots.sizes import Told, TypeSizes
 from accelstudy.sensors.models import get_model
 
 STANDARD_ERRORS = 3.3
@@ -48,18 +50,29 @@ def shown_by(rng, lacks):
     return noise + SPREAD * lacks * rng.standard_normal(lacks.shape)
 
 
-def sensor(name, odds, rng):
+def sensor(name, odds):
     """Evidence in which each effect shows in a number of its own."""
-    by_chance = odds_of(rng.standard_normal((DRAWS, len(NAMES))))
     known = dict(zip(NAMES, odds.tolist(), strict=True))
     pairs = {(a, b): known[a] + known[b] for a, b in product(NAMES, NAMES) if a < b}
-    return SensorEvidence(name, 0.5, known, pairs, tuple((n,) for n in NAMES), {}, by_chance,
-                          NAMES, odds, 10, np.zeros(1))  # fmt: skip
+    return SensorEvidence(name, 0.5, known, pairs, tuple((n,) for n in NAMES), {}, 10,
+                          np.zeros(1))  # fmt: skip
+
+
+def weighed(odds, rng):
+    """A pass over sensors with these odds (n, K), whose chances are those of their numbers."""
+    tested = [
+        AnythingOdds(NAMES, np.vstack([each, odds_of(rng.standard_normal((DRAWS, len(NAMES))))]))
+        for each in odds
+    ]
+    anything = Anything()
+    for one in tested:
+        anything.add(one.names, one.odds)
+    sensors = tuple(sensor(f"sensor {i}", each) for i, each in enumerate(odds))
+    return Pass(sensors, anything, tested.__getitem__)
 
 
 def lot_of(lacks, rng):
-    each = odds_of(shown_by(rng, np.asarray(lacks, dtype=float)))
-    return Pass(tuple(sensor(f"sensor {i}", odds, rng) for i, odds in enumerate(each)))
+    return weighed(odds_of(shown_by(rng, np.asarray(lacks, dtype=float))), rng)
 
 
 def test_the_evidence_of_a_set_is_its_integral():
@@ -130,23 +143,32 @@ def shows(rng, sizes):
     return derivatives, z, normal, np.einsum("nmk,nm->nk", derivatives, z)
 
 
+def told_by(rng, sizes):
+    """What such sensors tell of their parameters."""
+    d, z, normal, right = shows(rng, np.asarray(sizes))
+    squares, square = np.sum(d**2, axis=1), np.sum(z**2, axis=1)
+    return [
+        Told(n, b, s, float(total), 30)
+        for n, b, s, total in zip(normal, right, squares, square, strict=True)
+    ]
+
+
 def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     """The evidence is that of one campaign with all residuals, by least squares."""
     rng = np.random.default_rng(8)
     derivatives, z, normal, right = shows(rng, np.full((4, 2), 0.3))
     sensors = []
     for d, one, n, b in zip(derivatives, z, normal, right, strict=True):
-        shown = Shown(np.zeros((1, 0)), n[None], b[None], np.sum(d**2, axis=0)[None])
-        none = np.zeros((DRAWS, 0))
-        sensors.append(SensorEvidence("c", 0.5, {}, {}, (), {}, none, (), np.zeros(0), 30, one,
-                                      float(one @ one), {"effect": shown}))  # fmt: skip
-    joint = together(sensors, range(4))["effect"]
+        shown = Shown(("effect",), np.zeros((1, 0)), n[None], b[None], np.sum(d**2, axis=0)[None])
+        sensors.append(SensorEvidence("c", 0.5, {}, {}, (), {}, 30, one, float(one @ one),
+                                      {"effect": shown}))  # fmt: skip
+    joint = together(sensors)["effect"]
     d, one = derivatives.reshape(-1, 2), z.ravel()
     fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
     evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), 120)
     part = evidence.of_spaces(np.array([fitted @ fitted]), [2], one @ one)[0]
     assert joint.odds == pytest.approx(part - evidence.of_noise(one @ one)[0], rel=1e-6)
-    assert len(joint.shown) == 4
+    assert joint.spec == "effect"
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.25])
@@ -157,9 +179,10 @@ def test_sizes_of_the_type_say_which_sensors_have_it(scatter):
         share = 1.0 if rng.random() < ALL else rng.random()
         lacks = rng.random(20) < share
         sizes = np.array([0.35, -0.25]) * (1 + scatter * rng.standard_normal((20, 2)))
-        _, _, normal, right = shows(rng, sizes * lacks[:, None])
-        typical, _ = odds_with_sizes(normal, right)
-        mixture = Mixture.of(np.zeros((20, 1)), {}, np.ones(1), {(0,): 50.0}, {0: typical})
+        each = told_by(rng, sizes * lacks[:, None])
+        of_type = TypeSizes.of(each, ("base_tilt",), range(20)).of_set(("base_tilt",))
+        known = {(0,): of_type}
+        mixture = Mixture.of(np.zeros((20, 1)), {}, np.ones(1), {(0,): 50.0}, known.get)
         said += mixture.lacking(0).tolist()
         true += lacks.tolist()
         _, low, high = mixture.share(0)
@@ -190,20 +213,20 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     assert [f.names for _, f in lot_of(2 * lacks, rng).found] == [("thermal_bias",)]
     odds = odds_of(shown_by(rng, np.zeros((20, 3))))
     odds[7, 1] = 25.0
-    one = Pass(tuple(sensor(f"sensor {i}", each, rng) for i, each in enumerate(odds)))
+    one = weighed(odds, rng)
     lot = Lot((one, one), get_model("bias-scale"), ())
     assert lot.missing
     assert one.found == []
     assert [(o.campaign, o.names) for o in lot.odd] == [("sensor 7", ("quadratic_scale",))]
     assert [names for _, names, _ in lot.each() if names] == [("odd",)]
-    # Without it the others are weighed as before, also what all campaigns say together.
-    _, _, normal, right = shows(rng, np.full((20, 2), 0.5))
-    each = [
-        (Shown(np.zeros((1, 0)), n[None], b[None], np.ones((1, 2))), 0)
-        for n, b in zip(normal, right, strict=True)
-    ]
-    rest = replace(one, together={"warm_up": Joint(50.0, tuple(each))}).without_odd()
+    # Without it the others are weighed as before, with the sizes of the type, too.
+    each = told_by(rng, np.full((20, 2), 0.5))
+    sizes = TypeSizes.of(each, ("base_tilt",), range(20))
+    k = one.classes.index(("warm_up",))
+    together = {"warm_up": Joint(sizes.of_set(("base_tilt",)).alike, "base_tilt")}
+    rest = replace(one, together=together, sizes=sizes, shapes={(k,): ("base_tilt",)}).without_odd()
     assert len(rest.sensors) == 19
+    assert rest.p_value > one.p_value
     assert rest.alternatives[0][0] == ("warm_up",)
     assert rest.mixture.share(rest.classes.index(("warm_up",)))[0] > 0.9
 
@@ -211,8 +234,7 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
 def test_names_that_no_campaign_tells_apart_are_one_class():
     def shows(*classes):
         odds = {name: 1.0 - i / 10 for i, name in enumerate(sorted(n for c in classes for n in c))}
-        return SensorEvidence("c", 0.5, odds, {}, classes, {}, np.zeros((1, 0)), (), np.zeros(0),
-                              10, np.zeros(1))  # fmt: skip
+        return SensorEvidence("c", 0.5, odds, {}, classes, {}, 10, np.zeros(1))
 
     together = [shows(("a", "b"), ("c",))] * 2
     assert lot_classes(together) == [("a", "b"), ("c",)]

@@ -16,7 +16,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.of_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.evidence import LotNoise
+from accelstudy.lots.noise import LotNoise
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model

@@ -33,9 +33,11 @@ from accelstudy.epochs.history import history_of
 from accelstudy.epochs.history_output import history_document, history_table
 from accelstudy.epochs.output import comparison_document
 from accelstudy.files.tables import read_table
-from accelstudy.lots.evidence import SensorEvidence
-from accelstudy.lots.lot import Lot, Pass
+from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
+from accelstudy.lots.lot import Lot
+from accelstudy.lots.mixture import Anything
 from accelstudy.lots.output import lot_document
+from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
@@ -119,12 +121,12 @@ def test_each_name_of_an_exported_calibration_is_described(pages):
 
 def _lot():
     """Content of lot.json, of sensors that lack the same."""
-    name, odds, by_chance = "thermal_bias", np.array([20.0]), np.zeros((1000, 1))
-    each = [
-        SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, by_chance, (name,), odds, 9, odds)
-        for c in "abc"
-    ]
-    one = Pass(tuple(each))
+    name, anything = "thermal_bias", Anything()
+    each = [SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, 9, np.zeros(1)) for c in "abc"]
+    odds = np.array([[20.0], *[[0.0]] * 1000])
+    for _ in each:
+        anything.add((name,), odds)
+    one = Pass(tuple(each), anything, lambda i: AnythingOdds((name,), odds))
     effects = tuple((found, name) for _, found in one.found)
     lot = Lot((one, one), get_model("bias-scale"), effects)
     return lot_document(lot, [found for found, _ in effects], [None] * 3, None, {})

@@ -169,11 +169,11 @@ def generate(
     if case.gross is not None:
         campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
         gross["name"] = case.gross
-    verdict = knowing.judge(_left(of_design, sensor, forces, reading), case.lam)
+    verdict = knowing.judge(left_of(of_design, sensor, forces, reading), case.lam)
     left: tuple[float, ...] = ()
     place = None
     if case.effect and (strange := NOWHERE.get(case.effect[0])):
-        left = knowing.left(_left(of_design, sensor, output, encoders))
+        left = knowing.left(left_of(of_design, sensor, output, encoders))
         place = strange.place if strange.has_place(case.approach == "robot") else None
     truth = Truth(
         set=case.set,
@@ -206,7 +206,7 @@ def generate(
     return campaign, truth
 
 
-def _left(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+def left_of(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
     return of_design.conditions.seen(corrected[None], reading[None])[0]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.hidden.physics.atlas import Conditions
-from accelstudy.hidden.physics.generate import Case, Known, Truth, drawn, generate
+from accelstudy.hidden.physics.generate import Case, Known, Truth, drawn, generate, left_of
 from accelstudy.hidden.physics.measuring import Sensor
-from accelstudy.hidden.physics.oracle import oracle
+from accelstudy.hidden.physics.oracle import Verdict, oracle
 
 SCATTER = 0.25
 """Sd of the logarithm of an effect's size, from sensor to sensor."""
@@ -78,6 +78,31 @@ def generate_lot(
                 given[name] = replace(cause, parameters=cause.parameters * factors), same
         campaign, truth = generate(one, its_seed, given)
         yield replace(campaign, name=f"sensor-{i + 1}"), truth
+
+
+def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
+    """Say what the oracle says of a lot that lacks one effect in a share of its sensors.
+
+    It knows which sensors have it, and judges their mean, which has all that a size of the type
+    shows.
+
+    Parameters
+    ----------
+    case : LotCase
+    made : campaigns and truths of `generate_lot`
+    """
+    knowing = oracle(case.design, case.approach)
+    shown = [
+        left_of(
+            knowing.atlas,
+            Sensor(**{name: np.array(values) for name, values in truth.sensor.items()}),
+            campaign.forces,
+            np.zeros((len(campaign.forces), 2)) if campaign.angles is None else campaign.angles,
+        )
+        for campaign, truth in made
+        if truth.effects
+    ]
+    return knowing.judge(np.sum(shown, axis=0) / np.sqrt(len(shown)), (case.lam * len(shown),))
 
 
 def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:

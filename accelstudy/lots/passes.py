@@ -1,0 +1,376 @@
+"""One pass over a lot: the evidence of all sensors together, with one model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.diagnosis.decision import priors
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
+from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.lots.evidence import (
+    COMMON,
+    AnythingOdds,
+    Joint,
+    SensorEvidence,
+    is_noise,
+    lot_classes,
+)
+from accelstudy.lots.mixture import Anything, Mixture, Names
+from accelstudy.lots.noise import LotNoise
+from accelstudy.lots.sizes import OfType, TypeSizes
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.05
+"""Level of the test whether anything is missing in a lot: half of it by what each campaign says of
+its noise, and half by the noise of the type."""
+FALSE_ODD = 0.05
+"""False discovery rate of odd sensors."""
+FEW = 0.1
+"""Share of the sensors up to which what they lack makes them odd, and is no matter of the type."""
+RIVAL = 0.02
+"""Least posterior of what may be there in place of something else."""
+UNTOLD = 2.0
+"""Noncentrality of what an effect leaves beside another one up to which they cannot be told apart:
+on average the right one is not 0.7 probable then."""
+SETS = 12
+"""Most probable sets of effects whose sizes are looked at."""
+EFFECT = "effect"
+WEIGHTS = {
+    EFFECT: 1.0,
+    UNKNOWN: priors.UNKNOWN,
+    COMMON: priors.UNKNOWN,
+    **dict.fromkeys(NOISES, priors.COLOUR),
+    AXES: priors.AXES,
+    TAILS: priors.TAILS,
+}
+"""Prior weights of what a lot may lack, relative to one effect of the catalogue."""
+ODD = "odd"
+"""Name of what a sensor lacks that the others do not."""
+NEVER = -30.0
+"""Log odds of what cannot be."""
+HAS = 0.5
+"""Posterior probability from which a sensor counts among those that lack an effect."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter of an effect, over the sensors that have it.
+
+    Attributes
+    ----------
+    name, unit : str, SI
+    mean, scatter : float, of the type
+    sigma : float, of the mean
+    each, sigma_each : (n,) arrays, of the sensors; NaN where a campaign cannot show it
+    """
+
+    name: str
+    unit: str
+    mean: float
+    scatter: float
+    sigma: float
+    each: Array
+    sigma_each: Array
+
+
+@dataclass(frozen=True)
+class Found:
+    """Something that the lot lacks.
+
+    Attributes
+    ----------
+    names : tuple of str, the names that mean the same in this lot
+    posterior : float, given that the lot lacks anything
+    share : float, of the sensors
+    share_ci95 : tuple of two floats
+    sizes : tuple of Size, of an effect
+    """
+
+    names: tuple[str, ...]
+    posterior: float
+    share: float
+    share_ci95: tuple[float, float]
+    sizes: tuple[Size, ...] = ()
+
+
+@dataclass(frozen=True)
+class Odd:
+    """A sensor that lacks what the others do not."""
+
+    campaign: str
+    posterior: float
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The evidence of all sensors together, with one model.
+
+    Attributes
+    ----------
+    sensors : tuple of SensorEvidence
+    anything : Anything, the test of them
+    retested : function of a sensor's place that gives what it added to the test
+    mean : SensorEvidence, of their mean; None if they were in different positions
+    noise : LotNoise, of the type; None where each campaign says its own
+    together : mapping of effects to what all campaigns say of them together
+    sizes : TypeSizes, of the effects of `shapes`; None where there are none
+    shapes : mapping of one or two places in `classes` to the shapes of these effects
+    """
+
+    sensors: tuple[SensorEvidence, ...]
+    anything: Anything
+    retested: Callable[[int], AnythingOdds]
+    mean: SensorEvidence | None = None
+    noise: LotNoise | None = None
+    together: Mapping[str, Joint] = field(default_factory=dict)
+    sizes: TypeSizes | None = None
+    shapes: Mapping[Names, tuple[str, ...]] = field(default_factory=dict)
+
+    @cached_property
+    def classes(self) -> list[tuple[str, ...]]:
+        """Names that mean the same in this lot; the first one stands for them."""
+        return lot_classes(self.sensors) + ([] if self.mean is None else [(COMMON,)])
+
+    @cached_property
+    def mixture(self) -> Mixture:
+        """Posterior of all sets of effects."""
+        # One sensor alone never shows what has neither a name nor a shape.
+        unseen = [NEVER if members[0] == COMMON else 0.0 for members in self.classes]
+        odds = [
+            [
+                each.odds.get(members[0], no)
+                for members, no in zip(self.classes, unseen, strict=True)
+            ]
+            for each in self.sensors
+        ]
+        pairs: dict[Names, Array] = {}
+        for i, each in enumerate(self.sensors):
+            for both, log in self._pairs(each).items():
+                pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
+        kinds = [_kind(members[0]) for members in self.classes]
+        prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
+        common: dict[Names, float] = {
+            (k,): self.together[members[0]].odds
+            for k, members in enumerate(self.classes)
+            if members[0] in self.together
+        }
+        if (mean := self.mean) is not None:
+            # What is larger than noise in the mean is no noise; what is sudden has no mean.
+            of_mean = {
+                name: log
+                for name, log in mean.odds.items()
+                if not is_noise(name) and not _is_sudden(name)
+            }
+            of_mean[COMMON] = mean.odds[LEVEL_OF_NOISE]
+            common |= {
+                (k,): of_mean[members[0]]
+                for k, members in enumerate(self.classes)
+                if members[0] in of_mean
+            }
+            common |= {
+                both: log
+                for both, log in self._pairs(mean).items()
+                if not any(_is_sudden(self.classes[k][0]) for k in both)
+            }
+        return Mixture.of(
+            np.array(odds), pairs, prior / prior.sum(), common, partial(self._typical, {})
+        )
+
+    def _typical(self, known: dict[Names, OfType], names: Names) -> OfType | None:
+        """Odds of effects with sizes of the type, where all sensors told of them."""
+        if self.sizes is None or names not in self.shapes:
+            return None
+        if not all(len(self.sizes.columns[spec]) for spec in self.shapes[names]):
+            return None
+        if names not in known:
+            of_type = self.sizes.of_set(self.shapes[names])
+            odds = {tuple(names[i] for i in s): log for s, log in of_type.odds.items()}
+            known[names] = replace(of_type, odds=odds)
+        return known[names]
+
+    def strongest(self) -> dict[Names, tuple[str, ...]]:
+        """Return the most probable sets of effects and each of their effects, with best shapes."""
+        best = [one.names for one in self.mixture.sets[:SETS]]
+        sets = dict.fromkeys([*((k,) for names in best for k in names), *best])
+        shapes = {}
+        for names in sets:
+            effects = tuple(self.classes[k][0] for k in names)
+            if 0 < len(effects) < 3 and all(name in self.together for name in effects):
+                shapes[names] = self._best_shapes(effects)
+        return shapes
+
+    def _best_shapes(self, effects: tuple[str, ...]) -> tuple[str, ...]:
+        if self.mean is None:
+            return tuple(self.together[name].spec for name in effects)
+        if (both := tuple(sorted(effects))) in self.mean.pair_specs:
+            specs = dict(zip(both, self.mean.pair_specs[both], strict=True))
+            return tuple(specs[name] for name in effects)
+        return tuple(self.mean.specs.get(name, self.together[name].spec) for name in effects)
+
+    def _pairs(self, each: SensorEvidence) -> dict[Names, float]:
+        """Log odds of two classes together."""
+        place = {name: k for k, members in enumerate(self.classes) for name in members}
+        pairs: dict[Names, float] = {}
+        for (one, other), log in each.pairs.items():
+            if one in place and other in place and place[one] != place[other]:
+                first, second = sorted((place[one], place[other]))
+                pairs[first, second] = max(log, pairs.get((first, second), -np.inf))
+        return pairs
+
+    @cached_property
+    def p_value(self) -> float:
+        """Probability that sensors without anything missing would show as much evidence.
+
+        It is that of the sensors or of their mean, whichever is the smaller one, for both.
+        """
+        each = self.anything.p_value({UNKNOWN: priors.UNKNOWN})
+        return each if self.mean is None else min(2 * min(each, self.mean.p_value), 1.0)
+
+    @property
+    def missing(self) -> bool:
+        """Whether anything is missing, at one level for the whole lot."""
+        return self.p_value < LEVEL / 2
+
+    @cached_property
+    def wrong(self) -> float:
+        """Posterior probability that the lot lacks anything, or that a sensor is odd."""
+        mixture = self.mixture
+        nothing = 1 - mixture.missing
+        none_odd = np.prod(1 - mixture.sensors_under(())[1]) if nothing > 0 else 1.0
+        return float(max(1 - nothing * none_odd, 1e-300))
+
+    @cached_property
+    def found(self) -> list[tuple[int, Found]]:
+        """What is missing and has a name that is sure enough, with its place in `classes`.
+
+        What few sensors lack makes these odd.
+        """
+        if not self.missing:
+            return []
+        found, taken = [], set[int]()
+        for k in np.argsort(-self.given, kind="stable").tolist():
+            if k in taken or self._rare[k] or self.given[k] < RIVAL:
+                continue
+            alike = [k] if self.given[k] >= priors.SURE else [k, *self._rivals(k)]
+            posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
+            if posterior >= priors.SURE:
+                taken.update(alike)
+                names = tuple(name for one in alike for name in self.classes[one])
+                share, low, high = self.mixture.share(k)
+                found.append((k, Found(names, posterior, share, (low, high))))
+        return found
+
+    def _rivals(self, k: int) -> list[int]:
+        """Effects that all campaigns together cannot tell from one that is not sure."""
+        sets = [one.names for one in self.mixture.sets if k in one.names]
+        names = next((names for names in sets if names in self.shapes), None)
+        of_type = None if names is None else self.mixture.typical(names)
+        if names is None or of_type is None or self.sizes is None:
+            return []
+        rivals = []
+        for j in np.flatnonzero(self.given >= RIVAL).tolist():
+            if j in names or (j,) not in self.shapes:
+                continue
+            place, (spec,) = names.index(k), self.shapes[j,]
+            if self.sizes.apart(self.shapes[names], of_type, place, spec) < UNTOLD:
+                rivals.append(j)
+        return rivals
+
+    @cached_property
+    def given(self) -> Array:
+        """Posterior of each class to be one of the lot, given that anything is wrong, (K,)."""
+        return np.asarray(self.mixture.of_effects / self.wrong)
+
+    @cached_property
+    def _rare(self) -> NDArray[np.bool_]:
+        """Whether few sensors lack it, if it is one of the lot, (K,)."""
+        of = np.maximum(self.mixture.of_effects, 1e-300)
+        surely = [np.sum(self.mixture.lacking(k) > HAS * of[k]) for k in range(len(of))]
+        return np.array(surely) <= max(1, FEW * len(self.sensors))
+
+    @property
+    def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
+        """The most probable classes with their posterior, given that anything is wrong."""
+        order = np.argsort(-self.given, kind="stable")[:3]
+        return [(self.classes[k], float(self.given[k])) for k in order]
+
+    @cached_property
+    def odd(self) -> list[Odd]:
+        """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly."""
+        lacks, odd = self.mixture.sensors
+        alone = sum((p for names, p in lacks.items() if any(self._rare[k] for k in names)), odd)
+        order = np.argsort(-alone, kind="stable")
+        wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)
+        known = {k for k, _ in self.found}
+        told = []
+        for i in order[: int(np.sum(wrong <= FALSE_ODD))]:
+            own = self.mixture.odds[i] + np.log(self.mixture.prior)
+            k = max((k for k in range(len(own)) if k not in known), key=lambda k: own[k])
+            told.append(Odd(self.sensors[i].campaign, float(alone[i]), self.classes[k]))
+        return told
+
+    def without_odd(self) -> Pass:
+        """The same without the sensors that are odd."""
+        if not (odd := {one.campaign for one in self.odd}):
+            return self
+        usual = [i for i, each in enumerate(self.sensors) if each.campaign not in odd]
+        others = [self.retested(i) for i in range(len(self.sensors)) if i not in {*usual}]
+        return replace(
+            self,
+            sensors=tuple(self.sensors[i] for i in usual),
+            anything=self.anything.without((one.names, one.odds) for one in others),
+            retested=lambda i: self.retested(usual[i]),
+            sizes=None if self.sizes is None else self.sizes.only(usual),
+        )
+
+    @cached_property
+    def each(self) -> list[tuple[tuple[str, ...], float]]:
+        """Names of what a sensor lacks under the lot, and their posterior, for each sensor."""
+        lacks, odd = self.mixture.sensors
+        sets = [*lacks]
+        table = np.array([*lacks.values(), odd])
+        rows = []
+        for i, k in enumerate(table.argmax(axis=0)):
+            names = (ODD,) if k == len(sets) else tuple(self.classes[c][0] for c in sets[k])
+            rows.append((names, float(table[k, i])))
+        return rows
+
+    def specs(self, places: Iterable[int]) -> dict[int, str]:
+        """Effects of some classes, each in the setting that explains most."""
+        specs = {}
+        for k in places:
+            looked_at = [
+                w.names for w in self.mixture.sets if k in w.names and w.names in self.shapes
+            ]
+            if looked_at:
+                names = looked_at[0]
+                specs[k] = self.shapes[names][names.index(k)]
+                continue
+            counted: dict[str, float] = {}
+            for each, weight in zip(self.sensors, self.mixture.lacking(k), strict=True):
+                if (spec := each.specs.get(self.classes[k][0])) is not None:
+                    counted[spec] = counted.get(spec, 0.0) + float(weight)
+            if counted:
+                specs[k] = max(counted, key=lambda spec: counted[spec])
+        return specs
+
+
+def _is_sudden(name: str) -> bool:
+    """Whether something is an effect that comes to each sensor at a time of its own."""
+    return name in effect_names() and get_effect(name).sudden
+
+
+def _kind(name: str) -> str:
+    """Which of `WEIGHTS` something has; things of one kind share it evenly."""
+    if name in WEIGHTS:
+        return name
+    return UNKNOWN if name.startswith(UNKNOWN) else EFFECT
