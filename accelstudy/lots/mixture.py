@@ -206,7 +206,7 @@ class Mixture:
         of_type = self.typical(names)
         if of_type is None or self._typical_way(names, of_type) < self._own_way(names):
             return self._together
-        return partial(_looked_up, of_type)
+        return partial(_looked_up, of_type, names)
 
     def _together(self, subset: Names) -> Array:
         """Log odds of the sensors for some effects together, (n,)."""
@@ -258,7 +258,7 @@ class Mixture:
 
     def _typical_way(self, names: Names, of_type: OfType) -> float:
         """Log evidence with sizes of the type."""
-        logs = self._log_likelihood(names, partial(_looked_up, of_type))
+        logs = self._log_likelihood(names, partial(_looked_up, of_type, names))
         if names in self.common:
             fitted = self.common[names] - of_type.alike
         else:
@@ -272,9 +272,11 @@ class Mixture:
         return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
 
 
-def _looked_up(of_type: OfType, subset: Names) -> Array:
-    """Log odds of the sensors for a subset of effects, with sizes of the type, (n,)."""
-    return of_type.odds[subset] if subset else np.zeros(len(next(iter(of_type.odds.values()))))
+def _looked_up(of_type: OfType, names: Names, subset: Names) -> Array:
+    """Log odds of the sensors for a subset of a set, with sizes of the type, (n,)."""
+    if not subset:
+        return np.zeros(len(next(iter(of_type.odds.values()))))
+    return of_type.odds[tuple(names.index(k) for k in subset)]
 
 
 @cache

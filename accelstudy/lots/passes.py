@@ -192,9 +192,7 @@ class Pass:
         if not all(len(self.sizes.columns[spec]) for spec in self.shapes[names]):
             return None
         if names not in known:
-            of_type = self.sizes.of_set(self.shapes[names])
-            odds = {tuple(names[i] for i in s): log for s, log in of_type.odds.items()}
-            known[names] = replace(of_type, odds=odds)
+            known[names] = self.sizes.of_set(self.shapes[names])
         return known[names]
 
     def strongest(self) -> dict[Names, tuple[str, ...]]:

@@ -1,0 +1,117 @@
+"""Sizes of effects as those of a type, beside plain integrals and least squares."""
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.lots.evidence import sensor_evidence
+from accelstudy.lots.mixture import Mixture
+from accelstudy.lots.sizes import SCATTERS, Told, TypeSizes, told
+
+SPECS = ("settling", "gravity_error", "axis_nonperpendicularity")
+"""Effects with a parameter each, whose names alone matter here."""
+N, ROWS = 24, 30
+
+
+def sensors(rng, sizes, like=0.0):
+    """What sensors with effects of some sizes (n, 3) tell; the third is like the second one."""
+    d = rng.standard_normal((len(sizes), ROWS, 3))
+    d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
+    z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
+    each = [
+        Told(a.T @ a, a.T @ b, np.sum(a**2, axis=0), float(b @ b), ROWS)
+        for a, b in zip(d, z, strict=True)
+    ]
+    return d, TypeSizes.of(each, SPECS, range(len(each)))
+
+
+def lot(rng, size=0.6, like=0.0):
+    """All sensors have the first effect, a third of them the second one, none the third."""
+    lacks = np.zeros((N, 3))
+    lacks[:, 0], lacks[: N // 3, 1] = 1, 1
+    return lacks, *sensors(rng, size * lacks, like)
+
+
+def test_odds_are_the_integral_over_the_sizes_of_the_type():
+    _, _, sizes = lot(np.random.default_rng(1))
+    of_type = sizes.of_set(SPECS[:2])
+    assert of_type.shares[0] > 0.9
+    assert of_type.shares[1] == pytest.approx(1 / 3, abs=0.15)
+
+    def integral(i, at, scatter):
+        """Log of the mean of exp(ℓ) over normal sizes, by quadrature."""
+        normal, right = sizes.normal[i][np.ix_(at, at)], sizes.right[i][at]
+        mean = of_type.mean[at]
+
+        def likelihood(*beta):
+            b = np.array(beta)
+            density = np.prod(stats.norm.pdf(b, mean, scatter * abs(mean)))
+            return density * np.exp(b @ right - b @ normal @ b / 2)
+
+        limits = [(m - 9 * abs(m), m + 9 * abs(m)) for m in mean]
+        return np.log(integrate.nquad(likelihood, limits)[0])
+
+    for i, at in ((0, [0]), (20, [1]), (3, [0, 1])):
+        near = [integral(i, at, scatter) - of_type.odds[tuple(at)][i] for scatter in SCATTERS]
+        assert min(map(abs, near)) < 1e-3 * max(1, abs(of_type.odds[tuple(at)][i]))
+
+
+def test_what_a_third_has_is_found_beside_what_all_have():
+    """Of twenty lots; by itself a sensor shows it with a noncentrality of 11."""
+    rng, named, right = np.random.default_rng(2), 0, []
+    for _ in range(20):
+        lacks, _, sizes = lot(rng, like=0.7)
+        known = {
+            names: sizes.of_set([SPECS[k] for k in names])
+            for names in [(0,), (1,), (2,), (0, 1), (0, 2), (1, 2)]
+        }
+        common = {(k,): known[k,].alike - 3 for k in range(3)}
+        mixture = Mixture.of(np.zeros((N, 3)), {}, np.ones(3) / 3, common, known.get)
+        named += mixture.sets[0].names == (0, 1)
+        right.append(np.mean((mixture.lacking(1) > 0.5) == lacks[:, 1]))
+    assert named >= 18
+    # With a known size the error is Φ(−√λ/2) where half of the sensors have it, and less here.
+    assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.6 / 2) - 0.03
+
+
+@pytest.mark.parametrize("like", [0.3, 0.99])
+def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
+    _, d, sizes = lot(np.random.default_rng(3), like=like)
+    of_type = sizes.of_set(SPECS[:2])
+    columns = d.reshape(-1, 3)
+    others = columns[:, [0, 2]]
+    own = 0.6 * columns[:, 1]
+    left = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
+    expected = (left @ left) / 3
+    assert sizes.apart(SPECS[:2], of_type, 1, SPECS[2]) == pytest.approx(expected, rel=0.4)
+
+
+def test_the_noise_is_that_which_the_best_effects_leave():
+    """In units of it, what a sensor tells of an effect that it lacks scatters as noise does."""
+    rng = np.random.default_rng(4)
+    sizes = np.zeros((400, 3))
+    sizes[:, 0], sizes[:200, 1] = 3.0, -2.0
+    _, of_lot = sensors(rng, sizes)
+    normal, right = of_lot.normal[:, 2, 2], of_lot.right[:, 2]
+    without = right - np.einsum(
+        "nk,nk->n",
+        of_lot.normal[:, 2, :2],
+        np.linalg.solve(of_lot.normal[:, :2, :2], of_lot.right[:, :2, None])[..., 0],
+    )
+    beside = normal - np.einsum(
+        "nk,nk->n",
+        of_lot.normal[:, 2, :2],
+        np.linalg.solve(of_lot.normal[:, :2, :2], of_lot.normal[:, :2, 2:])[..., 0],
+    )
+    assert np.std(without / np.sqrt(beside)) == pytest.approx(1, abs=3.3 / np.sqrt(800))
+
+
+def test_a_campaign_that_does_not_determine_the_model_says_nothing():
+    campaign, _ = simulate_campaign(CampaignSettings(name="few", scheme="faces-6"))
+    silent, of_test = sensor_evidence(campaign, None)
+    assert silent.odds == {}
+    assert of_test.names == ()
+    none = told(campaign, None, None, None, ("thermal_bias",))
+    assert none.normal.shape == (3, 3)
+    assert not none.normal.any()
