@@ -98,8 +98,9 @@ class SensorEvidence:
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting
     redundancy : int
-    residuals : (m,) array, m/s², equally uncertain
-    square : float, ‖z‖² of the residuals, in units of the noise: of the type where it is known
+    residuals : (m,) array, m/s², of the means of the positions, equally uncertain
+    freedom : int, redundancy of these
+    square : float, ‖z‖² of all residuals, in units of the noise: of the type where it is known
     shown : dict of effect to what its shapes would show in the residuals, in the same units
     pair_specs : dict of two names to their best settings beside each other
     """
@@ -112,6 +113,7 @@ class SensorEvidence:
     specs: dict[str, str]
     redundancy: int
     residuals: Array
+    freedom: int = 0
     square: float = 0.0
     shown: dict[str, Shown] = field(default_factory=dict)
     pair_specs: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
@@ -172,7 +174,7 @@ def sensor_evidence(
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
-    z, unknown = problem.residuals.z, problem.field.unknown
+    z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals.positions
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
     if noise is not None:
@@ -204,7 +206,8 @@ def sensor_evidence(
         },
         pair_specs=pair_specs,
         redundancy=problem.residuals.redundancy,
-        residuals=z * sigma_stated(base.solution),
+        residuals=of_means.z * sigma_stated(base.solution),
+        freedom=of_means.redundancy,
         square=float(z @ z) / variance,
         shown={
             name: Shown.of(problem, effects, variance)
@@ -233,7 +236,7 @@ def mean_sensor(
     if len({each.residuals.shape for each in sensors}) > 1:
         return None
     table = np.array([each.residuals for each in sensors])
-    freedom = (n - 1) * min(each.redundancy for each in sensors)
+    freedom = (n - 1) * min(each.freedom for each in sensors)
     within = float(np.sum((table - table.mean(axis=0)) ** 2)) / freedom
     sigma = max(float(np.sqrt(within / n)), LEAST_SIGMA)
     columns = {

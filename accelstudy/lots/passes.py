@@ -37,9 +37,11 @@ FEW = 0.1
 """Share of the sensors up to which what they lack makes them odd, and is no matter of the type."""
 RIVAL = 0.02
 """Least posterior of what may be there in place of something else."""
-UNTOLD = 2.0
-"""Noncentrality of what an effect leaves beside another one up to which they cannot be told apart:
-on average the right one is not 0.7 probable then."""
+CERTAIN = 0.95
+"""Posterior from which on one name is told without those that it may be confused with."""
+UNTOLD, RESEMBLES = 6.0, 0.05
+"""Noncentrality of what an effect leaves beside another one, absolute and as a share of its own, up
+to which they are told together: on average the right one is 0.95 probable then."""
 SETS = 12
 """Most probable sets of effects whose sizes are looked at."""
 EFFECT = "effect"
@@ -185,15 +187,19 @@ class Pass:
             np.array(odds), pairs, prior / prior.sum(), common, partial(self._typical, {})
         )
 
-    def _typical(self, known: dict[Names, OfType], names: Names) -> OfType | None:
-        """Odds of effects with sizes of the type, where all sensors told of them."""
+    def _typical(self, known: dict[Names, OfType | None], names: Names) -> OfType | None:
+        """Odds of effects with sizes of the type; None where sensors do not tell of a type."""
+        if names not in known:
+            known[names] = self._of_type(names)
+        return known[names]
+
+    def _of_type(self, names: Names) -> OfType | None:
         if self.sizes is None or names not in self.shapes:
             return None
         if not all(len(self.sizes.columns[spec]) for spec in self.shapes[names]):
             return None
-        if names not in known:
-            known[names] = self.sizes.of_set(self.shapes[names])
-        return known[names]
+        of_type = self.sizes.of_set(self.shapes[names])
+        return None if min(of_type.shares) * len(self.sensors) <= self._few else of_type
 
     def strongest(self) -> dict[Names, tuple[str, ...]]:
         """Return the most probable sets of effects and each of their effects, with best shapes."""
@@ -258,7 +264,7 @@ class Pass:
         for k in np.argsort(-self.given, kind="stable").tolist():
             if k in taken or self._rare[k] or self.given[k] < RIVAL:
                 continue
-            alike = [k] if self.given[k] >= priors.SURE else [k, *self._rivals(k)]
+            alike = [k] if self.given[k] >= CERTAIN else [k, *self._rivals(k)]
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
             if posterior >= priors.SURE:
                 taken.update(alike)
@@ -268,7 +274,7 @@ class Pass:
         return found
 
     def _rivals(self, k: int) -> list[int]:
-        """Effects that all campaigns together cannot tell from one that is not sure."""
+        """Effects that all campaigns together hardly tell from one that is not certain."""
         sets = [one.names for one in self.mixture.sets if k in one.names]
         names = next((names for names in sets if names in self.shapes), None)
         of_type = None if names is None else self.mixture.typical(names)
@@ -279,7 +285,8 @@ class Pass:
             if j in names or (j,) not in self.shapes:
                 continue
             place, (spec,) = names.index(k), self.shapes[j,]
-            if self.sizes.apart(self.shapes[names], of_type, place, spec) < UNTOLD:
+            left, whole = self.sizes.apart(self.shapes[names], of_type, place, spec)
+            if left < min(UNTOLD, RESEMBLES * whole):
                 rivals.append(j)
         return rivals
 
@@ -293,7 +300,12 @@ class Pass:
         """Whether few sensors lack it, if it is one of the lot, (K,)."""
         of = np.maximum(self.mixture.of_effects, 1e-300)
         surely = [np.sum(self.mixture.lacking(k) > HAS * of[k]) for k in range(len(of))]
-        return np.array(surely) <= max(1, FEW * len(self.sensors))
+        return np.array(surely) <= self._few
+
+    @property
+    def _few(self) -> float:
+        """Sensors up to which what they lack makes them odd."""
+        return max(1, FEW * len(self.sensors))
 
     @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:

@@ -205,8 +205,10 @@ class TypeSizes:
         _, odds, mean, shares = best
         return OfType(dict(zip(search.subsets, odds, strict=True)), alike, mean, shares)
 
-    def apart(self, specs: Sequence[str], of_type: OfType, place: int, rival: str) -> float:
-        """Noncentrality that an effect leaves beside a rival of it.
+    def apart(
+        self, specs: Sequence[str], of_type: OfType, place: int, rival: str
+    ) -> tuple[float, float]:
+        """Noncentrality that an effect leaves beside a rival of it, and without the rival.
 
         Parameters
         ----------
@@ -217,14 +219,18 @@ class TypeSizes:
         """
         normal = self.normal[self.usual].sum(axis=0)
         ends = np.cumsum([0, *(len(self.columns[spec]) for spec in specs)])
-        others = [spec for k, spec in enumerate(specs) if k != place]
-        own = self.columns[specs[place]]
-        rest = np.concatenate([self.columns[spec] for spec in (*others, rival)])
-        cross = normal[np.ix_(own, rest)]
-        inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
-        left = normal[np.ix_(own, own)] - cross @ inverse @ cross.T
         mean = of_type.mean[ends[place] : ends[place + 1]]
-        return float(of_type.shares[place] * mean @ left @ mean)
+        own = self.columns[specs[place]]
+        others = [spec for k, spec in enumerate(specs) if k != place]
+
+        def left(beside: Sequence[str]) -> float:
+            rest = np.concatenate([np.zeros(0, dtype=int), *(self.columns[s] for s in beside)])
+            cross = normal[np.ix_(own, rest)]
+            inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
+            shown = normal[np.ix_(own, own)] - cross @ inverse @ cross.T
+            return float(of_type.shares[place] * mean @ shown @ mean)
+
+        return left([*others, rival]), left(others)
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,7 +160,7 @@ def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     sensors = []
     for d, one, n, b in zip(derivatives, z, normal, right, strict=True):
         shown = Shown(("effect",), np.zeros((1, 0)), n[None], b[None], np.sum(d**2, axis=0)[None])
-        sensors.append(SensorEvidence("c", 0.5, {}, {}, (), {}, 30, one, float(one @ one),
+        sensors.append(SensorEvidence("c", 0.5, {}, {}, (), {}, 30, one, 30, float(one @ one),
                                       {"effect": shown}))  # fmt: skip
     joint = together(sensors)["effect"]
     d, one = derivatives.reshape(-1, 2), z.ravel()

@@ -80,11 +80,14 @@ def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
     _, d, sizes = lot(np.random.default_rng(3), like=like)
     of_type = sizes.of_set(SPECS[:2])
     columns = d.reshape(-1, 3)
-    others = columns[:, [0, 2]]
-    own = 0.6 * columns[:, 1]
-    left = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
-    expected = (left @ left) / 3
-    assert sizes.apart(SPECS[:2], of_type, 1, SPECS[2]) == pytest.approx(expected, rel=0.4)
+    own, expected = 0.6 * columns[:, 1], []
+    for beside in ([0, 2], [0]):
+        others = columns[:, beside]
+        left = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
+        expected.append(left @ left / 3)
+    found = sizes.apart(SPECS[:2], of_type, 1, SPECS[2])
+    assert found == pytest.approx(expected, rel=0.4)
+    assert found[0] / found[1] == pytest.approx(expected[0] / expected[1], rel=0.02)
 
 
 def test_the_noise_is_that_which_the_best_effects_leave():
