@@ -230,8 +230,10 @@ def mean_sensor(
     What all of them lack is as large in their mean, and the noise is smaller by the root of their
     number. It is told by their scatter about the mean. None if the positions differ.
     """
-    first, n = campaigns[0], len(campaigns)
-    if n < 2 or not all(_alike(first, other) for other in campaigns[1:]):
+    if (n := len(campaigns)) < 2:
+        return None
+    first = campaigns[0]
+    if not all(_alike(first, other) for other in campaigns[1:]):
         return None
     if len({each.residuals.shape for each in sensors}) > 1:
         return None

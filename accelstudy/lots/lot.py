@@ -190,8 +190,11 @@ def _weigh_lot(
         if of_mean is not None:
             with suppress(InputError):  # the positions do not determine the model
                 mean, _ = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
-        now = replace(now, mean=mean, together=together([sensors[k] for k in usual]))
-        if not (shapes := now.strongest()):
+        joint = together([sensors[k] for k in usual])
+        # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
+        kept = tuple(replace(sensor, shown={}) for sensor in sensors)
+        now = replace(now, sensors=kept, mean=mean, together=joint)
+        if len(usual) < 2 or not (shapes := now.strongest()):
             return now
         specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set))
         each = mapped(told, campaigns, models, [approach] * n, [noise] * n, [specs] * n)
