@@ -52,6 +52,10 @@ NODES = {1: 64, 2: 24, 3: 12}
 """Nodes of the integral over each share below 1, by the number of effects."""
 
 
+BLOCK = 64
+"""Sensors that are integrated over the shares at once, so that memory does not follow the lot."""
+
+
 @dataclass(frozen=True)
 class Weighted:
     """A set of effects of the lot.
@@ -182,14 +186,17 @@ class Mixture:
 
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the lot lacks some effects."""
-        _, weights = self._posterior(names)
-        parts, strange = self._parts(names, self._judging(names))
-        total = np.logaddexp.reduce([*parts.values(), strange])
-
-        def mass(log: Array) -> Array:
-            return np.asarray(np.exp(log - total).reshape(len(log), -1) @ np.ravel(weights))
-
-        return {subset: mass(log) for subset, log in parts.items()}, mass(strange)
+        weights = np.ravel(self._posterior(names)[1])
+        lacks: dict[Names, list[Array]] = {}
+        odd = []
+        for parts, strange in self._parts(names, self._judging(names)):
+            total = np.logaddexp.reduce([*parts.values(), strange])
+            for subset, log in parts.items():
+                mass = np.exp(log - total).reshape(len(log), -1) @ weights
+                lacks.setdefault(subset, []).append(mass)
+            odd.append(np.exp(strange - total).reshape(len(strange), -1) @ weights)
+        each = {subset: np.concatenate(masses) for subset, masses in lacks.items()}
+        return each, np.concatenate(odd)
 
     def lacking(self, k: int) -> Array:
         """Posterior of each sensor to lack an effect, (n,)."""
@@ -222,23 +229,29 @@ class Mixture:
 
     def _parts(
         self, names: Names, odds_of: Callable[[Names], Array]
-    ) -> tuple[dict[Names, Array], Array]:
-        """Log of what each subset, and oddness, contributes: (n, nodes ...) arrays."""
+    ) -> Iterator[tuple[dict[Names, Array], Array]]:
+        """Log of what each subset, and oddness, contributes: (b, nodes ...) arrays, b sensors."""
         size = len(names)
-        shape = (len(self.odds), *(len(_nodes(size)[0]),) * size) if size else (len(self.odds),)
+        nodes = (len(_nodes(size)[0]),) * size
         rho = np.meshgrid(*[_nodes(size)[0]] * size, indexing="ij") if size else []
-        parts = {}
+        prior = {}
         for subset in (s for r in range(min(size, 2) + 1) for s in combinations(names, r)):
-            log = np.full(shape[1:], np.log(1 - ODD))
+            prior[subset] = np.full(nodes, np.log(1 - ODD))
             for place, i in enumerate(names):
-                log = log + (np.log(rho[place]) if i in subset else _log_of_rest(rho[place]))
-            parts[subset] = odds_of(subset).reshape(-1, *[1] * size) + log
-        strange = (np.log(ODD) + self._anything).reshape(-1, *[1] * size)
-        return parts, np.broadcast_to(strange, shape)
+                prior[subset] += np.log(rho[place]) if i in subset else _log_of_rest(rho[place])
+        odds = {subset: odds_of(subset) for subset in prior}
+        for first in range(0, len(self.odds), BLOCK):
+            some = slice(first, first + BLOCK)
+            parts = {s: odds[s][some].reshape(-1, *[1] * size) + prior[s] for s in prior}
+            strange = (np.log(ODD) + self._anything[some]).reshape(-1, *[1] * size)
+            yield parts, np.broadcast_to(strange, (len(strange), *nodes))
 
     def _log_likelihood(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
-        parts, strange = self._parts(names, odds_of)
-        return np.asarray(np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0))
+        each = (
+            np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0)
+            for parts, strange in self._parts(names, odds_of)
+        )
+        return np.asarray(sum(each))
 
     def _evidence(self, names: Names) -> float:
         """Log evidence of effects: with sizes of each sensor, or of the type."""
