@@ -18,7 +18,10 @@ def run() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from accelstudy.commands.main import main
 
-    main(prog_name="accelstudy")
+    try:
+        main(prog_name="accelstudy")
+    finally:
+        gc.freeze()  # Python would look among all of them once more before it ends
 
 
 def _end(number: int, frame: object) -> None:

@@ -41,6 +41,7 @@ def run(step, content, folder):
     from accelstudy.files.tables import collect, read_table
     from accelstudy.study.batches import Share
     from accelstudy.study.cells import study_cells
+    from accelstudy.study.claims.judging import TABLES as FOR_CLAIMS
     from accelstudy.study.claims.judging import judge_claims
     from accelstudy.study.config import parse_study
     from accelstudy.study.figures import figure_names, figure_tables, render
@@ -82,8 +83,8 @@ def run(step, content, folder):
         if kept == "estimates":
             parts[kept] = [folder / cell.approach / "estimates.parquet" for cell in cells]
         outputs = {name: folder / f"{name}.parquet" for name in ("claims", "by_scheme", "html")}
-        tables = (folder / f"{name}.parquet" for name in ("correlations", "sensitivity", "shapley"))
-        judge_claims(study, parts, *tables, outputs, PROVENANCE)
+        tables = {name: folder / f"{name}.parquet" for name in FOR_CLAIMS}
+        judge_claims(study, parts, tables, outputs, PROVENANCE)
     else:
         for name in figure_names(study):
             tables = {key: read_table(folder / f"{key}.parquet") for key in figure_tables(name)}

@@ -1,4 +1,4 @@
-"""The command that prints the verdicts on the paper's claims."""
+"""The command that prints the verdicts on claims."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from accelstudy.commands.options import PATH, example
 @click.command("claims", epilog=example("accelstudy claims results/paper"))
 @click.argument("results", type=PATH)
 def claims_command(results: Path) -> None:
-    """Print the verdicts on the paper's claims as Markdown.
+    """Print the verdicts on claims as Markdown.
 
-    RESULTS is the folder of a study, such as results/paper.
+    RESULTS is the folder of a study, such as results/paper. The paper's claims stand first, then
+    those of this project about what simulation adds to linear theory.
     """
     from accelstudy.files.tables import read_table
     from accelstudy.study.claims.judging import claims_markdown

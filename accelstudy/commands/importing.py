@@ -152,8 +152,6 @@ def _reference(
     log: Path | None, calibration: Path | None, columns: str | None, offset: float | None
 ) -> Beside | None:
     """A reference, as the options say."""
-    from accelstudy.campaign.beside import Beside, ReferenceLog
-
     if log is None and calibration is None:
         given = {"--reference-columns": columns, "--reference-offset": offset}
         for option in (option for option, value in given.items() if value is not None):
@@ -165,6 +163,8 @@ def _reference(
         raise InputError("--reference: give the raw log of that sensor by --reference-log")
     if offset is not None and not math.isfinite(offset):
         raise InputError(f"--reference-offset: expected a number of seconds, not {offset}")
+    from accelstudy.campaign.beside import Beside, ReferenceLog
+
     places = {} if columns is None else parse_columns(columns, "--reference-columns")
     return Beside.of(ReferenceLog(log, calibration, places, offset))
 

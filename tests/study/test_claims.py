@@ -1,4 +1,4 @@
-"""The paper's claims: known reductions, and verdicts that can be either."""
+"""The paper's claims and those of this project: known numbers, and verdicts that can be either."""
 
 import re
 from dataclasses import replace
@@ -24,9 +24,19 @@ from accelstudy.basics.wording import interval, number
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
+from accelstudy.study.beyond_linear_theory import beyond_linear_theory
 from accelstudy.study.cells import study_cells
-from accelstudy.study.claims import NOT_REPRODUCED, REPRODUCED, SLIP, evidence_from, judge
-from accelstudy.study.claims.judging import claims_markdown, claims_page, judge_claims
+from accelstudy.study.claims import (
+    FAILS,
+    HOLDS,
+    NOT_REPRODUCED,
+    OPEN,
+    REPRODUCED,
+    SLIP,
+    evidence_from,
+    judge,
+)
+from accelstudy.study.claims.judging import TABLES, claims_markdown, claims_page, judge_claims
 from accelstudy.study.figures import draw_figures, figure_tables
 from accelstudy.study.monte_carlo.distributions import Controlled, Sample
 from accelstudy.study.sensitivity import analyse_shapley
@@ -74,6 +84,7 @@ def evidence(tables, folder):
         study_cells(make_study(**KEYS)), parts_in(folder), LEVELING, scheme="mclaren-24",
         correlations=tables["correlations"], sensitivity=tables["sensitivity"],
         shapley=tables["shapley"], base_samples=BASE_SAMPLES, resamples=RESAMPLES, seed=1,
+        beyond=beyond_linear_theory(tables["cells"], tables["summary"]),
     )  # fmt: skip
 
 
@@ -143,8 +154,9 @@ def test_correlations(judged):
 def test_slips(judged):
     slips = judged[0][judged[0]["verdict"] == SLIP]
     assert [*slips.index] == ["roll-accuracy-falls-with", "degree-of-freedom", "equation-10"]
-    assert [*judged[0].index[-3:]] == [*slips.index]
-    assert judged[0]["section"][:-3].is_monotonic_increasing
+    papers = judged[0][judged[0]["section"] != ""]
+    assert [*papers.index[-3:]] == [*slips.index]
+    assert papers["section"][:-3].is_monotonic_increasing
     assert judged[0].index.is_unique
     freedom = slips.loc["degree-of-freedom"]
     assert (freedom["paper"], freedom["ours"]) == (15, 63)
@@ -262,6 +274,75 @@ def test_a_scheme_without_redundancy_has_no_reduction(evidence):
     assert "of 1 schemes" in claims.set_index("claim").loc["reduction-bias", "sentence"]
 
 
+def own_claims(evidence, **changed):
+    """Claims of this project where some parameters in rings-24 by gravity have other numbers."""
+    rows = evidence.beyond.assign(bias=1e-4, excess=-1e-4, bias_half=1e-5, excess_half=1e-5)
+    there = (rows["scheme"] == "rings-24") & (rows["approach"] == "gravity")
+    one = there & rows["parameter"].isin(["b_x", "s_z"])
+    for column, value in changed.items():
+        rows.loc[one, column] = value
+    claims = judge(replace(evidence, beyond=rows))[0]
+    return claims[claims["section"] == ""].set_index("claim")
+
+
+@pytest.mark.parametrize(("claim", "changed", "verdict", "ours"), [
+    ("bias-small", {}, HOLDS, 0.01),
+    ("bias-small", {"bias": -0.009, "bias_half": 5e-4}, HOLDS, 0.9),
+    ("bias-small", {"bias": -0.009, "bias_half": 2e-3}, OPEN, 0.9),
+    ("bias-small", {"bias": 0.011, "bias_half": 2e-3}, OPEN, 1.1),
+    ("bias-small", {"bias": -0.05}, FAILS, 5),
+    ("variance-linear", {}, HOLDS, 0.01),
+    ("variance-linear", {"excess": 0.009, "excess_half": 2e-3}, OPEN, 0.9),
+    ("variance-linear", {"excess": -0.04}, FAILS, 4),
+    ("noise-when-off", {}, HOLDS, 10),
+    ("noise-when-off", {"excess": 0.001, "excess_half": 2e-3}, OPEN, np.sqrt(10)),
+    ("noise-when-off", {"excess": 0.01}, FAILS, 1),
+])  # fmt: skip
+def test_what_simulation_adds_holds_or_not_or_is_not_decided(
+    evidence, claim, changed, verdict, ours
+):
+    claims = own_claims(evidence, **changed)
+    judged = claims.loc[f"{claim}-gravity"]
+    assert judged["verdict"] == verdict
+    assert judged["ours"] == pytest.approx(ours)
+    assert judged["ci95_low"] < judged["ours"] < judged["ci95_high"]
+    assert (f"rings-24 with {NINE}" in judged["sentence"]) == (verdict != HOLDS)
+    assert "1 of 2 set-ups" in judged["sentence"] or verdict != FAILS
+    assert "mclaren-24" not in judged["sentence"]
+    assert set(claims.filter(like="-robot", axis=0)["verdict"]) == {HOLDS}
+
+
+def test_what_simulation_adds_in_simulated_set_ups(evidence, judged):
+    """At 2 mm/s² linear theory is right; in the limits there is no room for anything else."""
+    own = judged[0][judged[0]["section"] == ""]
+    assert len(own) == 6
+    assert own["paper"].isna().all()
+    assert set(own.loc[["bias-small-robot", "variance-linear-robot"], "verdict"]) == {HOLDS}
+    rows = evidence.beyond[evidence.beyond["approach"] == "gravity"]
+    bias = 100 * rows["bias"].abs()
+    assert own.loc["bias-small-gravity", "ours"] == pytest.approx(bias.max())
+    off = np.sqrt(0.01 / rows["excess"].abs().max())
+    assert own.loc["noise-when-off-gravity", "ours"] == pytest.approx(off)
+
+
+def test_what_simulation_adds_is_judged_at_the_papers_noise(evidence):
+    noisy = evidence.beyond.assign(sensor_sigma_mps2=0.2, bias=1.0, bias_half=0.0)
+    both = replace(evidence, beyond=pd.concat([evidence.beyond, noisy]))
+    pd.testing.assert_frame_equal(judge(both)[0], judge(evidence)[0])
+    none = judge(replace(evidence, beyond=None))[0]
+    assert (none["section"] != "").all()
+
+
+def test_many_set_ups_are_not_all_named(evidence):
+    rows = evidence.beyond.assign(bias=0.5)
+    rows = pd.concat([rows.assign(scheme=f"rings-{n}") for n in range(30)])
+    claims = judge(replace(evidence, beyond=rows))[0].set_index("claim")
+    sentence = claims.loc["bias-small-robot", "sentence"]
+    assert sentence.startswith("Not so in 30 of 30 set-ups: rings-0 with")
+    assert "rings-9 with" in sentence
+    assert sentence.endswith(", 20 more.")
+
+
 def test_the_same_evidence_gives_the_same_verdicts(evidence, judged):
     pd.testing.assert_frame_equal(judge(evidence)[0].set_index("claim"), judged[0])
 
@@ -273,9 +354,12 @@ def test_markdown_has_every_claim(judged):
     claims = judged[0].reset_index()
     text = claims_markdown(claims)
     lines = text.splitlines()
-    assert len(lines) == 2 + len(claims)
-    assert all(line.count("|") == 7 for line in lines)
-    for line, row in zip(lines[2:], claims.to_dict("records"), strict=True):
+    papers = int((claims["section"] != "").sum())
+    assert lines[papers + 2] == ""
+    assert [line.count("|") for line in lines[: papers + 2]] == [7] * (papers + 2)
+    assert {line.count("|") for line in lines[papers + 3 :]} == {5}
+    rows = [*lines[2 : papers + 2], *lines[papers + 5 :]]
+    for line, row in zip(rows, claims.to_dict("records"), strict=True):
         assert row["statement"] in line
         assert f"**{row['verdict']}**" in line
         assert row["sentence"] in line
@@ -290,6 +374,9 @@ def test_page_has_every_claim(judged):
         assert row["sentence"] in text_of(page)
     for scheme in ("mclaren-24", "rings-24"):
         assert scheme in page
+    assert "not of the paper" in page
+    papers = judged[0][judged[0]["section"] != ""].reset_index()
+    assert "not of the paper" not in claims_page(papers, judged[1].reset_index())
     assert not re.search(r"\bnan\b", page, re.IGNORECASE)
     assert not re.search(r"(src|href)=[\"']https?:", page)
 
@@ -325,8 +412,8 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
         "html": tmp_path / "claims.html",
     }
     judge_claims(
-        make_study(**KEYS), parts_in(folder), folder / "correlations.parquet",
-        folder / "sensitivity.parquet", folder / "shapley.parquet", outputs, PROVENANCE,
+        make_study(**KEYS), parts_in(folder),
+        {name: folder / f"{name}.parquet" for name in TABLES}, outputs, PROVENANCE,
     )  # fmt: skip
     claims = read_table(outputs["claims"])
     pd.testing.assert_frame_equal(claims.set_index("claim"), judged[0], check_dtype=False)

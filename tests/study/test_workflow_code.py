@@ -41,6 +41,7 @@ def names():
     ("design/closed_forms.py", {"summarise"}),
     ("drawing/style.py", {"figures", "calibrate"}),
     ("study/figures/sweep.py", {"figures"}),
+    ("study/beyond_linear_theory.py", {"claims", "figures"}),
     ("study/claims/base.py", {"claims"}),
     ("study/claims/page.html.j2", {"claims"}),
     ("pages/base.html.j2", {"claims", "calibrate", "overview"}),

@@ -29,6 +29,8 @@ rule sensitivity:
 rule claims:
     input:
         **(parts_of_claims() if STUDY.paper else {}),
+        cells=f"{RESULTS}/cells.parquet",
+        summary=f"{RESULTS}/summary.parquet",
         correlations=f"{RESULTS}/correlations.parquet",
         sensitivity=f"{RESULTS}/sensitivity.parquet",
         shapley=f"{RESULTS}/shapley.parquet",
@@ -53,6 +55,6 @@ rule claims:
     params:
         code=code_of("claims"),
     message:
-        "Check the paper's claims against the Monte Carlo"
+        "Judge the paper's claims, and what simulation adds"
     script:
         "../scripts/claims.py"

@@ -1,5 +1,5 @@
 from accelstudy.jobs.job import job, lists
-from accelstudy.study.claims.judging import judge_claims
+from accelstudy.study.claims.judging import TABLES, judge_claims
 from accelstudy.study.config import StudyConfig
 
 with job(snakemake) as provenance:
@@ -7,9 +7,7 @@ with job(snakemake) as provenance:
     judge_claims(
         study,
         lists(snakemake.input),
-        snakemake.input.correlations,
-        snakemake.input.sensitivity,
-        snakemake.input.shapley,
+        {name: snakemake.input[name] for name in TABLES},
         dict(snakemake.output.items()),
         provenance,
     )

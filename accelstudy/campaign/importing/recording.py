@@ -383,7 +383,8 @@ class Log:
                 if "nanoseconds" in keys:
                     raw[:, keys.index("time")] += 1e-9 * raw[:, keys.index("nanoseconds")]
                 check_numbers(self.source, self.places, raw, row, self.conditions)
-                forces = self.frame.to_frd(self.conversion.to_si(raw[:, axes]))
+                readings = raw[:, axes]
+                forces = self.frame.to_frd(self.conversion.to_si(readings))
                 if clock is not None:
                     start = raw[0, keys.index("time")] if start is None else start
                     time = raw[:, keys.index("time")] - start
@@ -392,8 +393,8 @@ class Log:
                 else:
                     assert self.rate is not None
                     time = np.arange(row, row + len(raw)) / self.rate
-                lowest = np.minimum(lowest, raw[:, axes].min(axis=0))
-                highest = np.maximum(highest, raw[:, axes].max(axis=0))
+                lowest = np.minimum(lowest, readings.min(axis=0))
+                highest = np.maximum(highest, readings.max(axis=0))
                 row += len(raw)
                 yield Rows(time, forces, raw[:, others])
         if row < 2:

@@ -27,6 +27,7 @@ SATURATED = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
 WANDERING = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
+_NONE = np.empty((0, 1))  # rows
 
 
 @dataclass(frozen=True)
@@ -249,19 +250,23 @@ class GrowingHold:
         # Conversion from counts or g rounds.
         self._range, self._beyond = full_range * (1 - 1e-9), np.zeros(3, dtype=int)
         self._cut, self._to_drop = cut, cut
-        self._waiting: list[Array] = []
+        self._waiting = _NONE
         self._record: list[Array] = []
         self._recorded = 0
 
     def grow(self, batch: Windows, chosen: slice) -> None:
-        """Add the samples that follow, (k, 4 + c): time, forces, conditions."""
-        parts = (batch.time[:, None], batch.forces, batch.conditions)
-        rows = np.hstack([part[chosen] for part in parts])
-        dropped = min(self._to_drop, len(rows))
+        """Add the samples that follow."""
+        time = batch.time[chosen]
+        dropped = min(self._to_drop, len(time))
         self._to_drop -= dropped
-        rows = np.concatenate([*self._waiting, rows[dropped:]])
+        columns = [time, *batch.forces[chosen].T, *batch.conditions[chosen].T]
+        before = len(self._waiting)
+        rows = np.empty((before + len(time) - dropped, len(columns)), order="F")
+        rows[:before] = self._waiting
+        for i, column in enumerate(columns):
+            rows[before:, i] = column[dropped:]
         sure = max(0, len(rows) - self._cut)
-        self._waiting = [rows[sure:]]
+        self._waiting = rows[sure:]
         if sure:
             self.keep(rows[:sure])
 
@@ -283,13 +288,14 @@ class GrowingHold:
         if max(high.max(), -low.min()) >= self._range:
             self._beyond += np.sum(np.abs(forces) >= self._range, axis=0)
         kept = rows[: max(0, LONGEST_RECORD - self._recorded), :4]
-        self._record.append(kept.copy())
+        if len(kept):  # an empty part would hold on to all rows
+            self._record.append(kept)
         self._recorded += len(kept)
 
     def finish(self) -> Segment:
         """Reduce the hold to its sums; the samples of all holds may not fit into memory."""
         assert self._moments is not None
-        record, self._record, self._waiting = np.concatenate(self._record), [], []
+        record, self._record, self._waiting = np.concatenate(self._record), [], _NONE
         moments = allan_moments(record)
         forces = np.eye(4)[:, 1:]
         about_line = forces.copy()

@@ -21,7 +21,7 @@ from accelstudy.campaign.importing.recording import GAP, Recording
 Array = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 8, 10**6  # samples
-IN_MEMORY = 2**23
+IN_MEMORY = 2**22
 """Bytes of windows that are kept in memory."""
 FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
@@ -99,54 +99,70 @@ class Windows:
 def windows(log: Recording, width: int) -> Iterator[Windows]:
     """Windows of `width` samples (odd), sliding by one; none spans a gap."""
     half, piece, recording, row = width // 2, 0, 0, 0
-    times, values = np.empty(0), np.empty((0, 3 + len(log.conditions)), order="F")
+    times, forces, others = np.empty(0), _columns(3), _columns(len(log.conditions))
     for rows in log.chunks():
         before = times[-1:] if len(times) else rows.time[:1]
         jumps = np.diff(rows.time, prepend=before) > GAP * log.step
         if rows.anew and row > 0:
             jumps[0], recording = True, recording + 1
-        chunk = np.hstack([rows.forces, rows.conditions])
-        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(chunk)})
+        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(rows.time)})
         for first, end in pairwise(edges):
             if jumps[first]:
                 piece += 1
-                times, values = times[:0], values[:0]
+                times, forces, others = times[:0], forces[:0], others[:0]
             times = np.concatenate([times, rows.time[first:end]])
-            values = np.concatenate([values, chunk[first:end]])
+            forces = np.concatenate([forces, rows.forces[first:end]])
+            others = np.concatenate([others, rows.conditions[first:end]])
             row += end - first
             centred = max(0, len(times) - width + 1)
             empty = np.empty(0), np.empty(0, dtype=bool)
-            variance, frozen = _spread(values[:, :3], width) if centred else empty
+            variance, frozen = _spread(forces, width) if centred else empty
             inside = slice(half, half + centred)
             yield Windows(
                 piece,
                 recording,
                 row - len(times) + half,
                 times[inside],
-                np.asfortranarray(values[inside, :3]),
-                np.asfortranarray(values[inside, 3:]),
+                np.asfortranarray(forces[inside]),
+                np.asfortranarray(others[inside]),
                 variance,
                 frozen,
             )
-            times, values = times[centred:], values[centred:]
+            times, forces, others = times[centred:], forces[centred:], others[centred:]
+
+
+def _columns(count: int) -> Array:
+    """No row yet of columns each of which lies in one piece, as sums along them are faster."""
+    return np.empty((0, count), order="F")
 
 
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes in each window, and whether an axis does not change."""
-    # Running sums of large numbers lose digits.
-    offsets = forces - forces.mean(axis=0)
-    sums, squares = (_window_sums(values, width) / width for values in (offsets, offsets**2))
-    variance = np.maximum(squares - sums**2, 0.0)
-    # Rounding may hide a variance of zero, so changes are counted.
-    changed = np.diff(forces, axis=0) != 0
-    frozen = np.zeros(len(variance), dtype=bool)
-    if not changed.all():
-        frozen = np.any(_window_sums(changed, width - 1) == 0, axis=1)
-    return np.sqrt(np.sum(variance**2, axis=1)), frozen
+    squares = np.zeros(len(forces) - width + 1)
+    frozen = np.zeros(len(squares), dtype=bool)
+    # Axis by axis, as what a processor keeps at hand is small.
+    for force in forces.T:
+        # Running sums of large numbers lose digits.
+        offsets = force - force.mean()
+        mean = _window_sums(offsets, width)
+        mean /= width
+        offsets *= offsets
+        variance = _window_sums(offsets, width)
+        variance /= width
+        mean *= mean
+        variance -= mean
+        np.maximum(variance, 0.0, out=variance)
+        variance *= variance
+        squares += variance
+        # Rounding may hide a variance of zero, so changes are counted.
+        changed = force[1:] != force[:-1]
+        if not changed.all():
+            frozen |= _window_sums(changed, width - 1) == 0
+    return np.sqrt(squares, out=squares), frozen
 
 
 def _window_sums(values: NDArray[Any], width: int) -> NDArray[Any]:
-    sums = np.cumsum(values, axis=0)
+    sums = np.cumsum(values)
     result = sums[width - 1 :].copy()
     result[1:] -= sums[:-width]
     return result
@@ -235,11 +251,13 @@ class Survey:
 
 def _two_lowest(before: Array, forces: Array) -> Array:
     """Lowest value of each axis and the one next to it, (2, 3), with those before."""
-    if (forces.min(axis=0) >= before[1]).all():
-        return before
-    candidates = np.vstack([before, forces])
-    lowest = candidates.min(axis=0)
-    return np.array([lowest, np.where(candidates > lowest, candidates, np.inf).min(axis=0)])
+    result = before.copy()
+    for (lowest, next_to_it), force, ends in zip(before.T, forces.T, result.T, strict=True):
+        if force.min() < next_to_it:
+            candidates = np.append(force[force < next_to_it], [lowest, next_to_it])
+            ends[0] = candidates.min()
+            ends[1] = candidates[candidates > ends[0]].min(initial=np.inf)
+    return result
 
 
 def survey_log(log: Recording, width: int) -> Survey:

@@ -19,15 +19,19 @@ Array = NDArray[np.float64]
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 SLIP = "slip in the paper"
+HOLDS = "holds"
+FAILS = "does not hold"
+OPEN = "not decided"
 
 
 @dataclass(frozen=True)
 class Claim:
     """One claim and its verdict; numbers in `unit`, NaN where they do not apply.
 
-    `paper` is the paper's number, `ours` ours with its 95 % confidence interval; `single_low` and
-    `single_high` bound the central 95 % of single simulations, and `percentile` is where the
-    paper's number lies in their distribution (default scheme).
+    `section` is where the paper makes it, and empty for a claim of this project. `paper` is the
+    paper's number, `ours` ours with its 95 % confidence interval; `single_low` and `single_high`
+    bound the central 95 % of single simulations, and `percentile` is where the paper's number lies
+    in their distribution (default scheme).
     """
 
     claim: str
@@ -74,6 +78,8 @@ class Evidence:
     sensitivity : DataFrame, see `accelstudy.leveling.sensitivity`, with a column `analysis`
     shapley : DataFrame, see `accelstudy.leveling.shares`, with a column `analysis`
     base_samples, resamples, seed : of the sensitivity analysis
+    beyond : DataFrame, see `accelstudy.study.beyond_linear_theory`; None where linear theory does
+        not know all that is simulated
     """
 
     statistics: Mapping[tuple[str, str], Statistics]
@@ -86,6 +92,7 @@ class Evidence:
     base_samples: int
     resamples: int
     seed: int
+    beyond: pd.DataFrame | None = None
 
     @property
     def cell(self) -> Cell:
@@ -113,12 +120,12 @@ def judge(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
 
     Returns
     -------
-    claims : DataFrame, one row per `Claim`, by section, slips last
+    claims : DataFrame, one row per `Claim`, by section, then slips, then those of this project
     by_scheme : DataFrame, one row per `SchemeClaim`
     """
     rows = [row for judge_family in _JUDGES for row in judge_family(evidence)]
     claims = [row for row in rows if isinstance(row, Claim)]
-    claims.sort(key=lambda claim: (claim.verdict == SLIP, claim.section))
+    claims.sort(key=lambda claim: (not claim.section, claim.verdict == SLIP, claim.section))
     by_scheme = [row for row in rows if isinstance(row, SchemeClaim)]
     return pd.DataFrame(claims), pd.DataFrame(by_scheme)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from accelstudy.basics.wording import interval, number
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
+from accelstudy.study.beyond_linear_theory import beyond_linear_theory, knows_all
 from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims.base import Array, Evidence, judge, schemes_with_both
@@ -31,6 +32,8 @@ from accelstudy.study.monte_carlo.moments import EDGES, PROBABILITIES, apart_by_
 from accelstudy.study.monte_carlo.sketch import Sketch
 from accelstudy.study.monte_carlo.statistics import Statistics, read_trees
 
+TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
+"""What the claims are judged by, beside moments, sketches and estimates."""
 SWEEP = "config/sweeps/positions.yaml"
 """A study for readers of the claims who want one of their own."""
 
@@ -38,19 +41,17 @@ SWEEP = "config/sweeps/positions.yaml"
 def judge_claims(
     study: StudyConfig,
     parts: Mapping[str, Sequence[str | Path]],
-    correlations: str | Path,
-    sensitivity: str | Path,
-    shapley: str | Path,
+    tables: Mapping[str, str | Path],
     outputs: Mapping[str, str],
     provenance: Mapping[str, Any],
 ) -> None:
-    """Judge the paper's claims.
+    """Judge the paper's claims, and those of this project.
 
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
     parts : see `evidence_from`
-    correlations, sensitivity, shapley : paths of the tables
+    tables : paths of the tables of `TABLES`, by their names
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
@@ -61,14 +62,18 @@ def judge_claims(
         for cell in study_cells(study)
         if cell.name == "/".join([settings.model, cell.scheme, cell.approach])
     ]
+    read = {name: read_table(tables[name]) for name in TABLES}
+    known = knows_all(study)
+    beyond = beyond_linear_theory(read["cells"], read["summary"]) if known else None
     evidence = evidence_from(
         cells,
         parts,
         study.leveling.model_dump(),
         scheme=settings.scheme,
-        correlations=read_table(correlations),
-        sensitivity=read_table(sensitivity),
-        shapley=read_table(shapley),
+        correlations=read["correlations"],
+        sensitivity=read["sensitivity"],
+        shapley=read["shapley"],
+        beyond=beyond,
         base_samples=settings.base_samples,
         resamples=settings.resamples,
         seed=study.seed,
@@ -206,9 +211,11 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
     """Page (HTML, self-contained) with all claims and their verdicts."""
     from accelstudy.pages import render  # which shows numbers as here
 
+    papers, own = _papers_and_own(claims)
     return render(
         "study/claims/page.html.j2",
-        claims=claims.to_dict("records"),
+        claims=papers,
+        own=own,
         schemes=by_scheme.to_dict("records"),
         next_steps=[
             ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
@@ -218,19 +225,34 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
 
 
 def claims_markdown(claims: pd.DataFrame) -> str:
-    """The claims as a table in Markdown, one row each."""
+    """The claims as tables in Markdown, one row each: those of the paper, then of this project."""
+    papers, own = _papers_and_own(claims)
     lines = [
         "| section | claim | paper | ours (95 % interval) | verdict | |",
         "|---|---|---|---|---|---|",
     ]
-    for row in claims.to_dict("records"):
-        unit = "" if row["unit"] in ("1", "ratio") else f" {row['unit']}"
-        paper = "–" if math.isnan(row["paper"]) else f"{number(row['paper'])}{unit}"
-        ours = f"{number(row['ours'])}{unit}"
-        spread = interval(row["ci95_low"], row["ci95_high"])
-        ours += f" ({spread})" if spread else ""
-        lines.append(
-            f"| {row['section']} | {row['statement']} | {paper} | {ours} | "
-            f"**{row['verdict']}** | {row['sentence']} |"
-        )
+    for row in papers:
+        paper = "–" if math.isnan(row["paper"]) else f"{number(row['paper'])}{_unit(row)}"
+        lines.append(f"| {row['section']} | {row['statement']} | {paper} | {_judged(row)}")
+    if own:
+        lines += ["", "| claim of this project | found (95 % interval) | verdict | |"]
+        lines += ["|---|---|---|---|"]
+        lines += [f"| {row['statement']} | {_judged(row)}" for row in own]
     return "\n".join(lines) + "\n"
+
+
+def _papers_and_own(claims: pd.DataFrame) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
+    """Claims of the paper, and those of this project, which are of no section."""
+    of_paper = claims["section"] != ""
+    return claims[of_paper].to_dict("records"), claims[~of_paper].to_dict("records")
+
+
+def _judged(row: Mapping[Any, Any]) -> str:
+    """Number, verdict and sentence, as the last cells of a row in Markdown."""
+    spread = interval(row["ci95_low"], row["ci95_high"])
+    ours = f"{number(row['ours'])}{_unit(row)}" + (f" ({spread})" if spread else "")
+    return f"{ours} | **{row['verdict']}** | {row['sentence']} |"
+
+
+def _unit(row: Mapping[Any, Any]) -> str:
+    return "" if row["unit"] in ("1", "ratio") else f" {row['unit']}"

@@ -22,6 +22,7 @@ from accelstudy.files.tables import read_table
 from accelstudy.pages import render
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import PRESETS
+from accelstudy.study.beyond_linear_theory import is_compared
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.explorer import charts
 from accelstudy.study.explorer.content import (
@@ -35,7 +36,6 @@ from accelstudy.study.explorer.content import (
     without_robot,
 )
 from accelstudy.study.figures import angle_unit, figure_names, get_figure
-from accelstudy.study.figures.beyond_linear_theory import is_drawn
 from accelstudy.study.figures.factors import (
     FACTORS,
     NOISES,
@@ -296,7 +296,7 @@ def _tests(study: StudyConfig) -> dict[str, Callable[[Mapping[Any, Any]], bool]]
     for factor in FACTORS:
         tests[f"sweep-{factor.name}"] = _drawn(study, factor)
     tests["closed-forms"] = lambda cell: bool(cell["n_converged"])
-    tests["beyond-linear-theory"] = lambda cell: bool(is_drawn(cell))
+    tests["beyond-linear-theory"] = lambda cell: bool(is_compared(cell))
     return tests
 
 

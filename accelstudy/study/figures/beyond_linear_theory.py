@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,12 @@ from accelstudy.drawing.style import (
     new_figure,
     say_empty,
 )
+from accelstudy.study.beyond_linear_theory import (
+    OFF,
+    beyond_linear_theory,
+    knows_all,
+    noise_when_off,
+)
 from accelstudy.study.figures.base import Tables, register
 from accelstudy.study.figures.factors import NOISES
 
@@ -32,26 +38,12 @@ if TYPE_CHECKING:
 
     from accelstudy.study.config import StudyConfig
 
-OFF = 0.01
-"""Share of the variance from which linear theory counts as off."""
 MOST_MODELS = 10
 """Most models of one figure; more would make it too tall."""
 ROW_MM = 4.2
 APART = 0.18
 """Half the height between two approaches; rows are 1 apart."""
 LIMIT: Style = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
-
-
-def is_drawn(cells: Any) -> Any:
-    """Whether the figure shows cells, rows of the table `cells`: one or more."""
-    simulated = (cells["control"] == "linear") & (cells["n_converged"] > 1)
-    return simulated & (cells["gravity_error_mps2"] == 0)
-
-
-def _as_simulated(study: StudyConfig) -> bool:
-    """Whether calibrations know of all that is simulated, and linear theory with them."""
-    complete = study.simulated_effects == ["model"] and not study.noise.effects
-    return study.control == "linear" and complete
 
 
 @register(
@@ -68,10 +60,10 @@ def _as_simulated(study: StudyConfig) -> bool:
     of a panel are right together with a probability of 95 %.
     """,
     tables=("cells", "summary"),
-    when=_as_simulated,
+    when=knows_all,
     angles=False,
 )
-def beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
+def draw_beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
     """A row of three panels for each model, with a line for each group of parameters."""
     from matplotlib.lines import Line2D
     from matplotlib.ticker import NullLocator
@@ -132,24 +124,10 @@ def _numbers(tables: Tables) -> pd.DataFrame:
     A number is NaN where none of the group is distinguished from zero; the limit then holds for all
     of the group, and at 95 % for all groups and cells together.
     """
-    from scipy import special
-
-    cells = tables["cells"]
-    rows: pd.DataFrame = tables["summary"]
-    rows = rows[rows["cell"].isin(cells["cell"][is_drawn(cells)])]
-    relative = (rows["sd_empirical"] / rows["sd_linear"]) ** 2
-    rows = rows.assign(
-        group=[group_of(name) for name in rows["parameter"]],
-        bias=rows["bias"] / rows["sd_empirical"],
-        bias_se=rows["bias_se"] / rows["sd_empirical"],
-        excess=relative - 1,
-        excess_se=2 * relative * rows["sd_se"] / rows["sd_empirical"],
-    )
-    rows = rows[np.isfinite(rows["bias_se"]) & np.isfinite(rows["excess_se"])]
-    both_tails = 0.05 / max(len(rows), 1)
-    sigmas = special.stdtrit(rows["n_converged"] - 1, 1 - both_tails / 2)
+    rows = beyond_linear_theory(tables["cells"], tables["summary"])
+    rows = rows.assign(group=[group_of(name) for name in rows["parameter"]])
     for name in ("bias", "excess"):
-        size, half = rows[name].abs(), sigmas * rows[f"{name}_se"]
+        size, half = rows[name].abs(), rows[f"{name}_half"]
         seen = rows[name].where(size > half)
         columns = {name: seen, f"{name}_size": seen.abs(), f"{name}_limit": size + half}
         rows = rows.assign(**columns)
@@ -160,8 +138,8 @@ def _numbers(tables: Tables) -> pd.DataFrame:
     noise = NOISES[0].shown(table["sensor_sigma_mps2"])
     return table.assign(
         below=-by_group["excess"].min().to_numpy() == table["excess_size"],
-        noise_size=noise * np.sqrt(OFF / table["excess_size"]),
-        noise_limit=noise * np.sqrt(OFF / table["excess_limit"]),
+        noise_size=noise_when_off(noise, table["excess_size"]),
+        noise_limit=noise_when_off(noise, table["excess_limit"]),
     )
 
 
