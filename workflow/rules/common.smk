@@ -86,16 +86,16 @@ def parts_of_batch(wildcards):
     }
 
 
+def batches_of_claims():
+    """Batches with the cells that the sensitivity analysis and the claims use."""
+    model = STUDY.sensitivity.model
+    return [b for b, batch in BATCHES.items() if any(cell.model == model for cell in batch.cells)]
+
+
 def parts_of_claims():
     """Moments and sketches of the cells that the claims use, and their estimates."""
-    chosen = [
-        name
-        for name, batch in BATCHES.items()
-        if any(cell.model == STUDY.sensitivity.model for cell in batch.cells)
-    ]
-    whole = {
-        kind: [f"{RESULTS}/batches/{name}/{kind}.parquet" for name in chosen] for kind in WHOLE
-    }
+    chosen = batches_of_claims()
+    whole = {kind: expand(f"{BATCH}/{kind}.parquet", batch=chosen) for kind in WHOLE}
     kept = (
         [WRITTEN["estimates"].format(part=part) for b in chosen for part in PARTS_OF[b]]
         if KEPT
