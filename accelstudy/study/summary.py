@@ -72,8 +72,8 @@ def summarise_batch(
             statistics = Statistics.of_none(cell)
             distributions: Mapping[Key, Controlled] = {}
             if cell.name in trees:
-                tree, control = trees[cell.name], Control.of(cell, leveling)
-                tilt = cell_tilt_error(cell, leveling)
+                tree, tilt = trees[cell.name], cell_tilt_error(cell, leveling)
+                control = Control.of(cell, tilt)
                 statistics = Statistics.of(cell, tree, control, tilt)
                 write_moments(moments_table(cell.name, tree))
                 if statistics.converged:
