@@ -139,7 +139,7 @@ def panels_over_roll(
         ax.tick_params(labelsize=7, pad=2)
     for row, (label, colour) in zip(axes, rows, strict=True):
         row[0].set_ylabel(label.replace("-", "-\n"), color=colour)
-    fig.align_ylabels()
+    fig.align_ylabels(axes[:, 0])
     unit = attitude_unit()
     for ax, pitch in zip(axes[0], pitches, strict=True):
         ax.set_title(f"$\\theta$ = {to_attitude(pitch * GON):g} {unit}")
