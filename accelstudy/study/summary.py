@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -33,7 +32,7 @@ from accelstudy.study.monte_carlo.followed import (
     Distributed,
     cell_tilt_error,
 )
-from accelstudy.study.monte_carlo.moments import MOMENTS, PROBABILITIES, moments_table
+from accelstudy.study.monte_carlo.moments import PROBABILITIES
 from accelstudy.study.monte_carlo.sketch import SKETCHES, Key, sketch_table
 from accelstudy.study.monte_carlo.statistics import Estimates, Statistics, read_trees
 from accelstudy.study.tables import TABLES
@@ -59,16 +58,12 @@ def summarise_batch(
     spec : mapping with `cells` (plain data of `Cell`)
     parts : files of the jobs of the batch, in order: `moments`, and `estimates` or `sketches`
     leveling : mapping with max_tilt_gon and attitudes
-    outputs : path of each of `TABLES`, and of `moments` and `sketches` of whole cells
+    outputs : path of each of `TABLES`, and of `sketches` of whole cells
     provenance : see `accelstudy.files.tables.origin`
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
     trees = read_trees(parts["moments"], (cell.name for cell in cells))
-    with ExitStack() as files:
-        write_moments, write_sketches = (
-            files.enter_context(parquet_writer(outputs[name], schema, provenance))
-            for name, schema in (("moments", MOMENTS), ("sketches", SKETCHES))
-        )
+    with parquet_writer(outputs["sketches"], SKETCHES, provenance) as write_sketches:
 
         def summed_up(cell: Cell) -> SummedUp:
             if cell.name not in trees:
@@ -77,12 +72,12 @@ def summarise_batch(
             control = Control.of(cell, tilt)
             statistics = Statistics.of(cell, tree, control, tilt)
             distributions: Mapping[Key, Controlled] = {}
-            write_moments(moments_table(cell.name, tree))
             if statistics.converged:
                 redundancy = statistics.moments.redundancy
                 distributed = Distributed(statistics.followed, redundancy, tilt)
                 distributions = cell_distributions(parts, statistics, distributed, control, cell)
-            write_sketches(sketch_table(cell.name, plain_sketches(distributions)))
+            if sketches := plain_sketches(distributions):
+                write_sketches(sketch_table(cell.name, sketches))
             return cell, statistics, distributions
 
         tables = tables_of(map(summed_up, cells))

@@ -43,7 +43,6 @@ WRITTEN = {
         else {"sketches": f"{RESULTS}/parts/{{part}}/sketches.parquet"}
     ),
 }
-WHOLE = ("moments", "sketches")
 COLLECTED = [*TABLES, *(["rare"] if STUDY.rare else [])]
 MEMORY = max(1000, round(EFFORT.memory / 1e6))
 FIGURES = figure_names(STUDY)
@@ -95,13 +94,12 @@ def batches_of_claims():
 def parts_of_claims():
     """Moments and sketches of the cells that the claims use, and their estimates."""
     chosen = batches_of_claims()
-    whole = {kind: expand(f"{BATCH}/{kind}.parquet", batch=chosen) for kind in WHOLE}
-    kept = (
-        [WRITTEN["estimates"].format(part=part) for b in chosen for part in PARTS_OF[b]]
-        if KEPT
-        else []
-    )
-    return {**whole, "estimates": kept}
+    parts = [part for name in chosen for part in PARTS_OF[name]]
+    return {
+        "moments": expand(WRITTEN["moments"], part=parts),
+        "sketches": expand(f"{BATCH}/sketches.parquet", batch=chosen),
+        "estimates": expand(WRITTEN["estimates"], part=parts) if KEPT else [],
+    }
 
 
 def in_report(name):
