@@ -31,8 +31,7 @@ from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cel
 from accelstudy.study.monte_carlo.followed import ANGLES, TILT, cell_tilt_error
 from accelstudy.study.monte_carlo.sketch import Key
 from accelstudy.study.monte_carlo.statistics import Statistics
-from accelstudy.study.summary import cell_tables
-from accelstudy.study.tables import TABLES
+from accelstudy.study.summary import tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,13 +85,10 @@ class Simulation:
 
         Their columns are those of the files of a study; units stand in their names, or in a column.
         """
-        rows = [
-            cell_tables(cell, one.statistics, one.distributions)
+        return tables_of(
+            (cell, one.statistics, one.distributions)
             for cell, one in zip(self.cells, self.simulated, strict=True)
-        ]
-        return {
-            name: pd.concat([tables[name] for tables in rows], ignore_index=True) for name in TABLES
-        }
+        )
 
     @property
     def parameters(self) -> pd.DataFrame:

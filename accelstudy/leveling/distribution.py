@@ -125,13 +125,16 @@ class TiltDistribution:
 
     def _share_of_both(self, bounds: Array) -> Array:
         """Share of the larger error that is below bounds (k,)."""
-        near, far = ends = self._ends(bounds)
-        both = self._shares(np.stack([near.max(axis=0), far.min(axis=0)]))
-        larger = both.mean(axis=1)
         if not self._central:
-            return np.asarray(larger)
+            near, far = self._ends(bounds)
+            both = self._shares(np.stack([near.max(axis=0), far.min(axis=0)]))
+            return np.asarray(both.mean(axis=1))
+        constant, _, square = (each[:, None] for each in self._along[:3])
+        room = np.maximum(bounds**2 - constant, 0.0)[..., None]
+        single = self._length(np.sqrt(square * room) / square)
+        both = single.min(axis=0)
+        larger = both.mean(axis=1)
         exact = [self._exact(angle, bounds) for angle in (0, 1)]
-        single = self._shares(ends)
         mean = single.mean(axis=2)
         for i, each in enumerate(both):
             apart = single[:, i] - mean[:, i, None]

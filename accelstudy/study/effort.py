@@ -26,8 +26,8 @@ position and parameter, by gravity, with the robot, and by compiled code:"""
 SECONDS_BY_GRAVITY, SECONDS_WITH_ROBOT, SECONDS_COMPILED = 0.11e-6, 0.26e-6, 0.03e-6
 SECONDS_PER_CELL = 0.1
 """For its linear theory and the distribution of its tilt error, however few its calibrations."""
-SECONDS_PER_RESAMPLED_VALUE = 0.01e-6
-"""Sensitivity: per base sample, input, bootstrap resample and attitude."""
+SECONDS_PER_VALUE, SECONDS_PER_RESAMPLE = 0.4e-6, 0.6e-9
+"""Sensitivity: per base sample, input and attitude, and for each bootstrap resample of it."""
 SECONDS_PER_JOB = 3.0
 """To start Python, twice for each batch of cells and once for each of the other jobs."""
 OTHER_JOBS = 10
@@ -143,9 +143,9 @@ def _seconds_of_sensitivity(study: StudyConfig) -> float:
         return 0.0
     parameters = get_model(settings.model, study.models).n_parameters
     inputs = 3 + 2 * (3 + parameters)  # of the forces alone, and with either calibration
-    values = settings.base_samples * settings.resamples * inputs
     attitudes = len(settings.roll_gon) * len(settings.pitch_gon)
-    return SECONDS_PER_RESAMPLED_VALUE * values * attitudes
+    seconds = SECONDS_PER_VALUE + SECONDS_PER_RESAMPLE * settings.resamples
+    return seconds * settings.base_samples * inputs * attitudes
 
 
 def _size(size: float) -> str:

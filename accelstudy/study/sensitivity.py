@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -18,12 +18,14 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.study.config import StudyConfig
 
+Tables: TypeAlias = str | Path | Sequence[str | Path]
+
 APPROACHES = ("gravity", "robot")
 """The approaches with whose calibrations the sensitivity is analysed."""
 
 
 def analyse_sensitivity(
-    study: StudyConfig, summary: str | Path, output: str | Path, provenance: Mapping[str, Any]
+    study: StudyConfig, summary: Tables, output: str | Path, provenance: Mapping[str, Any]
 ) -> None:
     """Analyse the sensitivity of leveling and write the table.
 
@@ -33,7 +35,7 @@ def analyse_sensitivity(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    summary : path of the table of that name
+    summary : paths of tables of that name with all cells that are analysed
     output : path of the table to write
     provenance : see `accelstudy.files.tables.origin`
     """
@@ -63,8 +65,8 @@ def analyse_sensitivity(
 
 def analyse_shapley(
     study: StudyConfig,
-    summary: str | Path,
-    correlations: str | Path,
+    summary: Tables,
+    correlations: Tables,
     output: str | Path,
     provenance: Mapping[str, Any],
 ) -> None:
@@ -76,7 +78,7 @@ def analyse_shapley(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    summary, correlations : paths of the tables of those names
+    summary, correlations : paths of tables of those names, as in `analyse_sensitivity`
     output : path of the table to write
     provenance : see `accelstudy.files.tables.origin`
     """
@@ -120,7 +122,7 @@ def _cell(study: StudyConfig, approach: str) -> str:
     return "/".join([settings.model, settings.scheme, approach])
 
 
-def _empirical_sigma(study: StudyConfig, approach: str, summary: Any) -> np.ndarray:
+def _empirical_sigma(study: StudyConfig, approach: str, summary: Tables) -> np.ndarray:
     """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
     model, _ = _sensor(study)
     cell = _cell(study, approach)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -33,13 +32,15 @@ from accelstudy.study.monte_carlo.followed import (
     Distributed,
     cell_tilt_error,
 )
-from accelstudy.study.monte_carlo.moments import MOMENTS, PROBABILITIES, moments_table
+from accelstudy.study.monte_carlo.moments import PROBABILITIES
 from accelstudy.study.monte_carlo.sketch import SKETCHES, Key, sketch_table
 from accelstudy.study.monte_carlo.statistics import Estimates, Statistics, read_trees
 from accelstudy.study.tables import TABLES
 
 COVERAGE = tuple(f"coverage_95{end}" for end in ("", "_se", "_gain", "_low", "_high"))
 VALUE = tuple(f"value{end}" for end in ("", "_se", "_gain", "_plain"))
+SummedUp: TypeAlias = tuple[Cell, Statistics, Mapping[Key, Controlled]]
+"""A cell, its calibrations, and their distributions; none where none converged."""
 QUANTILES = ("quantity", "name", "unit", "probability", *VALUE, "relative_error")
 
 
@@ -57,49 +58,50 @@ def summarise_batch(
     spec : mapping with `cells` (plain data of `Cell`)
     parts : files of the jobs of the batch, in order: `moments`, and `estimates` or `sketches`
     leveling : mapping with max_tilt_gon and attitudes
-    outputs : path of each of `TABLES`, and of `moments` and `sketches` of whole cells
+    outputs : path of each of `TABLES`, and of `sketches` of whole cells
     provenance : see `accelstudy.files.tables.origin`
     """
     cells = [Cell.from_dict(data) for data in spec["cells"]]
     trees = read_trees(parts["moments"], (cell.name for cell in cells))
-    rows: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-    with ExitStack() as files:
-        write_moments, write_sketches = (
-            files.enter_context(parquet_writer(outputs[name], schema, provenance))
-            for name, schema in (("moments", MOMENTS), ("sketches", SKETCHES))
-        )
-        for cell in cells:
-            statistics = Statistics.of_none(cell)
+    with parquet_writer(outputs["sketches"], SKETCHES, provenance) as write_sketches:
+
+        def summed_up(cell: Cell) -> SummedUp:
+            if cell.name not in trees:
+                return cell, Statistics.of_none(cell), {}
+            tree, tilt = trees[cell.name], cell_tilt_error(cell, leveling)
+            control = Control.of(cell, tilt)
+            statistics = Statistics.of(cell, tree, control, tilt)
             distributions: Mapping[Key, Controlled] = {}
-            if cell.name in trees:
-                tree, control = trees[cell.name], Control.of(cell, leveling)
-                tilt = cell_tilt_error(cell, leveling)
-                statistics = Statistics.of(cell, tree, control, tilt)
-                write_moments(moments_table(cell.name, tree))
-                if statistics.converged:
-                    redundancy = statistics.moments.redundancy
-                    distributed = Distributed(statistics.followed, redundancy, tilt)
-                    distributions = cell_distributions(
-                        parts, statistics, distributed, control, cell
-                    )
-                write_sketches(sketch_table(cell.name, plain_sketches(distributions)))
-            for name, table in cell_tables(cell, statistics, distributions).items():
-                rows[name].append(table)
+            if statistics.converged:
+                redundancy = statistics.moments.redundancy
+                distributed = Distributed(statistics.followed, redundancy, tilt)
+                distributions = cell_distributions(parts, statistics, distributed, control, cell)
+            if sketches := plain_sketches(distributions):
+                write_sketches(sketch_table(cell.name, sketches))
+            return cell, statistics, distributions
+
+        tables = tables_of(map(summed_up, cells))
     for name in TABLES:
-        write_table(outputs[name], pd.concat(rows[name], ignore_index=True), provenance)
+        write_table(outputs[name], tables[name], provenance)
 
 
-def cell_tables(
-    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
-) -> dict[str, pd.DataFrame]:
-    """Rows of a cell in each of `TABLES`."""
-    leveling = _leveling_row(cell, statistics, distributions)
+def tables_of(found: Iterable[SummedUp]) -> dict[str, pd.DataFrame]:
+    """Each of `TABLES` with the rows of some cells, in order."""
+    cells, summary, leveling = [], [], []
+    correlations, quantiles = [], []
+    for cell, statistics, distributions in found:
+        cells.append(_cell_row(cell, statistics))
+        summary += _summary_rows(cell, statistics)
+        correlations.append(_correlation_rows(cell, statistics))
+        leveling.append(_leveling_row(cell, statistics, distributions))
+        quantiles.append(_quantile_rows(cell, statistics, distributions))
+    table = pd.DataFrame(cells)
     return {
-        "cells": _cell_row(cell, statistics),
-        "summary": _summary_rows(cell, statistics),
-        "correlations": _correlation_rows(cell, statistics),
-        "leveling": leveling if cell.estimability.estimable else leveling[:0],
-        "quantiles": _quantile_rows(cell, statistics, distributions),
+        "cells": table,
+        "summary": pd.DataFrame(summary),
+        "correlations": pd.concat(correlations, ignore_index=True),
+        "leveling": pd.DataFrame(leveling)[table["estimable"]].reset_index(drop=True),
+        "quantiles": pd.concat(quantiles, ignore_index=True),
     }
 
 
@@ -117,28 +119,25 @@ def _labels(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_row(cell: Cell, statistics: Statistics) -> pd.DataFrame:
+def _cell_row(cell: Cell, statistics: Statistics) -> dict[str, Any]:
     theory = cell.estimability
-    return pd.DataFrame(
-        {
-            **_labels(cell),
-            "n_positions": cell.positions.n_positions,
-            "n_parameters": len(theory.parameter_names),
-            "rank": theory.rank,
-            "condition": theory.condition,
-            "redundancy": theory.redundancy,
-            "fourth_moment": theory.fourth_moment,
-            "pole_distance_gon": theory.pole_distance / GON,
-            "estimable": theory.estimable,
-            "not_estimable": ", ".join(theory.not_estimable),
-            "reason": theory.reason,
-            "n_replicates": statistics.moments.simulated,
-            "n_converged": statistics.converged,
-            "control": statistics.control,
-            **_columns("variance_factor", statistics.factor[0]),
-        },
-        index=[0],
-    )
+    return {
+        **_labels(cell),
+        "n_positions": cell.positions.n_positions,
+        "n_parameters": len(theory.parameter_names),
+        "rank": theory.rank,
+        "condition": theory.condition,
+        "redundancy": theory.redundancy,
+        "fourth_moment": theory.fourth_moment,
+        "pole_distance_gon": theory.pole_distance / GON,
+        "estimable": theory.estimable,
+        "not_estimable": ", ".join(theory.not_estimable),
+        "reason": theory.reason,
+        "n_replicates": statistics.moments.simulated,
+        "n_converged": statistics.converged,
+        "control": statistics.control,
+        **_columns("variance_factor", statistics.factor[0]),
+    }
 
 
 def _columns(
@@ -155,7 +154,7 @@ def _columns(
     }
 
 
-def _summary_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
+def _summary_rows(cell: Cell, statistics: Statistics) -> list[dict[str, Any]]:
     """Statistics of each parameter, in the units shown to people; NaN where there are none."""
     theory, exact, followed = cell.estimability, _closed_forms(cell), statistics.followed
     bias, sd, priori = statistics.bias, statistics.sd, statistics.mean(PRIORI)
@@ -198,7 +197,7 @@ def _summary_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
                 "reason": theory.reason,
             }
         )
-    return pd.DataFrame(rows)
+    return rows
 
 
 def _ratio(posteriori: Estimates, sd: Estimates) -> dict[str, float]:
@@ -309,7 +308,7 @@ def _quantile_rows(
 
 def _leveling_row(
     cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
-) -> pd.DataFrame:
+) -> dict[str, Any]:
     """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
     rms = statistics.tilt_rms.scaled(1 / MGON)
     row: dict[str, Any] = _labels(cell)
@@ -324,4 +323,4 @@ def _leveling_row(
         row |= _columns(f"{angle}_rms_mgon", rms[i], f"{angle}_rms", plain=True)
     for name in TILTS:
         row |= _columns(f"{name}_rms_q95_mgon", bounds[name], f"{name}_rms_q95", plain=True)
-    return pd.DataFrame({**row, "n_converged": statistics.converged}, index=[0])
+    return {**row, "n_converged": statistics.converged}

@@ -73,7 +73,7 @@ def run_study(folder, batch_size=None, **keys):
     """
     study = make_study(**keys)
     leveling = study.leveling.model_dump()
-    wholes = {name: [] for name in (*TABLES, "moments", "sketches")}
+    wholes = {name: [] for name in (*TABLES, "sketches")}
     estimates = []
     for number, batch in enumerate(batches(study_cells(study), batch_size)):
         place = folder / f"{number:04d}"
@@ -114,6 +114,6 @@ def run_rare(folder, study):
 
 def parts_in(folder):
     """What the claims take from the folder of `run_study`."""
-    names = {"moments": "*/moments.parquet", "sketches": "*/sketches.parquet"}
+    names = {"moments": "*/*/moments.parquet", "sketches": "*/sketches.parquet"}
     names["estimates"] = "*/*/estimates.parquet"
     return {name: sorted(folder.glob(pattern)) for name, pattern in names.items()}

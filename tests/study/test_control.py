@@ -14,7 +14,7 @@ from study_helpers import LEVELING, grid, make_cells, run_study
 from accelstudy.study.monte_carlo.averaged import PRODUCT
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.distributions import Controlled, Sample, simulated_distributions
-from accelstudy.study.monte_carlo.followed import ERROR, TILT
+from accelstudy.study.monte_carlo.followed import ERROR, TILT, cell_tilt_error
 from accelstudy.study.monte_carlo.moments import (
     EDGES,
     PROBABILITIES,
@@ -38,7 +38,7 @@ def cell_of(sigma=0.002, approach="gravity", replicates=1000, **keys):
 
 def numbers_of(cell, seed=1):
     """Errors of replicates, converged or not, and those of linear theory."""
-    control = Control.of(cell, LEVELING)
+    control = Control.of(cell, cell_tilt_error(cell, LEVELING))
     pair = Pair.joined(blocks(cell, seed, 0, cell.n_blocks, control))
     truth = cell.true_values
     return pair.simulated.estimates - truth, pair.linear.estimates - truth, pair.simulated.converged
@@ -236,7 +236,7 @@ def test_a_model_that_lacks_an_effect_keeps_its_gain():
 def test_products_are_about_the_centre():
     """The first block tells where the mean is, so that a bias does not count as spread."""
     cell = cell_of(0.3, replicates=1000)
-    control = Control.of(cell, LEVELING)
+    control = Control.of(cell, cell_tilt_error(cell, LEVELING))
     found, _ = simulated_distributions(cell, 1, LEVELING)
     mean = found.mean(ERROR).value / control.theory.sigma
     assert np.abs(mean).max() < 0.02

@@ -124,7 +124,7 @@ def test_correlations_of_a_block(written):
 def test_origin_is_in_every_file(tmp_path):
     run_study(tmp_path, grids=[grid()])
     paths = sorted(tmp_path.rglob("*.parquet"))
-    assert len(paths) == 2 + (5 + 2) + 5
+    assert len(paths) == 2 + (5 + 1) + 5
     for path in paths:
         assert read_origin(path) == {
             **PROVENANCE, "version": accelstudy.__version__, "commit": git_commit(),

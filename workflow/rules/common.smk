@@ -43,7 +43,6 @@ WRITTEN = {
         else {"sketches": f"{RESULTS}/parts/{{part}}/sketches.parquet"}
     ),
 }
-WHOLE = ("moments", "sketches")
 COLLECTED = [*TABLES, *(["rare"] if STUDY.rare else [])]
 MEMORY = max(1000, round(EFFORT.memory / 1e6))
 FIGURES = figure_names(STUDY)
@@ -86,22 +85,21 @@ def parts_of_batch(wildcards):
     }
 
 
+def batches_of_claims():
+    """Batches with the cells that the sensitivity analysis and the claims use."""
+    model = STUDY.sensitivity.model
+    return [b for b, batch in BATCHES.items() if any(cell.model == model for cell in batch.cells)]
+
+
 def parts_of_claims():
     """Moments and sketches of the cells that the claims use, and their estimates."""
-    chosen = [
-        name
-        for name, batch in BATCHES.items()
-        if any(cell.model == STUDY.sensitivity.model for cell in batch.cells)
-    ]
-    whole = {
-        kind: [f"{RESULTS}/batches/{name}/{kind}.parquet" for name in chosen] for kind in WHOLE
+    chosen = batches_of_claims()
+    parts = [part for name in chosen for part in PARTS_OF[name]]
+    return {
+        "moments": expand(WRITTEN["moments"], part=parts),
+        "sketches": expand(f"{BATCH}/sketches.parquet", batch=chosen),
+        "estimates": expand(WRITTEN["estimates"], part=parts) if KEPT else [],
     }
-    kept = (
-        [WRITTEN["estimates"].format(part=part) for b in chosen for part in PARTS_OF[b]]
-        if KEPT
-        else []
-    )
-    return {**whole, "estimates": kept}
 
 
 def in_report(name):

@@ -1,7 +1,15 @@
+# It needs a few cells only, and what waits for it takes longer than all else that is left. So it
+# starts before the tables of all batches are there.
 rule sensitivity:
     input:
-        summary=f"{RESULTS}/summary.parquet",
-        correlations=f"{RESULTS}/correlations.parquet",
+        **(
+            {
+                table: expand(f"{BATCH}/{table}.parquet", batch=batches_of_claims())
+                for table in ("summary", "correlations")
+            }
+            if STUDY.sensitivity
+            else {}
+        ),
     output:
         sensitivity=f"{RESULTS}/sensitivity.parquet",
         shapley=f"{RESULTS}/shapley.parquet",
@@ -9,7 +17,6 @@ rule sensitivity:
         f"{RESULTS}/logs/sensitivity.log",
     benchmark:
         f"{RESULTS}/benchmarks/sensitivity.tsv"
-    # What waits for it takes longer than all else that is left.
     priority: 2
     conda:
         "../envs/accelstudy.yaml"

@@ -2,7 +2,7 @@ rule summarise:
     input:
         unpack(parts_of_batch),
     output:
-        **{name: f"{BATCH}/{name}.parquet" for name in (*TABLES, *WHOLE)},
+        **{name: f"{BATCH}/{name}.parquet" for name in (*TABLES, "sketches")},
     log:
         f"{RESULTS}/logs/summarise/{{batch}}.log",
     benchmark:

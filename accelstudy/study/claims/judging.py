@@ -104,8 +104,9 @@ def evidence_from(
     found = {}
     for name, tree in read_trees(parts["moments"], by_name).items():
         cell = by_name[name]
-        control = Control.of(cell, leveling)
-        statistics = Statistics.of(cell, tree, control, cell_tilt_error(cell, leveling))
+        tilt = cell_tilt_error(cell, leveling)
+        control = Control.of(cell, tilt)
+        statistics = Statistics.of(cell, tree, control, tilt)
         found[cell.scheme, cell.approach] = _Calibrations(cell, statistics, control)
     ratios: dict[tuple[str, str], Controlled] = {}
     for scheme in schemes_with_both(found):

@@ -109,8 +109,9 @@ def _effects_over_roll(table: pd.DataFrame, output: str) -> Figure:
     pitches = sorted(table["pitch_gon"].unique())
     fig, axes = panels_over_roll([(group_label(g), group_colour(g)) for g in groups], pitches)
     for group, row in zip(groups, axes, strict=True):
+        _share_axis(row[0])  # which the others share
         for pitch, ax in zip(pitches, row, strict=True):
-            _share_axis(ax)
+            ax.axhspan(BOTTOM, SMALLEST, color="#F0F0F0", linewidth=0, zorder=0)
             members = {name: style for name, style in drawn.items() if group_of(name) == group}
             _draw_shares(ax, table[table["pitch_gon"] == pitch], members)
     small = ", ".join(symbol(name) for name in highest.index if name not in drawn)
@@ -138,7 +139,7 @@ def panels_over_roll(
         ax.tick_params(labelsize=7, pad=2)
     for row, (label, colour) in zip(axes, rows, strict=True):
         row[0].set_ylabel(label.replace("-", "-\n"), color=colour)
-    fig.align_ylabels()
+    fig.align_ylabels(axes[:, 0])
     unit = attitude_unit()
     for ax, pitch in zip(axes[0], pitches, strict=True):
         ax.set_title(f"$\\theta$ = {to_attitude(pitch * GON):g} {unit}")
@@ -163,14 +164,13 @@ def styles_of(inputs: list[str]) -> dict[str, Style]:
 
 
 def _share_axis(ax: Axes) -> None:
-    """Make the vertical axis one of shares on a log scale, with a band for small ones."""
+    """Make the vertical axis one of shares on a log scale; small ones have a band of their own."""
     from matplotlib.ticker import NullLocator
 
     ax.set_yscale("log")
     ax.set_ylim(BOTTOM, TOP)
     ax.set_yticks([SMALL_AT, 0.01, 0.1, 1], ["<1", "1", "10", "100"])
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.axhspan(BOTTOM, SMALLEST, color="#F0F0F0", linewidth=0, zorder=0)
 
 
 def _draw_shares(ax: Axes, table: pd.DataFrame, styles: dict[str, Style]) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +31,6 @@ from accelstudy.study.monte_carlo.followed import (
     TILTS,
     Distributed,
     Followed,
-    cell_tilt_error,
 )
 
 Array = NDArray[np.float64]
@@ -58,12 +55,12 @@ class Control:
     tilt: TiltError
 
     @classmethod
-    def of(cls, cell: Cell, leveling: Mapping[str, Any]) -> Control | None:
+    def of(cls, cell: Cell, tilt: TiltError) -> Control | None:
         """Return that of a cell; None if the cell wants none, or has no noise-free calibration."""
         theory = cell.linear_theory if cell.control == "linear" else None
         if theory is None:
             return None
-        return cls(theory, Followed.of(cell), cell_tilt_error(cell, leveling))
+        return cls(theory, Followed.of(cell), tilt)
 
     def block(self, errors: Errors, uses_angles: bool) -> Block:
         """Calibrations of R sessions with given errors, as linear theory has them."""

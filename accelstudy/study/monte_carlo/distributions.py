@@ -54,19 +54,22 @@ class Distribution(Protocol):
 
 
 class Sample:
-    """All values, (R,)."""
+    """All values, (R,), which are sorted once for all quantiles."""
 
     def __init__(self, values: Array) -> None:
-        self.values = values
+        self.values = np.sort(values)
 
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles."""
-        return np.quantile(self.values, np.asarray(probabilities, dtype=float))
+        last = len(self.values) - 1
+        rank = np.asarray(probabilities, dtype=float) * last
+        below = rank.astype(int)
+        low, high = self.values[below], self.values[np.minimum(below + 1, last)]
+        return np.asarray(low + (rank - below) * (high - low))
 
     def share_below(self, values: ArrayLike) -> Array:
         """Shares that are below given values."""
-        at = np.searchsorted(np.sort(self.values), values)
-        return np.asarray(at / len(self.values))
+        return np.asarray(np.searchsorted(self.values, values) / len(self.values))
 
 
 @dataclass(frozen=True)
@@ -212,7 +215,8 @@ def simulated_cell(
     distributions : dict of Controlled; empty if no calibration converged
     replicates : Block, all of them
     """
-    control, tilt = Control.of(cell, leveling), cell_tilt_error(cell, leveling)
+    tilt = cell_tilt_error(cell, leveling)
+    control = Control.of(cell, tilt)
     centre, drawn = chunks(cell, seed, 0, cell.n_chunks, control)
     summed, tree, pairs = Summed(cell, control, tilt, centre), Tree(), []
     for index, pair in drawn:

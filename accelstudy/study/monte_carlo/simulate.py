@@ -82,8 +82,8 @@ def simulate_batch(
             if not design.estimable:
                 log.info("%d/%d %s: %s", number, len(shares), cell.name, design.reason)
                 continue
-            control = Control.of(cell, spec["leveling"])
             tilt = cell_tilt_error(cell, spec["leveling"])
+            control = Control.of(cell, tilt)
             centre, drawn = chunks(cell, spec["seed"], share.first, share.count, control)
             summed = Summed(cell, control, tilt, centre)
             tree, sketches = Tree(), CellSketches(summed.distributed)
