@@ -5,12 +5,10 @@ from __future__ import annotations
 import html
 import io
 from collections.abc import Callable, Mapping
-from functools import cache
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib import text as mpl_text
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import LineCollection
@@ -27,9 +25,6 @@ COMPRESSION = 4
 """Level of zlib. The default takes up to twice as long, and saves a twentieth."""
 MANY = 1000
 """An artist with more points or lines is drawn as an image inside of the SVG."""
-
-# Each renderer of each figure makes one of these, with a parser that would parse all formulas anew.
-mpl_text.TextToPath = cache(mpl_text.TextToPath)  # type: ignore[assignment, misc]
 
 
 def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
