@@ -100,20 +100,11 @@ class _Grid:
         value = float(self.criterion.value(normal))
         taken = np.zeros(n, dtype=int)
 
-        def promising(first: int) -> NDArray[np.bool_]:
+        slope = self.criterion.gradient(normal).ravel()
+        for i in range(n):
             # A convex criterion cannot fall by more than its derivative says.
-            promised = flat_changes[:, first:] @ self.criterion.gradient(normal).ravel()
-            return inside[:, first:] & (promised < -self.gain)
-
-        at, tries = 0, promising(0)
-        while at < n:
-            left = tries[:, at - n :].any(axis=0)
-            if not left.any():
-                break
-            i = at = at + int(np.argmax(left))
-            tried = np.flatnonzero(tries[:, i - n])
-            at += 1
-            if self.constraints.pair is not None:
+            tried = np.flatnonzero(inside[:, i] & (flat_changes[:, i] @ slope < -self.gain))
+            if len(tried) and self.constraints.pair is not None:
                 others = np.delete(around[taken, np.arange(n)], i, axis=0)
                 tried = tried[self.constraints.pair.apart(around[tried, i], others).all(axis=1)]
             if not len(tried):
@@ -123,7 +114,7 @@ class _Grid:
             if values[best] < value - self.gain:
                 taken[i], value = tried[best], float(values[best])
                 normal = normal + changes[taken[i], i]
-                tries = promising(at)
+                slope = self.criterion.gradient(normal).ravel()
         return self.moves[taken]
 
     def _further(self, t: Array, moved: Array) -> Array:
