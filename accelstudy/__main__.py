@@ -12,7 +12,7 @@ def run() -> None:
         signal.signal(signal.SIGINT, _end)
     # Imports and figures make a million objects that stay. To look for garbage among them again
     # and again takes a tenth of the time of a command.
-    gc.set_threshold(100_000, 50, 50)
+    gc.set_threshold(300_000, 50, 50)
     os.environ["MPLBACKEND"] = "agg"  # figures go to files; a name of no backend would be an error
     # The matrices are small: threads of BLAS would spend most of their time on waiting.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

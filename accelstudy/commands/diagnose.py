@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from pathlib import Path
 
 import click
@@ -53,15 +52,9 @@ def diagnose_command(
     CAMPAIGN is a folder. The command tells missing effects, wrong noise and gross errors apart. It
     adds what is missing to the model, and tests it on positions that were not used.
     """
-    # Nothing that is imported is ever garbage, and to look for it there takes a tenth of the time.
-    gc.disable()
-    try:
-        from accelstudy.diagnosis.report.output import diagnose_folder
-        from accelstudy.diagnosis.report.words import verdict_lines
-        from accelstudy.sensors.frames import FRD, axes_note
-    finally:
-        gc.freeze()
-        gc.enable()
+    from accelstudy.diagnosis.report.output import diagnose_folder
+    from accelstudy.diagnosis.report.words import verdict_lines
+    from accelstudy.sensors.frames import FRD, axes_note
 
     diagnosis = diagnose_folder(campaign, out, model, approach, seed, replicates, force, prior)
     for warning in diagnosis.campaign.warnings:

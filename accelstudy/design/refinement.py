@@ -7,6 +7,7 @@ positions there are often endless choices that are equally good.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -19,8 +20,10 @@ from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
 
-STEPS = 0.081 / 3.0 ** np.arange(5)
+STEPS = tuple(0.081 / 3.0**k for k in range(5))
 """rad, widths of the grids; from half the distance of the candidates to 0.06 gon."""
+FIRST_STEPS = STEPS[:2]
+"""They take a fifth of the time, and leave standard deviations that are 0.2 to 0.8 % too large."""
 GAIN = 0.1
 """Smallest gain of a move, of the square of the step."""
 SWEEPS = 60
@@ -30,7 +33,12 @@ FURTHER = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
 
 def refine(
-    task: Task, criterion: Criterion, space: Space, constraints: Constraints, start: Array
+    task: Task,
+    criterion: Criterion,
+    space: Space,
+    constraints: Constraints,
+    start: Array,
+    steps: Sequence[float] = STEPS,
 ) -> Array:
     """Improve positions by small moves.
 
@@ -41,6 +49,7 @@ def refine(
     space : Space, which says how positions can move
     constraints : Constraints, which `start` meets
     start : (n, 3) array of unit vectors
+    steps : rad, widths of the grids, one after the other
 
     Returns
     -------
@@ -49,7 +58,7 @@ def refine(
     if not space.tangents(start).shape[2]:
         return start
     directions = start
-    for step in STEPS:
+    for step in steps:
         directions = _Grid(task, criterion, space, constraints, directions, step).settled()
     return directions
 
@@ -100,20 +109,11 @@ class _Grid:
         value = float(self.criterion.value(normal))
         taken = np.zeros(n, dtype=int)
 
-        def promising(first: int) -> NDArray[np.bool_]:
+        slope = self.criterion.gradient(normal).ravel()
+        for i in range(n):
             # A convex criterion cannot fall by more than its derivative says.
-            promised = flat_changes[:, first:] @ self.criterion.gradient(normal).ravel()
-            return inside[:, first:] & (promised < -self.gain)
-
-        at, tries = 0, promising(0)
-        while at < n:
-            left = tries[:, at - n :].any(axis=0)
-            if not left.any():
-                break
-            i = at = at + int(np.argmax(left))
-            tried = np.flatnonzero(tries[:, i - n])
-            at += 1
-            if self.constraints.pair is not None:
+            tried = np.flatnonzero(inside[:, i] & (flat_changes[:, i] @ slope < -self.gain))
+            if len(tried) and self.constraints.pair is not None:
                 others = np.delete(around[taken, np.arange(n)], i, axis=0)
                 tried = tried[self.constraints.pair.apart(around[tried, i], others).all(axis=1)]
             if not len(tried):
@@ -123,7 +123,7 @@ class _Grid:
             if values[best] < value - self.gain:
                 taken[i], value = tried[best], float(values[best])
                 normal = normal + changes[taken[i], i]
-                tries = promising(at)
+                slope = self.criterion.gradient(normal).ravel()
         return self.moves[taken]
 
     def _further(self, t: Array, moved: Array) -> Array:

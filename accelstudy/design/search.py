@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.continuous import allowed, continuous_optimum
 from accelstudy.design.criteria import Criterion
 from accelstudy.design.exchange import Candidates, exchange
-from accelstudy.design.refinement import refine
+from accelstudy.design.refinement import FIRST_STEPS, STEPS, refine
 from accelstudy.design.spaces import Constraints, Space, Sphere
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best, in_order
@@ -59,6 +59,7 @@ def optimal_design(
     seed: int = 1,
     starts: int = STARTS,
     bounded: bool = True,
+    rough: bool = False,
 ) -> Design:
     """Find the n positions that are best by a criterion.
 
@@ -74,6 +75,7 @@ def optimal_design(
     seed : int
     starts : int, random sets to begin with, of each part of the space
     bounded : bool, whether the bound, and with it the efficiency, is wanted
+    rough : bool, whether positions near the best ones are enough
 
     Raises
     ------
@@ -87,10 +89,11 @@ def optimal_design(
     _check_determined(task, criterion, everything, n)
     parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
     if len(parts) > PARTS:  # the best ones after a single exchange
-        tried = [_best(task, criterion, p, constraints, n, seed, 1, moved=False) for p in parts]
+        tried = [_best(task, criterion, p, constraints, n, seed, 1, ()) for p in parts]
         parts = [parts[i] for i in in_order([value for _, value in tried], TIED)[:PARTS]]
+    steps = FIRST_STEPS if rough else STEPS
     directions, _ = _first_best(
-        [_best(task, criterion, part, constraints, n, seed, starts) for part in parts]
+        [_best(task, criterion, part, constraints, n, seed, starts, steps) for part in parts]
     )
     directions = rounded(with_repeats(task, criterion, constraints, directions))
     value = float(criterion.value(task.normal(directions)))
@@ -112,7 +115,7 @@ def _best(
     n: int,
     seed: int,
     starts: int,
-    moved: bool = True,
+    steps: Sequence[float],
 ) -> tuple[Array, float]:
     directions = allowed(space, constraints, CANDIDATES)
     if not len(directions):
@@ -124,13 +127,11 @@ def _best(
         rng = np.random.default_rng(np.random.SeedSequence([seed, start]))
         chosen = directions[exchange(candidates, candidates.random(n, rng), criterion)]
         designs.append((chosen, float(criterion.value(task.normal(chosen)))))
-    if moved:
-        order = in_order([value for _, value in designs], TIED)
-        refined = [
-            refine(task, criterion, space, constraints, designs[i][0]) for i in order[:REFINED]
-        ]
-        designs = [(u, float(criterion.value(task.normal(u)))) for u in refined]
-    return _first_best(designs)
+    order = in_order([value for _, value in designs], TIED)
+    refined = [
+        refine(task, criterion, space, constraints, designs[i][0], steps) for i in order[:REFINED]
+    ]
+    return _first_best([(u, float(criterion.value(task.normal(u)))) for u in refined])
 
 
 def _first_best(designs: list[tuple[Array, float]]) -> tuple[Array, float]:
@@ -191,12 +192,17 @@ def with_repeats(
     (n, 3) array of unit vectors, all of them among `directions`
     """
     cosines = directions @ directions.T
-    count, group = connected_components(cosines > np.cos(NEAR), directed=False)
-    if constraints.pair is not None or count == len(directions):
+    near = cosines > np.cos(NEAR)
+    if constraints.pair is not None or np.count_nonzero(near) == len(directions):
         return directions
+    # Each position is in the group of the first one that is near it, by way of others, too.
+    group, settled = np.arange(len(directions)), False
+    while not settled:
+        first = np.where(near, group, len(group)).min(axis=1)
+        group, settled = first, bool(np.all(first == group))
     joined = directions.copy()
-    for i in range(count):
-        members = np.flatnonzero(group == i)
+    for number in np.unique(group):
+        members = np.flatnonzero(group == number)
         middle = first_best(-cosines[np.ix_(members, members)].sum(axis=1))
         joined[members] = directions[members[middle]]
     before, after = (float(criterion.value(task.normal(u))) for u in (directions, joined))

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import whitened_jacobian
+from accelstudy.adjustment.equations import equations_of
+from accelstudy.adjustment.gauss_helmert import whitened_design
 from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
@@ -244,6 +247,8 @@ def position_rows(
         If the model needs what `hold` does not tell.
     """
     directions = np.asarray(directions, dtype=float)
+    if parameters is None and errors is None and not model.hold_columns:
+        return _ideal_rows(model, approach, noise, directions, gravity)
     at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
     ideal = session(model, at, directions, gravity, hold)
     observed = ideal.observations(noise)
@@ -253,6 +258,30 @@ def position_rows(
     rows = whitened_jacobian(model, approach, observed, at)
     k, c = len(directions), approach.n_conditions
     return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))
+
+
+def _ideal_rows(
+    model: SensorModel, approach: Approach, noise: Noise, directions: Array, gravity: float
+) -> Array:
+    """Rows of the ideal sensor: its output is the force, so that nothing is iterated.
+
+    A search for positions takes most of its time for them.
+    """
+    force = -gravity * directions
+    observed, variance = force, np.full(force.shape, noise.sigma_force**2)
+    if approach.uses_angles:
+        angles = angles_of(force)
+        observed = np.concatenate([force, angles], axis=1)
+        of_angles = np.full(angles.shape, noise.sigma_angle**2)
+        variance = np.concatenate([variance, of_angles], axis=1)
+    equations = equations_of(model.trace, approach, noise.sigma_gravity > 0)
+    x = np.zeros((equations.n_parameters, 1))
+    if equations.estimates_gravity:
+        x[-1] = gravity + noise.gravity_error
+    conditions = equations.at(model.settings, gravity + noise.gravity_error, None)
+    at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
+    rows = whitened_design(at, variance.T)[:, :, 0]
+    return np.ascontiguousarray(rows.transpose(2, 0, 1))
 
 
 def information(rows: Array) -> Array:

@@ -28,8 +28,10 @@ STARTS = 1
 """Random sets from which a search starts; more find designs that are better by 0.1 % at most."""
 USUALLY, AT_LEAST = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
-SURE = 0.98
-"""Where one position less, of the same information each, misses the target by 2 % or more, it is
+ROUGHLY = 0.995
+"""Accuracy of the best positions, of that of positions that were sought roughly."""
+SURE = 0.99
+"""Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
 
 
@@ -77,21 +79,27 @@ class Sought:
             n, self.model, self.equipment.approach, CRITERION, tilt_range, noise, starts=STARTS
         )
 
-    def candidate(self, n: int) -> Candidate | None:
-        """Calibration in the best n positions; None if so many are not allowed, or too few."""
+    def candidate(self, n: int, rough: bool = False) -> Candidate | None:
+        """Calibration in the best n positions; None if so many are not allowed, or too few.
+
+        `rough` asks for positions near the best ones.
+        """
         if not self.least <= n <= self.most:
             return None
         alone = replace(self.question, holds=(self.hold,))
-        scheme = best_positions(self.request(n))
+        scheme = best_positions(self.request(n), rough)
         return next(of_scheme(alone, self.equipment, scheme, [get_model(self.model)]), None)
 
     def fewest(self, confidence: float | None, near: int) -> Candidate | None:
         """Calibration in the fewest positions that reach the target, by linear theory.
 
-        The search begins near a number of positions, and goes on as if each gave the same
-        information. It ends where one position less is known to miss the target.
+        The search begins near a number of positions, first roughly, and goes on as if each gave
+        the same information. It ends where one position less is known to miss the target.
         """
         target, tried = self.question.target, {}
+        near = self._roughly_fewest(confidence, near)
+        if SURE**2 * near > self.most:
+            return None
         low, high = self.least - 1, self.most + 1
         while high - low > 1:
             n = min(max(near, low + 1), high - 1)
@@ -108,6 +116,19 @@ class Sought:
                 if n > 1 and SURE * share * math.sqrt(n / (n - 1)) > 1:
                     break
         return tried.get(high)
+
+    def _roughly_fewest(self, confidence: float | None, near: int) -> int:
+        """Number of positions that reach the target by a rough search; the least is not tried."""
+        tried: set[int] = set()
+        while near > self.least and near not in tried:
+            tried.add(near)
+            n = min(near, self.most)
+            candidate = self.candidate(n, rough=True)
+            if candidate is None:
+                break
+            share = ROUGHLY * candidate.accuracy(confidence) / self.question.target
+            near = math.ceil(n * share**2)
+        return near
 
 
 def cheapest(question: Question, good: Sequence[Candidate], confidence: float | None) -> Candidate:
@@ -146,9 +167,9 @@ def request_of(question: Question, candidate: Candidate) -> Request:
 
 
 @cache
-def best_positions(request: Request) -> Scheme:
-    """The best positions, as a scheme that a study can have."""
-    directions = request.find(bounded=False).directions.tolist()
+def best_positions(request: Request, rough: bool = False) -> Scheme:
+    """The best positions, or such as are near them, as a scheme that a study can have."""
+    directions = request.find(bounded=False, rough=rough).directions.tolist()
     source = "accelstudy design"
     return remember(
         {"title": "minimax", "source": source, "directions": directions},

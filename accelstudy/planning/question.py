@@ -14,7 +14,6 @@ from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.beside import reference_sensor, usable_reference
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
 from accelstudy.effects import get_effect
@@ -225,6 +224,9 @@ def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:
 
 
 def _of_calibration(path: Path) -> ReferenceSensor:
+    # Slow to import, and seldom needed.
+    from accelstudy.campaign.beside import reference_sensor, usable_reference
+
     calibration = usable_reference(path)
     sigma = calibration.content["sigma_position_mps2"]
     if not sigma:

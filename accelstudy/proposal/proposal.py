@@ -17,7 +17,7 @@ from accelstudy.basics.units import GON, MGON, angles_in, to_recorded
 from accelstudy.design.criteria import RIDGE, Rivals
 from accelstudy.design.search import Design, rounded
 from accelstudy.design.spaces import Mountings, attitudes
-from accelstudy.design.task import Task, information, position_rows
+from accelstudy.design.task import Task, position_rows
 from accelstudy.positions.choice import first_best
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme
@@ -185,18 +185,15 @@ def field_order(task: Task, directions: Array, groups: Order | None = None) -> O
     angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
     members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
     rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
-    tours: list[tuple[float, Order]] = []
+    trips: list[tuple[float, Order]] = []
     for _ in range(TOURS):
         parts = [_round_trip(angles, rng.permutation(group)) for group in members]
-        tours.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
-        if len(members) == 1:
-            turned = [np.roll(tours[-1][1], shift) for shift in range(1, len(directions))]
-            tours += [(tours[-1][0], tour) for tour in turned]
-    shortest = min(length for length, _ in tours)
-    near = [tour for length, tour in tours if length <= LONGER * shortest + 1e-9]
-    shown = [_drift_shown(task, directions[tour]) for tour in near]
-    best = max(shown)
-    return next(tour for tour, value in zip(near, shown, strict=True) if value > best - 1e-9)
+        trips.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
+    longest = LONGER * min(length for length, _ in trips) + 1e-9
+    turns = range(len(directions) if len(members) == 1 else 1)
+    near = [[np.roll(tour, turn) for turn in turns] for length, tour in trips if length <= longest]
+    shown = np.concatenate([_drift_shown(task, directions[tours]) for tours in near])
+    return np.concatenate(near)[first_best(-shown)]
 
 
 def _length(angles: Array, tour: Order) -> float:
@@ -225,19 +222,26 @@ def _round_trip(angles: Array, tour: Order) -> Order:
     return tour
 
 
-def _drift_shown(task: Task, directions: Array) -> float:
-    """Share of a drift of the biases that the parameters cannot imitate; the smallest axis."""
+def _drift_shown(task: Task, directions: Array) -> Array:
+    """Share of a drift of the biases that the parameters cannot imitate; the smallest axis.
+
+    directions : (k, n, 3) array, of k orders. Returns (k,).
+    """
     effects = [effect.spec for effect in task.model.effects]
     model = compose("drifting", (*effects, "bias_drift"))
-    n, u = len(directions), task.model.n_parameters
-    hold = replace(HoldPlan().hold(n), time=np.linspace(-1.0, 1.0, n))
+    (k, n), u = directions.shape[:2], task.model.n_parameters
+    hold = HoldPlan().hold(n).take(np.tile(np.arange(n), k))
+    hold = replace(hold, time=np.tile(np.linspace(-1.0, 1.0, n), k))
     fixed_gravity = replace(task.noise, sigma_gravity=0.0)
-    rows = position_rows(model, task.approach, fixed_gravity, directions, None, task.gravity, hold)
-    normal = information(rows).sum(axis=0)
-    normal = normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))
-    of_drift, cross = normal[u:, u:], normal[:u, u:]
-    inside = np.linalg.solve(normal[:u, :u] + RIDGE * np.eye(u), cross)
-    return float(np.diag(of_drift - cross.T @ inside).min())
+    flat = directions.reshape(-1, 3)
+    rows = position_rows(model, task.approach, fixed_gravity, flat, None, task.gravity, hold)
+    rows = rows.reshape(k, -1, rows.shape[-1])
+    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    normal = rows.swapaxes(1, 2) @ rows
+    of_drift, cross = normal[:, u:, u:], normal[:, :u, u:]
+    inside = np.linalg.solve(normal[:, :u, :u] + RIDGE * np.eye(u), cross)
+    left = of_drift - cross.swapaxes(1, 2) @ inside
+    return np.asarray(np.diagonal(left, axis1=1, axis2=2).min(axis=1))
 
 
 def write_design(

@@ -183,12 +183,13 @@ class Request:
         pair = None if self.least_angle is None else LeastAngle(self.least_angle)
         return Constraints(tuple(single), pair)
 
-    def find(self, bounded: bool = True) -> Design:
+    def find(self, bounded: bool = True, rough: bool = False) -> Design:
         """Find the positions.
 
         Parameters
         ----------
         bounded : bool, whether a bound of how good they can be is wanted
+        rough : bool, whether positions near the best ones are enough
 
         Raises
         ------
@@ -204,6 +205,7 @@ class Request:
             self.seed,
             self.starts,
             bounded,
+            rough,
         )
 
 

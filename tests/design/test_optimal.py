@@ -66,6 +66,17 @@ def test_the_rows_of_positions_add_up_to_the_normal_matrix(approach, sigma_gravi
     np.testing.assert_allclose(alone[0], rows[5], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+@pytest.mark.parametrize("noise", [Noise(), Noise(0.003, 1e-5, 1e-4, 2e-4)])
+def test_the_rows_of_an_ideal_sensor_are_those_of_a_session_without_errors(approach, noise):
+    effects = "bias-scale-nonorthogonality+cubic_scale+saturation+encoder_eccentricity"
+    model, directions = get_model(effects), random_directions(20)
+    rows = position_rows(model, get_approach(approach), noise, directions)
+    zeros = np.zeros(model.n_parameters)
+    of_session = position_rows(model, get_approach(approach), noise, directions, zeros)
+    np.testing.assert_allclose(rows, of_session, rtol=1e-12, atol=1e-12 * np.abs(rows).max())
+
+
 # Criteria
 
 
@@ -386,3 +397,11 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
     assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
     kept = Constraints(pair=LeastAngle(0.001 * GON))
     assert with_repeats(task, criterion, kept, thirteen) is thirteen
+
+    # In a row, the first and the last are near each other by way of the second alone.
+    beside = np.cross(apart[0], apart[3])
+    row = apart[0] + np.outer([0.0, 0.7 * GON, 1.4 * GON], beside / np.linalg.norm(beside))
+    row /= np.linalg.norm(row, axis=1, keepdims=True)
+    assert row[0] @ row[1] > np.cos(1 * GON) > row[0] @ row[2]
+    joined = with_repeats(task, criterion, Constraints(), np.vstack([row, apart[1:]]))
+    np.testing.assert_array_equal(joined[:3], np.tile(row[1], (3, 1)))
