@@ -14,9 +14,10 @@ SPECS = ("settling", "gravity_error", "axis_nonperpendicularity")
 N, ROWS = 24, 30
 
 
-def sensors(rng, sizes, like=0.0):
-    """What sensors with effects of some sizes (n, 3) tell; the third is like the second one."""
+def sensors(rng, sizes, like=0.0, first=0.0):
+    """What sensors with effects of some sizes (n, 3) tell; each is like the one before it."""
     d = rng.standard_normal((len(sizes), ROWS, 3))
+    d[..., 1] = first * d[..., 0] + np.sqrt(1 - first**2) * d[..., 1]
     d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
     z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
     each = [
@@ -26,11 +27,11 @@ def sensors(rng, sizes, like=0.0):
     return d, TypeSizes.of(each, SPECS, range(len(each)))
 
 
-def lot(rng, size=0.6, like=0.0):
+def lot(rng, size=0.6, like=0.0, first=0.0):
     """All sensors have the first effect, a third of them the second one, none the third."""
     lacks = np.zeros((N, 3))
     lacks[:, 0], lacks[: N // 3, 1] = 1, 1
-    return lacks, *sensors(rng, size * lacks, like)
+    return lacks, *sensors(rng, size * lacks, like, first)
 
 
 def test_odds_are_the_integral_over_the_sizes_of_the_type():
@@ -77,7 +78,7 @@ def test_what_a_third_has_is_found_beside_what_all_have():
 
 @pytest.mark.parametrize("like", [0.3, 0.99])
 def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
-    _, d, sizes = lot(np.random.default_rng(3), like=like)
+    _, d, sizes = lot(np.random.default_rng(3), like=like, first=0.8)
     of_type = sizes.of_set(SPECS[:2])
     columns = d.reshape(-1, 3)
     own, expected = 0.6 * columns[:, 1], []
