@@ -196,7 +196,7 @@ def _weigh_lot(
         now = replace(now, sensors=kept, mean=mean, together=joint)
         if len(usual) < 2 or not (shapes := now.strongest()):
             return now
-        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set))
+        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
         each = mapped(told, campaigns, models, [approach] * n, [noise] * n, [specs] * n)
         return replace(now, sizes=TypeSizes.of(list(each), specs, usual), shapes=shapes)
 

@@ -275,8 +275,10 @@ class Mixture:
         if names in self.common:
             fitted = self.common[names] - of_type.alike
         else:
-            each = [(self.common[k,], self.typical((k,))) for k in names]
-            fitted = sum(common - one.alike for common, one in each if one is not None)
+            fitted = 0.0
+            for k in names:
+                one = self.typical((k,))
+                fitted += self.common.get((k,), -np.inf) - (0.0 if one is None else one.alike)
         return float(special.logsumexp(logs + _log_weights(len(names)))) + fitted
 
     def _posterior(self, names: Names) -> tuple[list[Array], Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -125,7 +125,7 @@ class Pass:
     noise : LotNoise, of the type; None where each campaign says its own
     together : mapping of effects to what all campaigns say of them together
     sizes : TypeSizes, of the effects of `shapes`; None where there are none
-    shapes : mapping of one or two places in `classes` to the shapes of these effects
+    shapes : mapping of the names of one or two effects to the shape of each
     """
 
     sensors: tuple[SensorEvidence, ...]
@@ -135,7 +135,7 @@ class Pass:
     noise: LotNoise | None = None
     together: Mapping[str, Joint] = field(default_factory=dict)
     sizes: TypeSizes | None = None
-    shapes: Mapping[Names, tuple[str, ...]] = field(default_factory=dict)
+    shapes: Mapping[frozenset[str], Mapping[str, str]] = field(default_factory=dict)
 
     @cached_property
     def classes(self) -> list[tuple[str, ...]]:
@@ -194,31 +194,39 @@ class Pass:
         return known[names]
 
     def _of_type(self, names: Names) -> OfType | None:
-        if self.sizes is None or names not in self.shapes:
+        specs = self._shapes(names)
+        if self.sizes is None or not specs:
             return None
-        if not all(len(self.sizes.columns[spec]) for spec in self.shapes[names]):
+        if not all(len(self.sizes.columns[spec]) for spec in specs):
             return None
-        of_type = self.sizes.of_set(self.shapes[names])
+        of_type = self.sizes.of_set(specs)
         return None if min(of_type.shares) * len(self.sensors) <= self._few else of_type
 
-    def strongest(self) -> dict[Names, tuple[str, ...]]:
+    def _shapes(self, names: Names) -> tuple[str, ...]:
+        """Shapes of some effects that were looked at, in order; none if they were not."""
+        effects = [self.classes[k][0] for k in names]
+        shapes = self.shapes.get(frozenset(effects), {})
+        return tuple(shapes[name] for name in effects) if shapes else ()
+
+    def strongest(self) -> dict[frozenset[str], dict[str, str]]:
         """Return the most probable sets of effects and each of their effects, with best shapes."""
         best = [one.names for one in self.mixture.sets[:SETS]]
         sets = dict.fromkeys([*((k,) for names in best for k in names), *best])
         shapes = {}
         for names in sets:
-            effects = tuple(self.classes[k][0] for k in names)
+            effects = sorted(self.classes[k][0] for k in names)
             if 0 < len(effects) < 3 and all(name in self.together for name in effects):
-                shapes[names] = self._best_shapes(effects)
+                shapes[frozenset(effects)] = self._best_shapes(effects)
         return shapes
 
-    def _best_shapes(self, effects: tuple[str, ...]) -> tuple[str, ...]:
+    def _best_shapes(self, effects: Sequence[str]) -> dict[str, str]:
+        of_all = {name: self.together[name].spec for name in effects}
         if self.mean is None:
-            return tuple(self.together[name].spec for name in effects)
-        if (both := tuple(sorted(effects))) in self.mean.pair_specs:
-            specs = dict(zip(both, self.mean.pair_specs[both], strict=True))
-            return tuple(specs[name] for name in effects)
-        return tuple(self.mean.specs.get(name, self.together[name].spec) for name in effects)
+            return of_all
+        specs = self.mean.pair_specs.get((effects[0], effects[-1]))
+        if specs is not None:
+            return dict(zip(effects, specs, strict=True))
+        return {name: self.mean.specs.get(name, spec) for name, spec in of_all.items()}
 
     def _pairs(self, each: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
@@ -276,16 +284,15 @@ class Pass:
     def _rivals(self, k: int) -> list[int]:
         """Effects that all campaigns together hardly tell from one that is not certain."""
         sets = [one.names for one in self.mixture.sets if k in one.names]
-        names = next((names for names in sets if names in self.shapes), None)
+        names = next((names for names in sets if self._shapes(names)), None)
         of_type = None if names is None else self.mixture.typical(names)
         if names is None or of_type is None or self.sizes is None:
             return []
         rivals = []
         for j in np.flatnonzero(self.given >= RIVAL).tolist():
-            if j in names or (j,) not in self.shapes:
+            if j in names or not (spec := self._shapes((j,))):
                 continue
-            place, (spec,) = names.index(k), self.shapes[j,]
-            left, whole = self.sizes.apart(self.shapes[names], of_type, place, spec)
+            left, whole = self.sizes.apart(self._shapes(names), of_type, names.index(k), *spec)
             if left < min(UNTOLD, RESEMBLES * whole):
                 rivals.append(j)
         return rivals
@@ -359,12 +366,10 @@ class Pass:
         """Effects of some classes, each in the setting that explains most."""
         specs = {}
         for k in places:
-            looked_at = [
-                w.names for w in self.mixture.sets if k in w.names and w.names in self.shapes
-            ]
-            if looked_at:
-                names = looked_at[0]
-                specs[k] = self.shapes[names][names.index(k)]
+            sets = [one.names for one in self.mixture.sets if k in one.names]
+            looked_at = next((names for names in sets if self._shapes(names)), None)
+            if looked_at is not None:
+                specs[k] = self._shapes(looked_at)[looked_at.index(k)]
                 continue
             counted: dict[str, float] = {}
             for each, weight in zip(self.sensors, self.mixture.lacking(k), strict=True):

@@ -222,10 +222,15 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     # Without it the others are weighed as before, with the sizes of the type, too.
     each = told_by(rng, np.full((20, 2), 0.5))
     sizes = TypeSizes.of(each, ("base_tilt",), range(20))
-    k = one.classes.index(("warm_up",))
     together = {"warm_up": Joint(sizes.of_set(("base_tilt",)).alike, "base_tilt")}
-    rest = replace(one, together=together, sizes=sizes, shapes={(k,): ("base_tilt",)}).without_odd()
+    rest = replace(
+        one,
+        together=together,
+        sizes=sizes,
+        shapes={frozenset({"warm_up"}): {"warm_up": "base_tilt"}},
+    ).without_odd()
     assert len(rest.sensors) == 19
+    assert rest.classes != one.classes  # their order follows the evidence
     assert rest.p_value > one.p_value
     assert rest.alternatives[0][0] == ("warm_up",)
     assert rest.mixture.share(rest.classes.index(("warm_up",)))[0] > 0.9
