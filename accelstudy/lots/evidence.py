@@ -19,9 +19,9 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level, log_mean
-from accelstudy.diagnosis.space.residuals import VISIBLE
 from accelstudy.effects import Effect
 from accelstudy.lots.noise import LEAST_SIGMA, LotNoise, sigma_stated, with_noise
+from accelstudy.lots.sizes import visible
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -305,11 +305,8 @@ def _joint_part(shown: Sequence[tuple[Shown, int]]) -> tuple[float, int]:
     normal = np.sum([one.normal[k] for one, k in shown], axis=0)
     right = np.sum([one.right[k] for one, k in shown], axis=0)
     whole = np.sum([one.squares[k] for one, k in shown], axis=0)
-    scale = np.sqrt(np.where(whole > 0, whole, 1.0))
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    seen = values > VISIBLE**2
-    part = float(np.sum((vectors.T @ (right / scale))[seen] ** 2 / values[seen]))
-    return part, int(seen.sum())
+    directions, values = visible(normal, whole)
+    return float(np.sum((right @ directions) ** 2 / values)), len(values)
 
 
 def _alike(one: Campaign, other: Campaign) -> bool:

@@ -50,8 +50,6 @@ LEAST = 1e-6
 """Posterior below which a set does not count."""
 NODES = {1: 64, 2: 24, 3: 12}
 """Nodes of the integral over each share below 1, by the number of effects."""
-
-
 BLOCK = 64
 """Sensors that are integrated over the shares at once, so that memory does not follow the lot."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,17 +183,10 @@ class Pass:
                 for both, log in self._pairs(mean).items()
                 if not any(_is_sudden(self.classes[k][0]) for k in both)
             }
-        return Mixture.of(
-            np.array(odds), pairs, prior / prior.sum(), common, partial(self._typical, {})
-        )
-
-    def _typical(self, known: dict[Names, OfType | None], names: Names) -> OfType | None:
-        """Odds of effects with sizes of the type; None where sensors do not tell of a type."""
-        if names not in known:
-            known[names] = self._of_type(names)
-        return known[names]
+        return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common, cache(self._of_type))
 
     def _of_type(self, names: Names) -> OfType | None:
+        """Odds of effects with sizes of the type; None where sensors do not tell of a type."""
         specs = self._shapes(names)
         if self.sizes is None or not specs:
             return None
@@ -207,6 +200,11 @@ class Pass:
         effects = [self.classes[k][0] for k in names]
         shapes = self.shapes.get(frozenset(effects), {})
         return tuple(shapes[name] for name in effects) if shapes else ()
+
+    def _looked_at(self, k: int) -> Names | None:
+        """Most probable set with an effect, of those whose sizes were looked at."""
+        sets = (one.names for one in self.mixture.sets if k in one.names)
+        return next((names for names in sets if self._shapes(names)), None)
 
     def strongest(self) -> dict[frozenset[str], dict[str, str]]:
         """Return the most probable sets of effects and each of their effects, with best shapes."""
@@ -283,8 +281,7 @@ class Pass:
 
     def _rivals(self, k: int) -> list[int]:
         """Effects that all campaigns together hardly tell from one that is not certain."""
-        sets = [one.names for one in self.mixture.sets if k in one.names]
-        names = next((names for names in sets if self._shapes(names)), None)
+        names = self._looked_at(k)
         of_type = None if names is None else self.mixture.typical(names)
         if names is None or of_type is None or self.sizes is None:
             return []
@@ -366,10 +363,8 @@ class Pass:
         """Effects of some classes, each in the setting that explains most."""
         specs = {}
         for k in places:
-            sets = [one.names for one in self.mixture.sets if k in one.names]
-            looked_at = next((names for names in sets if self._shapes(names)), None)
-            if looked_at is not None:
-                specs[k] = self._shapes(looked_at)[looked_at.index(k)]
+            if (names := self._looked_at(k)) is not None:
+                specs[k] = self._shapes(names)[names.index(k)]
                 continue
             counted: dict[str, float] = {}
             for each, weight in zip(self.sensors, self.mixture.lacking(k), strict=True):

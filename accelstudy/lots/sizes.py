@@ -96,6 +96,25 @@ def told(
     return Told(d.T @ d, d.T @ z, np.sum(whole**2, axis=0), float(z @ z), residuals.redundancy)
 
 
+def visible(normal: Array, squares: Array) -> tuple[Array, Array]:
+    """Combinations of the parameters of an effect that show, and how much each of them does.
+
+    Parameters
+    ----------
+    normal : (k, k) array, DᵀD of the derivatives D of residuals by the parameters
+    squares : (k,) array, of what D would be if no parameter of the model were estimated
+
+    Returns
+    -------
+    directions : (k, l) array
+    values : (l,) array, of the normal matrix in these directions
+    """
+    scale = np.sqrt(np.where(squares > 0, squares, 1.0))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    seen = values > VISIBLE**2
+    return vectors[:, seen] / scale[:, None], values[seen]
+
+
 @dataclass(frozen=True)
 class OfType:
     """A set of effects in the sensors of a type.
@@ -149,13 +168,11 @@ class TypeSizes:
         ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)])
         turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
         for spec, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
-            scale = np.sqrt(np.where(whole[first:end] > 0, whole[first:end], 1.0))
-            shown = normal[:, first:end, first:end].sum(axis=0) / np.outer(scale, scale)
-            values, vectors = np.linalg.eigh(shown)
-            seen = values > VISIBLE**2
+            shown = normal[:, first:end, first:end].sum(axis=0)
+            directions, values = visible(shown, whole[first:end])
             # In these directions and units the sensors together tell as much of each.
-            block = np.zeros((ends[-1], int(seen.sum())))
-            block[first:end] = vectors[:, seen] / scale[:, None] / np.sqrt(values[seen] / len(each))
+            block = np.zeros((ends[-1], len(values)))
+            block[first:end] = directions / np.sqrt(values / len(each))
             turned.append(block)
             columns[spec] = place + np.arange(block.shape[1])
             place += block.shape[1]
@@ -249,6 +266,16 @@ class _Search:
         return [s for r in effects for s in combinations(effects, r + 1)]
 
     @cached_property
+    def of(self) -> NDArray[np.int_]:
+        """Effect of each parameter."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    @cached_property
+    def places(self) -> list[NDArray[np.int_]]:
+        """Parameters of each of the `subsets`."""
+        return [np.flatnonzero(np.isin(self.of, subset)) for subset in self.subsets]
+
+    @cached_property
     def has(self) -> NDArray[np.bool_]:
         """Which effects the empty set and the `subsets` have."""
         return np.array([[k in s for k in range(len(self.counts))] for s in ((), *self.subsets)])
@@ -265,15 +292,13 @@ class _Search:
     ) -> tuple[float, list[Array], Array, Array]:
         """Log likelihood, odds of each subset (n,), sizes and shares, from given ones on."""
         before, odds = -np.inf, list[Array]()
-        of = np.repeat(np.arange(len(self.counts)), self.counts)
         for _ in range(STEPS):
             variances = np.array([
-                max(scatter**2 * float(np.mean(mean[of == k] ** 2)), 1e-12)
+                max(scatter**2 * float(np.mean(mean[self.of == k] ** 2)), 1e-12)
                 for k in range(len(self.counts))
-            ])[of]  # fmt: skip
+            ])[self.of]  # fmt: skip
             odds, taken, seen = [], [], []
-            for subset in self.subsets:
-                at = np.flatnonzero(np.isin(of, subset))
+            for at in self.places:
                 n, b = self.normal[:, at[:, None], at], self.right[:, at]
                 m, s = mean[at], variances[at]
                 inverse = np.linalg.inv(n + np.diag(1 / s))
@@ -296,8 +321,7 @@ class _Search:
             weights = np.zeros((len(self.subsets), len(total)))
             weights[:, self.usual] = np.exp(logs[1:] - total)[:, self.usual]
             whole, pulled = np.zeros((len(mean),) * 2), np.zeros(len(mean))
-            for subset, w, a, b in zip(self.subsets, weights, taken, seen, strict=True):
-                at = np.flatnonzero(np.isin(of, subset))
+            for at, w, a, b in zip(self.places, weights, taken, seen, strict=True):
                 whole[np.ix_(at, at)] += np.einsum("n,nkl->kl", w, a)
                 pulled[at] += w @ b
             shares = np.clip(weights.sum(axis=1) @ self.has[1:] / len(self.usual), 0.01, 0.999)
