@@ -422,6 +422,8 @@ def test_links_go_to_figures_that_exist(shown, written, study):
 
 def test_a_narrow_screen(shown):
     shown.set_viewport_size({"width": 390, "height": 800})
+    # The charts follow the new width a moment later.
+    shown.wait_for_function("document.documentElement.scrollWidth <= 390")
     assert shown.evaluate("document.documentElement.scrollWidth") <= 390
     assert shown.locator("#chart-roll svg").bounding_box()["width"] <= 390
     shown.set_viewport_size({"width": 1280, "height": 900})
