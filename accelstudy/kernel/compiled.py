@@ -30,9 +30,11 @@ class Compiled:
         machine = _machine()
         described = (text, machine.triple, *_processor(), llvmlite.__version__)
         key = hashlib.sha256("\n".join(described).encode()).hexdigest()
-        compiled = kept_or_made(KIND, key, lambda: _compiled(text, machine))
+        compiled = kept_or_made(
+            KIND, key, lambda: _compiled(text, machine), llvm.ObjectFileRef.from_data
+        )
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-        self._engine.add_object_file(llvm.ObjectFileRef.from_data(compiled))
+        self._engine.add_object_file(compiled)
         self._engine.finalize_object()
         kinds = [ctypes.c_int64] * integers + [ctypes.c_void_p] * pointers
         address = self._engine.get_function_address(name)

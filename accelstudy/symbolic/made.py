@@ -51,8 +51,8 @@ def kept_under(key: str | None, name: str, make: Callable[[], Made]) -> Made:
     """
     if key is None:
         return make()
-    content = kept_or_made(KIND, f"{key}-{name}", lambda: marshal.dumps(make()))  # type: ignore[arg-type]
-    made: Made = marshal.loads(content)
+    dumped = lambda: marshal.dumps(make())  # type: ignore[arg-type]  # noqa: E731
+    made: Made = kept_or_made(KIND, f"{key}-{name}", dumped, marshal.loads)
     return made
 
 

@@ -311,7 +311,7 @@ def library() -> str:
 
     To bundle it takes two seconds, so the text is kept for the next study.
     """
-    return kept_or_made("explorer", f"vega-{version('vl-convert-python')}", _bundled).decode()
+    return kept_or_made("explorer", f"vega-{version('vl-convert-python')}", _bundled, bytes.decode)
 
 
 def _bundled() -> bytes:
