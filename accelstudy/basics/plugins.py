@@ -1,8 +1,9 @@
 """Plug-ins: effects, schemes and the like of the user's own, from a file or an installed package.
 
 Its code registers what it has when it is imported, as the modules of this package do. A file is
-loaded when it is named: `--plugin` of a command, `plugins` of a configuration. A package names its
-modules as entry points of the group ``accelstudy.`` and the room, such as ``accelstudy.effects``;
+loaded when it is named: `--plugin` of a command, `plugins` of a configuration. A file of data, such
+as a model.yaml, may be of anybody, so it only names what it needs. A package names its modules as
+entry points of the group ``accelstudy.`` and the room, such as ``accelstudy.effects``;
 they are imported when something of that room is first looked up.
 """
 
@@ -13,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import warn
 
 PREFIX = "accelstudy."
 """What the groups of entry points begin with; the name of a room follows."""
@@ -66,13 +69,62 @@ def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
 
     What is no list of texts, the schema of the configuration refuses.
     """
-    paths = content.get("plugins") or ()
-    paths = [paths] if isinstance(paths, str) else paths
-    if isinstance(paths, list | tuple) and all(isinstance(path, str) for path in paths):
-        try:
-            load_files(paths)
-        except InputError as error:
-            raise InputError(f"{source}: plugins: {error}".removeprefix(": ")) from None
+    try:
+        load_files(_named(content))
+    except InputError as error:
+        raise InputError(f"{source}: plugins: {error}".removeprefix(": ")) from None
+    _missing(content, source)
+
+
+@contextmanager
+def only_named(content: Mapping[str, Any], source: str | Path) -> Iterator[None]:
+    """Read a file of data, which loads none of the plug-ins that it names.
+
+    Raises
+    ------
+    InputError
+        Of what is read; it says which plug-ins are named and not loaded.
+    """
+    missing = ", ".join(_missing(content, source)[:3])
+    try:
+        yield
+    except InputError as error:
+        if not missing:
+            raise
+        raise InputError(
+            f"{error}; {source} needs the plug-in {missing}, and a file of data loads "
+            "no code: if you trust that plug-in, give it with --plugin"
+        ) from None
+
+
+def _named(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Plug-ins that a file names, with the digest of each or None."""
+    named = content.get("plugins") or {}
+    named = [named] if isinstance(named, str) else named
+    if isinstance(named, list | tuple):
+        named = dict.fromkeys(filter(lambda name: isinstance(name, str), named))
+    return {str(k): v for k, v in named.items()} if isinstance(named, Mapping) else {}
+
+
+def _missing(content: Mapping[str, Any], source: str | Path) -> list[str]:
+    """Plug-ins that are named and not loaded; warn of one that is loaded but is another now."""
+    missing = []
+    loaded = {Path(name).name: digest for name, digest in _files.items()}
+    for name, digest in _named(content).items():
+        there = loaded.get(Path(name).name)
+        if there is None and digest not in loaded.values():
+            missing.append(name if digest is None else f"{name} (digest {digest})")
+        elif digest is not None and digest not in loaded.values():
+            _warn_once(
+                f"{source}: was written with another {name} than is loaded: its digest was "
+                f"{digest}, and is {there} now"
+            )
+    return missing
+
+
+@cache
+def _warn_once(text: str) -> None:
+    warn(text)
 
 
 def _load_file(path: Path) -> None:
@@ -102,8 +154,8 @@ def loaded_files() -> list[str]:
 
 
 def as_a_key() -> dict[str, Any]:
-    """Content of a configuration that names the loaded files; empty without any."""
-    return {"plugins": loaded_files()} if _files else {}
+    """Key of a file that names the loaded files with their digests; empty without any."""
+    return {"plugins": dict(_files)} if _files else {}
 
 
 def provenance() -> dict[str, Any]:

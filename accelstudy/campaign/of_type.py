@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from accelstudy.campaign.session import Campaign
 
 TYPE_FILE = "type.yaml"
-TYPE_KEYS = ("schema_version", "models", "sensors", "parameters")
+TYPE_KEYS = ("schema_version", "models", "sensors", "parameters", "plugins")
 """Keys of a file of a type that data sheets do not have."""
 FEWEST = 5
 """Sensors whose scatter tells how far the next one may be away."""

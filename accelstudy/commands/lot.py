@@ -91,10 +91,13 @@ def _folders(given: Path) -> list[Path]:
 
 def _listed(path: Path) -> list[Path]:
     """Folders of the campaigns that the list of a batch names."""
+    from accelstudy.basics.plugins import only_named
     from accelstudy.campaign.batch.config import parse_batch
     from accelstudy.files.reading import read_layer
 
-    tasks = parse_batch(read_layer(path), str(path)).tasks()
+    content = read_layer(path)
+    with only_named(content, path):
+        tasks = parse_batch({**content, "plugins": []}, str(path)).tasks()
     for task in tasks:
         if task.kind != "campaign":
             raise InputError(

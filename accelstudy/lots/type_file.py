@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.plugins import as_a_key
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import DataSheet
@@ -54,6 +55,7 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
     lasting = [effect for effect in lot.model.effects if not effect.sudden]
     parameters = _typical(lot, lasting, used)
     content = {
+        **as_a_key(),
         **_sheet(lot, parameters, f"{len(used)} sensors of a type").content,
         **TypeFile(
             schema_version=1,

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.plugins import HOW, load_plugins
+from accelstudy.basics.plugins import HOW, only_named
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
@@ -132,7 +132,6 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     writes its base model in this way.
     """
     content = read_layer(path)
-    load_plugins(content, path)
     models: Any = content.get("models") or {}
     if not isinstance(models, Mapping):
         raise InputError(f"{path}: models: must be a mapping of names to lists of effects")
@@ -155,10 +154,11 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     effects = [effects] if isinstance(effects, str) else effects
     if not isinstance(effects, list) or not effects or not all(isinstance(e, str) for e in effects):
         raise InputError(f"{path}: {key}: must be a list of effects")
-    try:
-        return _composed(effects, str(name or key.removeprefix("models.")))
-    except InputError as error:
-        raise InputError(f"{path}: {key}: {error}") from None
+    with only_named(content, path):
+        try:
+            return _composed(effects, str(name or key.removeprefix("models.")))
+        except InputError as error:
+            raise InputError(f"{path}: {key}: {error}") from None
 
 
 @dataclass(frozen=True)

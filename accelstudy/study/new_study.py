@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
+from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -134,6 +137,10 @@ def new_study(
         for target, source in sources.items():
             text = source.read_text(encoding="utf-8")
             _write(new / target, jinja.from_string(text).render(content))
+        if named := as_a_key():  # the workflow runs in the new folder
+            named = {k: {os.path.abspath(p): d for p, d in v.items()} for k, v in named.items()}
+            with (new / "config" / "config.yaml").open("a", encoding="utf-8") as file:
+                file.write(f"\n{yaml.safe_dump(named)}")
         for source in sorted(shipped("profiles").glob("*/*.yaml")):
             _write(new / "profiles" / source.parent.name / source.name, source.read_text("utf-8"))
         if template == "plan" and "\n" in sensor.sheet:

@@ -207,10 +207,62 @@ def test_a_bad_key_is_one_line(given, reason):
         read_study(written(plugins=given))
 
 
-def test_a_model_in_a_file_brings_it():
-    content = {"plugins": ["ripple.py"], "models": {"mine": ["bias", "ripple"]}}
+def test_a_configuration_may_have_digests(capsys):
+    """As the files have them that this package writes; `config_hash` leaves them out."""
+    with forgotten():
+        plugins.load_files(["ripple.py"])
+        with_digests = plugins.as_a_key()["plugins"]
+    assert [*with_digests] == ["ripple.py"]
+    with forgotten():
+        assert read_study(written(plugins=with_digests)).plugins == ["ripple.py"]
+        assert "ripple" in effect_names()
+    assert capsys.readouterr().err == ""
+    with forgotten():
+        read_study(written(plugins={"ripple.py": "0" * 16}))
+    assert "another ripple.py than is loaded" in capsys.readouterr().err
+
+
+# --- files of data, which may be of anybody ------------------------------------------------------
+
+
+def model_file(named):
+    content = {"plugins": named, "models": {"mine": ["bias", "ripple"]}}
     Path("model.yaml").write_text(yaml.safe_dump(content))
+    return "model.yaml"
+
+
+@pytest.mark.parametrize("named", ["ripple.py", ["ripple.py"], {"ripple.py": "12ab"}])
+def test_a_model_in_a_file_names_it_and_loads_nothing(named):
+    with refused("unknown effect 'ripple'", "needs the plug-in ripple.py", "give it with --plugin"):
+        get_model(model_file(named))
+    assert plugins.loaded_files() == []
+    plugins.load_files(["ripple.py"])
     assert get_model("model.yaml").effects[1].name == "ripple"
+
+
+def test_another_one_than_a_model_names_is_told(capsys):
+    plugins.load_files(["ripple.py"])
+    get_model(model_file(plugins.as_a_key()["plugins"]))
+    assert capsys.readouterr().err == ""
+    get_model(model_file({"elsewhere/ripple.py": "12ab"}))
+    assert "with another elsewhere/ripple.py than is loaded" in capsys.readouterr().err
+
+
+def test_the_list_of_a_lot_loads_nothing():
+    Path("evil.py").write_text("open('evil', 'w')")
+    content = {"batch": "b", "plugins": ["evil.py"], "campaigns": [{"campaign": "mine"}]}
+    Path("list.yaml").write_text(yaml.safe_dump({**content, "model": "bias+evil"}))
+    assert "list.yaml needs the plug-in evil.py" in refusal("lot", "list.yaml", "--out", "new")
+    assert not Path("evil").exists()
+
+
+@pytest.mark.parametrize("template", ["study", "plan"])
+def test_a_new_study_names_those_it_was_set_up_with(template):
+    with forgotten():
+        succeed("--plugin", "ripple.py", "init", "new", "--template", template)
+    content = yaml.safe_load(Path("new/config/config.yaml").read_text(encoding="utf-8"))
+    plugins.load_plugins(content)
+    assert plugins.loaded_files() == [str(Path("ripple.py").resolve())]
 
 
 def hashes():
