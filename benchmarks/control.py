@@ -15,27 +15,24 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
 
-from accelstudy.files.tables import read_table
-from accelstudy.study.batches import Share
 from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
-from accelstudy.study.monte_carlo.simulate import simulate_batch
-from accelstudy.study.summary import summarise_batch
-from accelstudy.study.tables import TABLES
+from accelstudy.study.monte_carlo.control import Control
+from accelstudy.study.monte_carlo.distributions import distributions
+from accelstudy.study.monte_carlo.followed import cell_tilt_error
+from accelstudy.study.monte_carlo.replicates import simulate
+from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.summary import Result, tables_of
 
 CONFIG = Path(__file__).parent.parent / "config" / "config.yaml"
 NOISES = (0.002, 0.02, 0.1, 0.3)
 FAILING = (1.0,)
 LEVELING = {"max_tilt_gon": 50.0, "attitudes": 50}
-KEPT = 100_000
-"""Replicates up to which all are kept."""
-ORIGIN = {"config_hash": "-", "seed": 1}
 
 
 def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
@@ -55,20 +52,17 @@ def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
     return chosen
 
 
-def estimates(cell: Cell, replicates: int, seed: int, compiled: bool = False) -> pd.DataFrame:
-    """All estimates of a cell with their standard errors, by the files that a study writes."""
+def estimates(
+    cell: Cell, replicates: int, seed: int, compiled: bool = False, plain: bool = False
+) -> pd.DataFrame:
+    """All estimates of a cell with their standard errors, as a study tabulates them."""
     cell = replace(cell, replicates=replicates, compiled=compiled)
-    with TemporaryDirectory() as folder:
-        # Sketches are within a thousandth, which is much beside what a gain leaves.
-        kept = "estimates" if replicates <= KEPT else "sketches"
-        parts = {name: Path(folder) / name for name in ("moments", kept)}
-        shares = [Share(cell, 0, cell.n_chunks).to_dict()]
-        simulate_batch({"seed": seed, "shares": shares, "leveling": LEVELING}, parts, ORIGIN)
-        names = (*TABLES, "moments", "sketches")
-        outputs = {name: Path(folder) / f"all-{name}" for name in names}
-        each = {name: [path] for name, path in parts.items()}
-        summarise_batch({"cells": [cell.to_dict()]}, each, LEVELING, outputs, ORIGIN)
-        tables = {name: read_table(outputs[name]) for name in TABLES}
+    tilt = cell_tilt_error(cell, LEVELING)
+    control = None if plain else Control.of(cell, tilt)
+    simulated = simulate(cell, seed, control)
+    statistics = Statistics.of(cell, simulated, control, tilt)
+    found = distributions(cell, simulated, control, tilt)
+    tables = tables_of([Result(cell, statistics, found)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 
 
@@ -117,7 +111,7 @@ def _table(
 
 def against_plain(cell: Cell, plain: int, controlled: int = 1000) -> pd.DataFrame:
     """z of controlled estimates against plain averages of many replicates of another seed."""
-    many = estimates(replace(cell, control="none"), plain, 2, plain > 100_000)
+    many = estimates(cell, plain, 2, plain > 100_000, plain=True)
     few = estimates(cell, controlled, 1)
     both = few.merge(many, on=["cell", "kind", "name"], suffixes=("", "_many"))
     both["z"] = (both["value"] - both["value_many"]) / np.hypot(both["error"], both["error_many"])
@@ -154,7 +148,7 @@ def stages(quick: bool) -> dict[str, tuple[Callable[[Cell], pd.DataFrame], list[
     of_figures = [
         f"bias-scale-nonorthogonality/mclaren-24/{approach}" for approach in ("gravity", "robot")
     ]
-    plain, some, many, seeds = (10**5, 2000, 10**5, 20) if quick else (10**7, 10_000, 10**6, 200)
+    plain, some, many, seeds = (10**5, 2000, 10**5, 20) if quick else (10**6, 10_000, 10**6, 200)
     return {
         "figures": (partial(against_plain, plain=plain), cells_of(NOISES, of_figures)),
         "failing": (partial(against_plain, plain=many), cells_of(FAILING, of_figures)),

@@ -9,9 +9,10 @@ import numpy as np
 
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
-from accelstudy.study.monte_carlo.distributions import simulated_distributions
-from accelstudy.study.monte_carlo.followed import TILT
-from accelstudy.study.monte_carlo.statistics import LEAST
+from accelstudy.study.monte_carlo.distributions import distributions, simulated_cell
+from accelstudy.study.monte_carlo.followed import TILT, cell_tilt_error
+from accelstudy.study.monte_carlo.replicates import simulate
+from accelstudy.study.monte_carlo.statistics import LEAST, Statistics
 from problem import APPROACHES, SCHEME
 from timing import short, table
 from ways import WAYS
@@ -37,28 +38,35 @@ def run(speeds):
         if cell.name != f"bias-scale-nonorthogonality/{SCHEME}/{cell.approach}":
             continue
         name = cell.approach
-        plain = replace(cell, control="none", replicates=PILOT, compiled=False)
-        needed[name] = _needed(plain, leveling, PILOT)
+        plain = replace(cell, replicates=PILOT, compiled=False)
+        needed[name] = _needed(*_plain(plain, leveling), PILOT)
         rates = {way: float(np.median(each)) for way, each in speeds[name].items()}
         seconds[name] = {
             way: {what: count / rate for what, count in needed[name].items()}
             for way, rate in rates.items()
         }
-        few = _needed(replace(cell, replicates=1000, compiled=False), leveling, 1000)
+        some = replace(cell, replicates=1000, compiled=False)
+        few = _needed(*simulated_cell(some, 1, leveling)[:2], 1000)
         controlled = {}
         for what, count in few.items():
             own = replace(cell, replicates=max(LEAST, math.ceil(count)), compiled=False)
-            simulated_distributions(own, 1, leveling)  # what is traced is kept
+            simulated_cell(own, 1, leveling)  # what is traced is kept
             start = process_time()
-            simulated_distributions(own, 1, leveling)
+            simulated_cell(own, 1, leveling)
             controlled[what] = process_time() - start, own.replicates
         seconds[name]["controlled"] = controlled
     return needed, seconds
 
 
-def _needed(cell, leveling, count):
+def _plain(cell, leveling):
+    """Statistics and distributions without linear theory."""
+    tilt, replicates = cell_tilt_error(cell, leveling), simulate(cell, 1, None)
+    found = distributions(cell, replicates, None, tilt)
+    return Statistics.of(cell, replicates, None, tilt), found
+
+
+def _needed(found, bounds, count):
     """Calibrations for the wanted error, from the errors of so many."""
-    found, bounds = simulated_distributions(cell, 1, leveling)
     bound = bounds[TILT, "both"].at(0.95)
     relative = (
         np.sqrt(np.mean((found.sd.error / found.sd.value) ** 2)),

@@ -15,7 +15,6 @@ from accelstudy.adjustment.calibration import Block
 from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY, Given
 from accelstudy.basics.wording import counted
@@ -28,18 +27,15 @@ from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.config.blocks import LevelingConfig
 from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cell
-from accelstudy.study.monte_carlo.followed import ANGLES, TILT, cell_tilt_error
-from accelstudy.study.monte_carlo.sketch import Key
+from accelstudy.study.monte_carlo.followed import ANGLES, TILT, Key, cell_tilt_error
 from accelstudy.study.monte_carlo.statistics import Statistics
-from accelstudy.study.summary import tables_of
+from accelstudy.study.summary import Result, tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
-REPLICATES = Range(2, 10**8)
-"""Calibrations of a cell; all of them are in memory."""
 DIGITS = 12
 """Of a quantity in the configuration, so that 3.2 mgon stays that number."""
 
@@ -86,7 +82,7 @@ class Simulation:
         Their columns are those of the files of a study; units stand in their names, or in a column.
         """
         return tables_of(
-            (cell, one.statistics, one.distributions)
+            Result(cell, one.statistics, one.distributions)
             for cell, one in zip(self.cells, self.simulated, strict=True)
         )
 
@@ -232,7 +228,7 @@ def simulate(
         "schemes": [get_scheme(one).name for one in names("scheme", scheme)],
         "approaches": [get_approach(one).name for one in names("approach", approach)],
         "sensor_sigma_mps2": [_si("sigma", one, QUANTITIES["sigma"]) for one in each(sigma)],
-        "replicates": whole("replicates", replicates, REPLICATES),
+        "replicates": whole("replicates", replicates, bounds.REPLICATES),
     }
     for key, values in zip(("model", "scheme", "approach", "sigma"), grid.values(), strict=False):
         if not values:
@@ -260,7 +256,8 @@ def simulate(
 def _simulated(cell: Cell, seed: int) -> _Simulated:
     if not cell.estimability.estimable:
         return _Simulated(Statistics.of_none(cell), {}, None)
-    return _Simulated(*simulated_cell(cell, seed, LEVELING))
+    statistics, distributions, replicates = simulated_cell(cell, seed, LEVELING)
+    return _Simulated(statistics, distributions, replicates.simulated)
 
 
 def _si(name: str, value: float | str, given: Given, unit: float = 1.0) -> float:

@@ -12,7 +12,7 @@ from accelstudy.commands.options import PATH, example
 @click.command("cells", epilog=example("accelstudy cells config/config.yaml"))
 @click.argument("configs", nargs=-1, required=True, type=PATH)
 def cells_command(configs: tuple[Path, ...]) -> None:
-    """List the cells of a study and what it will take.
+    """List the cells of a study.
 
     Cells that cannot be estimated are listed with the reason. CONFIGS are YAML files; a later one
     overlays those before it, as with Snakemake's --configfile.
@@ -20,15 +20,14 @@ def cells_command(configs: tuple[Path, ...]) -> None:
     from accelstudy.design.estimability import estimability
     from accelstudy.study.cells import study_cells
     from accelstudy.study.config import read_study
-    from accelstudy.study.effort import study_effort
 
     study = read_study(*configs)
     chosen = study_cells(study)
-    effort = study_effort(study, chosen)
     for cell in chosen:
         found = estimability(
             cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
         )
         state = found.reason or f"r = {found.redundancy}, {cell.replicates} replicates"
         click.echo(f"{cell.name}: {state}")
-    click.echo(f"\n{effort}")
+    replicates = sum(cell.replicates for cell in chosen)
+    click.echo(f"\n{len(chosen)} cells, up to {replicates} calibrations")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -68,8 +68,6 @@ Interval = Annotated[float, *_within(bounds.INTERVAL)]
 Duration = Annotated[float, *_within(bounds.DURATION)]
 Rate = Annotated[float, *_within(bounds.RATE)]
 Replicates = Annotated[int, *_within(bounds.REPLICATES)]
-RareReplicates = Annotated[int, *_within(bounds.RARE_REPLICATES)]
-RareShare = Annotated[float, *_within(bounds.RARE_SHARE)]
 Sessions = Annotated[int, *_within(bounds.SESSIONS)]
 Attitudes = Annotated[int, *_within(bounds.ATTITUDES)]
 BaseSamples = Annotated[int, *_within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
@@ -148,6 +146,16 @@ class Block(BaseModel):
     """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+    retired: ClassVar[Mapping[str, str]] = {}
+    """Keys of earlier versions, and what to do instead."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_retired_key(cls, content: Any) -> Any:
+        for key in content if isinstance(content, Mapping) else ():
+            if key in cls.retired:
+                raise ValueError(f"{key}: no longer a key; {cls.retired[key]}")
+        return content
 
 
 class Configuration(Block):

@@ -19,7 +19,7 @@ from accelstudy.planning.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.distributions import Controlled, simulated_distributions
+from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cell
 from accelstudy.study.monte_carlo.followed import ANGLES, TILT, TILTS
 from accelstudy.study.monte_carlo.statistics import Estimates
 
@@ -137,11 +137,9 @@ def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simul
         (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
         order.append(cell.name)
         if cell.name not in by_cell:
-            found, distributions = simulated_distributions(cell, study.seed, leveling, shares)
+            found, distributions, _ = simulated_cell(cell, study.seed, leveling, shares)
             bounds = {name: distributions[TILT, name] for name in TILTS}
-            by_cell[cell.name] = Simulated(
-                cell.name, found.tilt_rms, bounds, found.moments.simulated
-            )
+            by_cell[cell.name] = Simulated(cell.name, found.tilt_rms, bounds, found.simulated)
     return [by_cell[name] for name in order]
 
 

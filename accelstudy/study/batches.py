@@ -1,96 +1,81 @@
-"""How the jobs of a study share its cells; no number depends on it."""
+"""Batches of cells, each of which a job simulates; no number depends on how cells are shared."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from accelstudy.simulation.sessions import BLOCK
-from accelstudy.study.cell import CHUNK, Cell
+from accelstudy.files.tables import parquet_writer, write_table
+from accelstudy.study.cell import Cell
+from accelstudy.study.monte_carlo.distributions import simulated_cell
+from accelstudy.study.monte_carlo.replicates import ESTIMATES, estimates_table
+from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.summary import Result, tables_of
+from accelstudy.study.tables import TABLES
 
-LEAST_PER_JOB = 400_000
-"""Calibrations in one job: seconds of compiled code, as starting Python takes seconds too."""
-JOB_GROWTH = 100
-"""A large study of N calibrations has jobs of 100 √N or somewhat more, and so about √N / 100 of
-them: some tens for 10⁸, some thousands for 10¹¹."""
+log = logging.getLogger(__name__)
+
+REPLICATES_PER_BATCH = 400_000
+"""Calibrations of a batch of several cells: seconds, as starting Python takes seconds, too."""
 CELLS_PER_BATCH = 100
-"""Most cells in one job, even with few replicates, so that small studies use all cores."""
+"""Most cells of a batch, even with few replicates, so that small studies use all cores."""
+MEGABYTES, BYTES_PER_ESTIMATE = 1000, 120
+"""Memory of a job: at least, and for each estimate of its largest cell."""
 
 
-@dataclass(frozen=True)
-class Share:
-    """Part of a cell that a job simulates: `count` chunks from the chunk `first` on."""
-
-    cell: Cell
-    first: int
-    count: int
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, from which `from_dict` makes the share again."""
-        return {"cell": self.cell.to_dict(), "first": self.first, "count": self.count}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Share:
-        """Make a share of plain data."""
-        return cls(Cell.from_dict(data["cell"]), data["first"], data["count"])
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Cells that are summarised together.
-
-    Attributes
-    ----------
-    cells : tuple of Cell
-    jobs : tuple of tuples of Share
-        Shares of each job. One job has all cells; only a cell that is too large for one job is
-        shared by several.
-    """
-
-    cells: tuple[Cell, ...]
-    jobs: tuple[tuple[Share, ...], ...]
-
-
-def job_size(cells: Iterable[Cell]) -> int:
-    """Calibrations in one job: a power of two, so that a few more cells do not change all jobs."""
-    wanted = JOB_GROWTH * math.isqrt(sum(cell.replicates for cell in cells))
-    size = LEAST_PER_JOB
-    while size < wanted:
-        size *= 2
-    return size
-
-
-def batches(cells: Sequence[Cell], size: int | None = None) -> list[Batch]:
-    """Divide cells into batches, in order, with jobs of at most `size` calibrations (or one chunk).
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-    size : int, optional
-        By default `job_size`.
-    """
-    size = size or job_size(cells)
+def batches(cells: Sequence[Cell], most: int = REPLICATES_PER_BATCH) -> list[list[Cell]]:
+    """Divide cells into batches, in order, of at most so many replicates if there are several."""
     groups: list[list[Cell]] = []
     room = 0
     for cell in cells:
         if not groups or cell.replicates > room or len(groups[-1]) == CELLS_PER_BATCH:
             groups.append([])
-            room = size
+            room = most
         groups[-1].append(cell)
         room -= cell.replicates
-    return [Batch(tuple(group), tuple(_jobs(group, size))) for group in groups]
+    return groups
 
 
-def _jobs(cells: list[Cell], size: int) -> Iterable[tuple[Share, ...]]:
-    whole = [cell.n_chunks for cell in cells]
-    at_once = max(1, size // (CHUNK * BLOCK))
-    if len(cells) > 1 or whole[0] <= at_once:
-        yield tuple(Share(cell, 0, n) for cell, n in zip(cells, whole, strict=True))
-        return
-    jobs = -(-whole[0] // at_once)
-    ends = [whole[0] * i // jobs for i in range(jobs + 1)]
-    for first, end in pairwise(ends):
-        yield (Share(cells[0], first, end - first),)
+def memory(cells: Sequence[Cell]) -> int:
+    """Memory that the job of a batch needs, megabytes."""
+    estimates = max(cell.replicates * cell.n_unknowns for cell in cells)
+    return MEGABYTES + round(BYTES_PER_ESTIMATE * estimates / 1e6)
+
+
+def simulate_batch(
+    spec: Mapping[str, Any], outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]
+) -> None:
+    """Simulate the cells of a batch, and tabulate what came of them.
+
+    Cells that are not estimable leave no estimates; the table of cells says why.
+
+    Parameters
+    ----------
+    spec : mapping with `seed`, `cells` (plain data of `Cell`) and `leveling` (max_tilt_gon and
+        attitudes)
+    outputs : paths of `estimates` and of each of `TABLES`
+    provenance : see `accelstudy.files.tables.origin`
+    """
+    cells = [Cell.from_dict(data) for data in spec["cells"]]
+    measured = ("estimate", "linear_estimate", "sigma_priori")
+    with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
+
+        def results() -> Iterator[Result]:
+            for number, cell in enumerate(cells, 1):
+                at = f"{number}/{len(cells)} {cell.name}"
+                if not cell.estimability.estimable:
+                    log.info("%s: %s", at, cell.estimability.reason)
+                    yield Result(cell, Statistics.of_none(cell), {})
+                    continue
+                simulated = simulated_cell(cell, spec["seed"], spec["leveling"])
+                statistics, distributions, replicates = simulated
+                write(estimates_table(cell, replicates))
+                n, failed = statistics.simulated, statistics.simulated - statistics.converged
+                log.info("%s: %d replicates, %d not converged", at, n, failed)
+                yield Result(cell, statistics, distributions)
+
+        tables = tables_of(results())
+    for name in TABLES:
+        write_table(outputs[name], tables[name], provenance)

@@ -17,8 +17,7 @@ OFF = 0.01
 
 def knows_all(study: StudyConfig) -> bool:
     """Whether calibrations know of all that is simulated, and linear theory with them."""
-    complete = study.simulated_effects == ["model"] and not study.noise.effects
-    return study.control == "linear" and complete
+    return study.simulated_effects == ["model"] and not study.noise.effects
 
 
 def is_compared(cells: Any) -> Any:

@@ -24,9 +24,6 @@ from accelstudy.simulation.sessions import BLOCK, Noise, Session, session
 
 Array = NDArray[np.float64]
 
-CHUNK = 20
-"""Blocks that are held, summed up and written together; they limit the memory of a job."""
-
 
 @dataclass(frozen=True)
 class Cell:
@@ -46,7 +43,6 @@ class Cell:
     holds : HoldPlan, conditions of the holds
     directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
     compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
-    control : str, `linear` where linear theory is the control variate of its estimates, or `none`
     """
 
     name: str
@@ -62,7 +58,6 @@ class Cell:
     holds: HoldPlan
     compiled: bool = False
     directions: tuple[tuple[float, ...], ...] | None = None
-    control: str = "linear"
 
     @cached_property
     def estimated_model(self) -> SensorModel:
@@ -144,11 +139,6 @@ class Cell:
     def n_blocks(self) -> int:
         """Number of blocks; the last one may have fewer replicates."""
         return -(-self.replicates // BLOCK)
-
-    @property
-    def n_chunks(self) -> int:
-        """Number of chunks; the last one may have fewer blocks."""
-        return -(-self.n_blocks // CHUNK)
 
     def seed(self, seed: int, block: int) -> np.random.SeedSequence:
         """Seed of one block of replicates.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -35,14 +34,6 @@ def study_cells(study: StudyConfig) -> list[Cell]:
             if earlier is None or cell.replicates > earlier.replicates:
                 cells[cell.name] = cell
     return with_compiled(list(cells.values()))
-
-
-def rare_cells(study: StudyConfig, cells: Sequence[Cell]) -> list[Cell]:
-    """The cells of a study as its rare tilt errors are simulated; none if they are not asked."""
-    if study.rare is None:
-        return []
-    n = study.rare.replicates
-    return with_compiled([replace(cell, replicates=n, compiled=False) for cell in cells])
 
 
 def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
@@ -96,7 +87,6 @@ def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:
             truth=study.truth(dict.fromkeys([*effects, *simulated])),
             holds=study.hold_plan,
             directions=None if file is None else tuple(map(tuple, file["directions"])),
-            control=study.control,
         )
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -14,14 +13,8 @@ from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
 from accelstudy.effects import get_effect
-from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.distributions import (
-    Controlled,
-    cell_distributions,
-    plain_sketches,
-)
+from accelstudy.study.monte_carlo.distributions import PROBABILITIES, Controlled
 from accelstudy.study.monte_carlo.followed import (
     ANGLES,
     ERROR,
@@ -29,67 +22,28 @@ from accelstudy.study.monte_carlo.followed import (
     PRIORI,
     TILT,
     TILTS,
-    Distributed,
-    cell_tilt_error,
+    Key,
 )
-from accelstudy.study.monte_carlo.moments import PROBABILITIES
-from accelstudy.study.monte_carlo.sketch import SKETCHES, Key, sketch_table
-from accelstudy.study.monte_carlo.statistics import Estimates, Statistics, read_trees
-from accelstudy.study.tables import TABLES
+from accelstudy.study.monte_carlo.statistics import Estimates, Statistics
 
 COVERAGE = tuple(f"coverage_95{end}" for end in ("", "_se", "_gain", "_low", "_high"))
 VALUE = tuple(f"value{end}" for end in ("", "_se", "_gain", "_plain"))
-SummedUp: TypeAlias = tuple[Cell, Statistics, Mapping[Key, Controlled]]
-"""A cell, its calibrations, and their distributions; none where none converged."""
-QUANTILES = ("quantity", "name", "unit", "probability", *VALUE, "relative_error")
+QUANTILES = ("quantity", "name", "unit", "probability", *VALUE)
 
 
-def summarise_batch(
-    spec: Mapping[str, Any],
-    parts: Mapping[str, Sequence[str | Path]],
-    leveling: Mapping[str, Any],
-    outputs: Mapping[str, str | Path],
-    provenance: Mapping[str, Any],
-) -> None:
-    """Summarise the cells of a batch.
+class Result(NamedTuple):
+    """What a cell came to: its calibrations and their distributions, empty if none converged."""
 
-    Parameters
-    ----------
-    spec : mapping with `cells` (plain data of `Cell`)
-    parts : files of the jobs of the batch, in order: `moments`, and `estimates` or `sketches`
-    leveling : mapping with max_tilt_gon and attitudes
-    outputs : path of each of `TABLES`, and of `sketches` of whole cells
-    provenance : see `accelstudy.files.tables.origin`
-    """
-    cells = [Cell.from_dict(data) for data in spec["cells"]]
-    trees = read_trees(parts["moments"], (cell.name for cell in cells))
-    with parquet_writer(outputs["sketches"], SKETCHES, provenance) as write_sketches:
-
-        def summed_up(cell: Cell) -> SummedUp:
-            if cell.name not in trees:
-                return cell, Statistics.of_none(cell), {}
-            tree, tilt = trees[cell.name], cell_tilt_error(cell, leveling)
-            control = Control.of(cell, tilt)
-            statistics = Statistics.of(cell, tree, control, tilt)
-            distributions: Mapping[Key, Controlled] = {}
-            if statistics.converged:
-                redundancy = statistics.moments.redundancy
-                distributed = Distributed(statistics.followed, redundancy, tilt)
-                distributions = cell_distributions(parts, statistics, distributed, control, cell)
-            if sketches := plain_sketches(distributions):
-                write_sketches(sketch_table(cell.name, sketches))
-            return cell, statistics, distributions
-
-        tables = tables_of(map(summed_up, cells))
-    for name in TABLES:
-        write_table(outputs[name], tables[name], provenance)
+    cell: Cell
+    statistics: Statistics
+    distributions: Mapping[Key, Controlled]
 
 
-def tables_of(found: Iterable[SummedUp]) -> dict[str, pd.DataFrame]:
+def tables_of(results: Iterable[Result]) -> dict[str, pd.DataFrame]:
     """Each of `TABLES` with the rows of some cells, in order."""
     cells, summary, leveling = [], [], []
     correlations, quantiles = [], []
-    for cell, statistics, distributions in found:
+    for cell, statistics, distributions in results:
         cells.append(_cell_row(cell, statistics))
         summary += _summary_rows(cell, statistics)
         correlations.append(_correlation_rows(cell, statistics))
@@ -133,7 +87,7 @@ def _cell_row(cell: Cell, statistics: Statistics) -> dict[str, Any]:
         "estimable": theory.estimable,
         "not_estimable": ", ".join(theory.not_estimable),
         "reason": theory.reason,
-        "n_replicates": statistics.moments.simulated,
+        "n_replicates": statistics.simulated,
         "n_converged": statistics.converged,
         "control": statistics.control,
         **_columns("variance_factor", statistics.factor[0]),
@@ -191,7 +145,7 @@ def _summary_rows(cell: Cell, statistics: Statistics) -> list[dict[str, Any]]:
                 **{key: float(to_recorded(value, unit)) for key, value in in_si.items()},
                 **_ratio(posteriori[i], sd[i]),
                 **_coverage(statistics, i),
-                "n_replicates": statistics.moments.simulated,
+                "n_replicates": statistics.simulated,
                 "n_converged": n,
                 "estimable": name not in theory.not_estimable,
                 "reason": theory.reason,
@@ -218,8 +172,8 @@ def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
     and not in linear theory, or the other way round; one more of these than there were is allowed
     for, as none may have been seen.
     """
-    n, moments, inside = statistics.converged, statistics.moments, statistics.inside[i]
-    if moments.redundancy <= 0 or n == 0:
+    n, inside = statistics.converged, statistics.inside[i]
+    if statistics.redundancy <= 0 or n == 0:
         return dict.fromkeys(COVERAGE, np.nan)
     plain = min(max(float(inside.plain), 0.0), 1.0)  # a mean of ones may round to more than one
     low, high = wilson(round(plain * n), n)
@@ -257,7 +211,7 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
 
 def _correlation_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
-    names = list(statistics.followed.units) if statistics.moments.simulated else []
+    names = list(statistics.followed.units) if statistics.simulated else []
     pairs = len(names) ** 2
     empirical = statistics.correlation
     return pd.DataFrame(
@@ -282,14 +236,13 @@ def _quantile_rows(
     n = statistics.converged
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     chosen = np.flatnonzero((tail >= 0.0249) | (n * tail >= 0.999))
-    names, estimates, errors = [], [], []
+    names, estimates = [], []
     for (quantity, name), distribution in distributions.items():
         if name in units:  # of effects there are claims, but no quantiles
             factor = float(to_recorded(1.0, units[name]))
             at = distribution.quantile(chosen).scaled(factor)
             names.append((quantity, name, recorded_unit(units[name])))
             estimates.append([at.value, at.error, at.gain, at.plain])
-            errors.append(distribution.relative_error)
     if not names:
         return pd.DataFrame(columns=[*_labels(cell), *QUANTILES]).assign(
             **_labels(cell), n_converged=n
@@ -300,7 +253,6 @@ def _quantile_rows(
         *each,
         np.tile(PROBABILITIES[chosen], len(names)),
         *np.moveaxis(np.array(estimates), 1, 0).reshape(4, -1),
-        np.repeat(errors, size),
     ]
     quantiles = dict(zip(QUANTILES, columns, strict=True))
     return pd.DataFrame({**_labels(cell), **quantiles, "n_converged": n})

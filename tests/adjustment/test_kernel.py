@@ -19,7 +19,6 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import BLOCK, Noise, session
 from accelstudy.study import compiling
 from accelstudy.study.compiling import POSITIONS_PER_PARAMETER
-from accelstudy.study.monte_carlo.replicates import blocks
 
 pytest.importorskip("llvmlite")
 
@@ -184,8 +183,6 @@ def test_a_compiled_cell_of_a_study(approach):
     cell = replace(cell, compiled=True)
     found = simulated(cell)
     assert_same(found, simulated(replace(cell, compiled=False)))
-    (second,) = (pair.simulated for pair in blocks(cell, 1, 1, 1))
-    assert second.estimates.tobytes() == found.estimates[BLOCK:].tobytes()
 
 
 def test_which_cells_are_compiled(monkeypatch):
@@ -206,7 +203,7 @@ def test_which_cells_are_compiled(monkeypatch):
     assert compiled_cells(pays, pays, pays) == [False, False, False]
     (cell,) = make_cells(grid(approaches="gravity")).values()
     with pytest.raises(InputError, match=r"install accelstudy\[kernel\]"):
-        next(blocks(replace(cell, compiled=True), 1, 0, 1))
+        simulated(replace(cell, compiled=True))
 
 
 def test_parameters_with_a_prior():

@@ -26,7 +26,7 @@ from accelstudy.symbolic.made import key_of
 EXAMPLES = ROOT / "examples"
 RIPPLE = EXAMPLES / "effect" / "ripple.py"
 STUDY = {
-    "study": "mine", "seed": 1, "plugins": "ripple.py", "keep": "summary",
+    "study": "mine", "seed": 1, "plugins": "ripple.py",
     "sensor": {"ripple": {"value": [0.006, 0.004, 0.005], "unit": "m/s^2"}},
     "grids": [{
         "models": ["bias-scale+ripple"], "schemes": ["fibonacci-24"], "approaches": ["gravity"],
@@ -279,7 +279,7 @@ def test_what_can_use_a_registry_depends_on_its_content():
 
 
 def test_jobs_load_it_and_run_again_when_it_changes(tmp_path):
-    table = "results/mine/parts/0000/moments.parquet"
+    table = "results/mine/batches/0000/summary.parquet"
 
     def run(*words):
         """As a new process does: nothing is loaded."""

@@ -28,7 +28,7 @@ BY_SLURM = [
     *("--profile", ROOT / "profiles" / "slurm", "--slurm-no-account"),
     *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "3"),
     *("--slurm-keep-successful-logs", "--group-components"),
-    *("simulate=1", "summarise=1", "results=100000"),
+    *("simulate=1", "results=100000"),
     *("--cores", str(min(2, os.cpu_count() or 1))),
 ]
 

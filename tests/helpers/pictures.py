@@ -54,8 +54,6 @@ DRAWN = {
     "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),
     "field-adxl355": ("make plan-example", "accelstudy/field/figure.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
-    "rare-events": ("the study config/sweeps/rare_events.yaml",
-                    "accelstudy/study/figures/rare_events.py", "config/sweeps/rare_events.yaml"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),

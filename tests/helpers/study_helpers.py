@@ -1,14 +1,14 @@
-"""A small study without Snakemake: configured, simulated and summarised as the workflow does it."""
+"""A small study without Snakemake: configured and simulated as the workflow does it."""
 
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import collect, read_table
-from accelstudy.study.batches import Share, batches
-from accelstudy.study.cells import rare_cells, study_cells
+from accelstudy.study.batches import batches, simulate_batch
+from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.replicates import Pair, blocks
-from accelstudy.study.monte_carlo.simulate import simulate_batch
-from accelstudy.study.rare import rare_table
-from accelstudy.study.summary import summarise_batch
+from accelstudy.study.monte_carlo.distributions import distributions
+from accelstudy.study.monte_carlo.followed import cell_tilt_error
+from accelstudy.study.monte_carlo.replicates import simulate
+from accelstudy.study.monte_carlo.statistics import Statistics
 from accelstudy.study.tables import TABLES
 
 NINE = "bias-scale-nonorthogonality"
@@ -47,73 +47,38 @@ LEVELING = {"max_tilt_gon": 50, "attitudes": 200}
 
 
 def simulated(cell, seed=1):
-    """All replicates of a cell in one block."""
-    return Pair.joined(blocks(cell, seed, 0, cell.n_blocks)).simulated
+    """All replicates of a cell."""
+    return simulate(cell, seed, None).simulated
 
 
-def simulate(folder, shares, seed=1, kept="estimates", leveling=LEVELING):
-    """Run the first stage; the paths of what it wrote: `estimates`, or `sketches` instead."""
-    paths = {name: folder / f"{name}.parquet" for name in ("moments", kept)}
-    spec = {"seed": seed, "shares": [share.to_dict() for share in shares], "leveling": leveling}
+def plain(cell, seed):
+    """Statistics and distributions of a cell as plain averages, without linear theory."""
+    tilt, replicates = cell_tilt_error(cell, LEVELING), simulate(cell, seed, None)
+    found = distributions(cell, replicates, None, tilt)
+    return Statistics.of(cell, replicates, None, tilt), found
+
+
+def simulate_cells(folder, cells, seed=1, leveling=LEVELING):
+    """Simulate a batch; the paths of the estimates and the tables."""
+    paths = {name: folder / f"{name}.parquet" for name in ("estimates", *TABLES)}
+    spec = {"seed": seed, "cells": [cell.to_dict() for cell in cells], "leveling": leveling}
     simulate_batch(spec, paths, PROVENANCE)
     return paths
 
 
-def simulate_cells(folder, cells, seed=1):
-    """Path of the estimates of whole cells."""
-    return simulate(folder, [Share(cell, 0, cell.n_chunks) for cell in cells], seed)["estimates"]
-
-
-def run_study(folder, batch_size=None, **keys):
-    """Run all stages up to the collected tables.
-
-    Returns
-    -------
-    tables : {name: DataFrame}, estimates included, if they are kept
-    """
+def run_study(folder, batch_size=400_000, **keys):
+    """Tables of a study, {name: DataFrame}, estimates included."""
     study = make_study(**keys)
-    leveling = study.leveling.model_dump()
-    wholes = {name: [] for name in (*TABLES, "sketches")}
-    estimates = []
-    for number, batch in enumerate(batches(study_cells(study), batch_size)):
-        place = folder / f"{number:04d}"
-        parts = [
-            simulate(
-                place / f"{i:04d}",
-                job,
-                study.seed,
-                "estimates" if study.keep == "replicates" else "sketches",
-                leveling,
-            )
-            for i, job in enumerate(batch.jobs)
-        ]
-        paths = {name: place / f"{name}.parquet" for name in wholes}
-        summarise_batch(
-            {"cells": [cell.to_dict() for cell in batch.cells]},
-            {name: [part[name] for part in parts] for name in parts[0]},
-            leveling,
-            paths,
-            PROVENANCE,
-        )
-        estimates += [part["estimates"] for part in parts if "estimates" in part]
-        for name, path in paths.items():
-            wholes[name].append(path)
+    parts = [
+        simulate_cells(folder / f"{i:04d}", cells, study.seed, study.leveling.model_dump())
+        for i, cells in enumerate(batches(study_cells(study), batch_size))
+    ]
     for name in TABLES:
-        collect(wholes[name], folder / f"{name}.parquet", PROVENANCE)
+        collect([part[name] for part in parts], folder / f"{name}.parquet", PROVENANCE)
     tables = {name: read_table(folder / f"{name}.parquet") for name in TABLES}
-    return {**tables, **({"estimates": read_table(estimates)} if estimates else {})}
+    return {**tables, "estimates": read_table([part["estimates"] for part in parts])}
 
 
-def run_rare(folder, study):
-    """The table of rare tilt errors."""
-    cells = [cell.to_dict() for cell in rare_cells(study, study_cells(study))]
-    spec = {"seed": study.seed, "cells": cells, "leveling": study.leveling.model_dump()}
-    rare_table({**spec, "shares": study.rare.shares}, folder / "rare.parquet", PROVENANCE)
-    return read_table(folder / "rare.parquet")
-
-
-def parts_in(folder):
-    """What the claims take from the folder of `run_study`."""
-    names = {"moments": "*/*/moments.parquet", "sketches": "*/sketches.parquet"}
-    names["estimates"] = "*/*/estimates.parquet"
-    return {name: sorted(folder.glob(pattern)) for name, pattern in names.items()}
+def estimates_in(folder):
+    """Files of estimates in the folder of `run_study`."""
+    return sorted(folder.glob("*/estimates.parquet"))

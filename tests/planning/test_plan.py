@@ -14,6 +14,7 @@ import yaml
 from calling import call, succeed
 from page_helpers import assert_told_alike
 from places import ROOT
+from study_helpers import simulated as simulated_of
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, angles_in
@@ -45,7 +46,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_study
-from accelstudy.study.monte_carlo.replicates import blocks
 
 MODEL = get_model(NINE)
 MCLAREN = get_scheme("mclaren-24")
@@ -213,10 +213,10 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
     told = {r.simulated.cell: r.simulated for r in plan.ranked if r.simulated}
     assert set(cells) == set(told)
     cell = cells[plan.first.simulated.cell]
-    simulated = [pair.simulated for pair in blocks(cell, study.seed, 0, cell.n_blocks)]
+    replicates = simulated_of(cell, study.seed)
     error = leveling_error(
         cell.simulated_model, cell.simulated_model.vector(cell.truth), cell.estimated_model,
-        np.concatenate([block.estimates for block in simulated]), cap_forces(30 * GON, 200),
+        replicates.estimates, cap_forces(30 * GON, 200),
     )  # fmt: skip
     np.testing.assert_allclose(error.rms, plan.first.simulated.mean.plain, rtol=1e-5)
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from places import ROOT
-from study_helpers import grid, make_study, run_rare, run_study
+from study_helpers import grid, make_study, run_study
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
@@ -42,7 +42,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
-RARE = {"replicates": 1000}
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
 
 
@@ -58,12 +57,11 @@ def pages():
 
 def test_each_column_of_a_study_is_described(tmp_path, pages):
     described = {name: list(columns) for name, (_, columns) in pages.study_tables().items()}
-    keys = {"grids": [grid(replicates=20)], "sensitivity": SENSITIVITY, "rare": RARE}
+    keys = {"grids": [grid(replicates=20)], "sensitivity": SENSITIVITY}
     written = run_study(tmp_path, **keys)
     study, summary = make_study(**keys), tmp_path / "summary.parquet"
     path = tmp_path / "sensitivity.parquet"
     analyse_sensitivity(study, summary, path, PROVENANCE)
-    written["rare"] = run_rare(tmp_path, study)
     written["sensitivity"] = read_table(path)
     correlations, path = tmp_path / "correlations.parquet", tmp_path / "shapley.parquet"
     analyse_shapley(study, summary, correlations, path, PROVENANCE)

@@ -13,9 +13,9 @@ from study_helpers import (
     NINE,
     PAPER_TRUTH,
     PROVENANCE,
+    estimates_in,
     grid,
     make_study,
-    parts_in,
     run_study,
 )
 
@@ -81,7 +81,7 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables, folder):
     return evidence_from(
-        study_cells(make_study(**KEYS)), parts_in(folder), LEVELING, scheme="mclaren-24",
+        study_cells(make_study(**KEYS)), estimates_in(folder), LEVELING, scheme="mclaren-24",
         correlations=tables["correlations"], sensitivity=tables["sensitivity"],
         shapley=tables["shapley"], base_samples=BASE_SAMPLES, resamples=RESAMPLES, seed=1,
         beyond=beyond_linear_theory(tables["cells"], tables["summary"]),
@@ -209,7 +209,7 @@ def with_reduction(evidence, percent, replicates=500, spread=0.05):
             squares, known = real.moments.squares.copy(), real.known.copy()
             difference[at], linear[at], known[at] = values.mean(), 0.0, np.nan
             squares[:, at] = values.var() * real.converged, 0.0, 0.0
-            moments = replace(real.moments, difference=difference, linear=linear, squares=squares)
+            moments = real.moments._replace(difference=difference, linear=linear, squares=squares)
             statistics[scheme, approach] = replace(real, moments=moments, known=known)
     return replace(evidence, statistics=statistics, ratios=ratios)
 
@@ -412,7 +412,7 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
         "html": tmp_path / "claims.html",
     }
     judge_claims(
-        make_study(**KEYS), parts_in(folder),
+        make_study(**KEYS), estimates_in(folder),
         {name: folder / f"{name}.parquet" for name in TABLES}, outputs, PROVENANCE,
     )  # fmt: skip
     claims = read_table(outputs["claims"])

@@ -5,25 +5,27 @@ the standard errors against the scatter over seeds.
 """
 
 from dataclasses import replace
+from functools import reduce
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import LEVELING, grid, make_cells, run_study
+from study_helpers import LEVELING, grid, make_cells, plain, run_study
 
 from accelstudy.study.monte_carlo.averaged import PRODUCT
 from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.distributions import Controlled, Sample, simulated_distributions
-from accelstudy.study.monte_carlo.followed import ERROR, TILT, cell_tilt_error
-from accelstudy.study.monte_carlo.moments import (
+from accelstudy.study.monte_carlo.distributions import (
     EDGES,
     PROBABILITIES,
-    Moments,
+    Controlled,
+    Sample,
     apart_by_quantile,
-    paired_moments,
+    simulated_cell,
 )
-from accelstudy.study.monte_carlo.replicates import Pair, blocks
-from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.monte_carlo.followed import ERROR, TILT, cell_tilt_error
+from accelstudy.study.monte_carlo.replicates import simulate
+from accelstudy.study.monte_carlo.statistics import Moments, Statistics
 
 STANDARD_ERRORS = 4.5
 
@@ -39,7 +41,7 @@ def cell_of(sigma=0.002, approach="gravity", replicates=1000, **keys):
 def numbers_of(cell, seed=1):
     """Errors of replicates, converged or not, and those of linear theory."""
     control = Control.of(cell, cell_tilt_error(cell, LEVELING))
-    pair = Pair.joined(blocks(cell, seed, 0, cell.n_blocks, control))
+    pair = simulate(cell, seed, control)
     truth = cell.true_values
     return pair.simulated.estimates - truth, pair.linear.estimates - truth, pair.simulated.converged
 
@@ -49,7 +51,7 @@ def numbers_of(cell, seed=1):
 
 def test_a_mean_is_that_of_the_regression_on_linear_theory():
     cell = cell_of(0.1, replicates=400)
-    found, _ = simulated_distributions(cell, 1, LEVELING)
+    found, *_ = simulated_cell(cell, 1, LEVELING)
     errors, linear, _ = numbers_of(cell)
     for i in range(9):
         x, y = errors[:, i], linear[:, i]
@@ -65,7 +67,7 @@ def test_a_mean_is_that_of_the_regression_on_linear_theory():
 def test_where_calibrations_fail_the_mean_is_a_ratio():
     """By influence: x of those that converged, y of all."""
     cell = cell_of(1.5, replicates=1000)
-    found, _ = simulated_distributions(cell, 1, LEVELING)
+    found, *_ = simulated_cell(cell, 1, LEVELING)
     errors, linear, converged = numbers_of(cell)
     assert 3 < (~converged).sum() < 300
     for i in range(9):
@@ -89,18 +91,32 @@ def test_failures_that_hang_on_the_noise_are_no_bias():
         y = rng.standard_normal((500, 1))
         converged = y[:, 0] < 1.5
         x = np.where(converged[:, None], y + 0.01 * rng.standard_normal(y.shape) + 0.3, 0.0)
-        moments = Moments(
-            len(x), int(converged.sum()), 3, np.zeros(1), **paired_moments(x, y, converged),
-            apart=np.zeros((3, 1, len(PROBABILITIES))), correlation_sum=np.zeros((1, 1)),
-            first=np.zeros(1),
-        )  # fmt: skip
-        found = Statistics(None, moments, np.zeros(1))._means
+        block = SimpleNamespace(converged=converged)
+        moments = Moments.of(x, y, converged)
+        found = Statistics(None, block, moments, np.zeros(1))._means
         values.append(found.value[0])
         errors.append(found.error[0])
         assert found.gain[0] >= 1
     true = 0.3 - stats.norm.pdf(1.5) / stats.norm.cdf(1.5)
     assert np.mean(values) == pytest.approx(true, abs=STANDARD_ERRORS * np.std(values) / 17)
     assert np.std(values) == pytest.approx(np.mean(errors), rel=0.2)
+
+
+def test_merged_moments_are_those_of_all():
+    """Though the means are far from zero, and the differences small."""
+    rng = np.random.default_rng(3)
+    y = 1e3 + rng.standard_normal((100, 3))
+    x = y + 1e-4 * rng.standard_normal((100, 3))
+    converged = np.arange(100) != 7
+    parts = (np.split(each, [10, 40, 93]) for each in (x, y, converged))
+    total = reduce(Moments.merged, map(Moments.of, *parts))
+    whole = Moments.of(x, y, converged)
+    assert total.size == 100
+    for name in ("difference", "linear", "squares", "linear_converged"):
+        np.testing.assert_allclose(getattr(total, name), getattr(whole, name), rtol=1e-7)
+    centred = y - y.mean(axis=0)
+    np.testing.assert_allclose(total.squares[2], (centred**2).sum(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(total.difference, (x - y).mean(axis=0), rtol=1e-7)
 
 
 @pytest.mark.parametrize("apart", [1e-4, 1e-2, 0.3, 3.0])
@@ -137,7 +153,7 @@ def test_stated_errors_are_those_over_seeds(noise, approach):
     levels = np.array([0.5, 0.95])
     values, errors = [], []
     for seed in range(40):
-        found, bounds = simulated_distributions(cell, seed, LEVELING, levels)
+        found, bounds, _ = simulated_cell(cell, seed, LEVELING, levels)
         correlation = found.correlation
         tilt = bounds[TILT, "roll"].quantile(np.arange(2))
         below = np.tril_indices(9, -1)
@@ -159,9 +175,8 @@ def test_stated_errors_are_those_over_seeds(noise, approach):
 
 @pytest.mark.parametrize(("noise", "approach"), [(0.002, "gravity"), (0.3, "robot")])
 def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach):
-    few, _ = simulated_distributions(cell_of(noise, approach, 200), 1, LEVELING)
-    plain = replace(cell_of(noise, approach, 20_000), control="none")
-    many, _ = simulated_distributions(plain, 2, LEVELING)
+    few, *_ = simulated_cell(cell_of(noise, approach, 200), 1, LEVELING)
+    many, _ = plain(cell_of(noise, approach, 20_000), 2)
     assert few.control == "linear"
     assert many.control == "none"
     for name in ("bias", "sd", "tilt_rms", "factor"):
@@ -172,27 +187,17 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach):
         assert np.abs(z).max() < STANDARD_ERRORS, name
 
 
-def test_a_study_without_a_control_has_plain_averages(tmp_path):
-    keys = {"grids": [grid(replicates=300)], "leveling": {"attitudes": 20}}
-    plain = run_study(tmp_path / "none", control="none", **keys)
-    linear = run_study(tmp_path / "linear", **keys)
-    assert plain["estimates"]["linear_estimate"].isna().all()
-    assert set(plain["cells"]["control"]) == {"none"}
-    assert set(linear["cells"]["control"]) == {"linear"}
-    for table, value, short in (
-        ("summary", "bias", "bias"), ("summary", "sd_empirical", "sd"),
-        ("correlations", "empirical", "empirical"), ("leveling", "roll_rms_mgon", "roll_rms"),
-        ("leveling", "both_rms_q95_mgon", "both_rms_q95"), ("quantiles", "value", "value"),
-    ):  # fmt: skip
-        rows, controlled = plain[table], linear[table]
-        np.testing.assert_allclose(rows[value], rows[f"{short}_plain"], rtol=1e-9, atol=1e-12)
-        assert (rows[f"{short}_gain"].dropna() == 1).all()
-        if table != "leveling":
-            same = controlled[f"{short}_plain"].to_numpy(), rows[f"{short}_plain"].to_numpy()
-            np.testing.assert_allclose(*same, rtol=1e-4, atol=1e-6)
-        gains = controlled[f"{short}_gain"].dropna()
-        assert gains.min() >= 1
-        assert gains.median() > 1000
+def test_plain_averages_stand_beside():
+    cell = cell_of(0.1, replicates=300)
+    found, bounds, _ = simulated_cell(cell, 1, LEVELING)
+    alone, without = plain(cell, 1)
+    for name in ("bias", "sd", "tilt_rms", "factor"):
+        one, other = getattr(found, name), getattr(alone, name)
+        np.testing.assert_allclose(one.plain, other.value, rtol=1e-3, atol=1e-9)
+        assert (other.gain == 1).all()
+        assert np.median(one.gain) > 10
+    one, other = bounds[TILT, "both"].at(0.95), without[TILT, "both"].at(0.95)
+    assert float(one.plain) == pytest.approx(float(other.value), rel=1e-12)
 
 
 def test_few_replicates_have_no_control(tmp_path):
@@ -207,9 +212,8 @@ def test_few_replicates_have_no_control(tmp_path):
 def test_noise_effects_only_lower_the_gain(effect):
     """The control is the normal noise on which they act; its distribution stays known."""
     keys = {"noise": {"effects": [effect]}}
-    few, _ = simulated_distributions(cell_of(replicates=400, **keys), 1, LEVELING)
-    plain = replace(cell_of(replicates=20_000, **keys), control="none")
-    many, _ = simulated_distributions(plain, 2, LEVELING)
+    few, *_ = simulated_cell(cell_of(replicates=400, **keys), 1, LEVELING)
+    many, _ = plain(cell_of(replicates=20_000, **keys), 2)
     assert (few.sd.gain >= 1).all()
     z = (few.sd.value - many.sd.value) / np.hypot(few.sd.error, many.sd.error)
     assert np.abs(z).max() < 6  # heavy tails of squares
@@ -220,16 +224,15 @@ def test_noise_effects_only_lower_the_gain(effect):
 def test_a_model_that_lacks_an_effect_keeps_its_gain():
     """Linear theory is taken where the noise-free session is calibrated, not at the truth."""
     cell = cell_of(simulated_effects=["bias", "scale", "nonorthogonality", "quadratic_scale"])
-    found, bounds = simulated_distributions(cell, 1, LEVELING)
+    found, bounds, _ = simulated_cell(cell, 1, LEVELING)
     assert found.sd.gain.min() > 1000
     assert found.tilt_rms.gain.min() > 100
-    alone = replace(cell, replicates=20_000, control="none")
-    many, plain = simulated_distributions(alone, 2, LEVELING)
+    many, alone = plain(replace(cell, replicates=20_000), 2)
     for one, other in ((found.bias, many.bias), (found.sd, many.sd), (found.factor, many.factor)):
         z = (one.value - other.value) / np.hypot(one.error, other.error)
         assert np.abs(z).max() < STANDARD_ERRORS
     for name in ("roll", "pitch", "both"):
-        one, other = bounds[TILT, name].at(0.95), plain[TILT, name].at(0.95)
+        one, other = bounds[TILT, name].at(0.95), alone[TILT, name].at(0.95)
         assert abs(one.value - other.value) < STANDARD_ERRORS * np.hypot(one.error, other.error)
 
 
@@ -237,7 +240,7 @@ def test_products_are_about_the_centre():
     """The first block tells where the mean is, so that a bias does not count as spread."""
     cell = cell_of(0.3, replicates=1000)
     control = Control.of(cell, cell_tilt_error(cell, LEVELING))
-    found, _ = simulated_distributions(cell, 1, LEVELING)
+    found, *_ = simulated_cell(cell, 1, LEVELING)
     mean = found.mean(ERROR).value / control.theory.sigma
     assert np.abs(mean).max() < 0.02
     squares = found.mean(PRODUCT).value[np.cumsum(np.arange(1, 10)) - 1]

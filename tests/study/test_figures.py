@@ -100,7 +100,7 @@ def texts(drawn: Figure) -> list[str]:
 
 
 ALL = figure_names(parse_study(PAPER))
-OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS), "rare-events"]
+OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS)]
 
 
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
@@ -437,7 +437,7 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
 
 IMPORTED = """\
 import sys
-import accelstudy.study.figures, accelstudy.study.effort
+import accelstudy.study.figures, accelstudy.study.cells
 import accelstudy.jobs.earlier, accelstudy.jobs.job
 print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
 """

@@ -14,7 +14,6 @@ from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
 from accelstudy.study.batches import batches
 from accelstudy.study.cells import study_cells
-from accelstudy.study.monte_carlo.replicates import blocks
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -126,9 +125,8 @@ def test_batches():
     cells = [*make_cells(grid(schemes="all", replicates=40)).values()]
     cells[3] = replace(cells[3], replicates=1000)
     shared = batches(cells[:8], 100)
-    sizes = [[cell.replicates for cell in batch.cells] for batch in shared]
+    sizes = [[cell.replicates for cell in batch] for batch in shared]
     assert sizes == [[40, 40], [40], [1000], [40, 40], [40, 40]]
-    assert all(len(batch.jobs) == 1 for batch in shared)  # none has more than a chunk
     assert batches([], 100) == []
 
 
@@ -150,13 +148,6 @@ def test_more_replicates_extend_the_fewer():
     assert len(many) == BLOCK + 30
     for fewer in (1, 20, BLOCK, BLOCK + 1):
         np.testing.assert_array_equal(estimates(replace(cell, replicates=fewer)), many[:fewer])
-
-
-def test_a_block_does_not_depend_on_those_before_it():
-    cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
-    (last,) = (pair.simulated for pair in blocks(cell, 1, 1, 5))
-    np.testing.assert_array_equal(last.estimates, estimates(cell)[BLOCK:])
-    assert last.correlation_sum.diagonal() == pytest.approx(np.full(9, 30), rel=1e-12)
 
 
 def test_no_two_replicates_are_alike():

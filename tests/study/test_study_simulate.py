@@ -33,10 +33,10 @@ from accelstudy.files.tables import (
     whole_file,
     write_table,
 )
-from accelstudy.study.monte_carlo import simulate as module
-from accelstudy.study.monte_carlo.moments import MOMENTS
-from accelstudy.study.monte_carlo.replicates import chunks
-from accelstudy.study.monte_carlo.simulate import ESTIMATES
+from accelstudy.study import batches as module
+from accelstudy.study.batches import batches, memory
+from accelstudy.study.monte_carlo.distributions import simulated_cell
+from accelstudy.study.monte_carlo.replicates import ESTIMATES
 from accelstudy.study.tables import read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
@@ -46,17 +46,16 @@ GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 def written(tmp_path_factory):
     cells = make_cells(grid(schemes=["faces-6", "mclaren-24"], approaches="gravity"), grid())
     folder = tmp_path_factory.mktemp("batch")
-    estimates = simulate_cells(folder, cells.values())
-    return cells, estimates, folder / "moments.parquet"
+    paths = simulate_cells(folder, cells.values())
+    return cells, paths["estimates"], paths["leveling"]
 
 
 # --- content -------------------------------------------------------------------------------------
 
 
 def test_schema(written):
-    _, estimates, moments = written
+    _, estimates, _ = written
     assert pq.read_schema(estimates).equals(ESTIMATES)
-    assert pq.read_schema(moments).equals(MOMENTS)
     assert not read_table(estimates).drop(columns="omega").isna().any().any()
 
 
@@ -93,7 +92,7 @@ def test_what_follows_from_the_stored_columns(written):
 
 def test_observed_gravity_is_a_parameter(tmp_path):
     cells = make_cells(grid(approaches="robot", gravity_sigma_mps2=1e-4))
-    table = read_estimates(simulate_cells(tmp_path, cells.values()))
+    table = read_estimates(simulate_cells(tmp_path, cells.values())["estimates"])
     g = table[table["parameter"] == "g"]
     assert set(g["unit"]) == {"m/s^2"}
     assert set(g["truth"]) == {9.80665}
@@ -102,9 +101,9 @@ def test_observed_gravity_is_a_parameter(tmp_path):
 
 
 def test_a_cell_that_is_not_estimable_leaves_no_rows(written):
-    cells, estimates, moments = written
+    cells, estimates, leveling = written
     assert f"{NINE}/faces-6/gravity" in cells
-    for path in (estimates, moments):
+    for path in (estimates, leveling):
         assert set(read_table(path)["cell"].astype(str)) == {GRAVITY, ROBOT}
 
 
@@ -124,7 +123,7 @@ def test_correlations_of_a_block(written):
 def test_origin_is_in_every_file(tmp_path):
     run_study(tmp_path, grids=[grid()])
     paths = sorted(tmp_path.rglob("*.parquet"))
-    assert len(paths) == 2 + (5 + 1) + 5
+    assert len(paths) == (1 + 5) + 5
     for path in paths:
         assert read_origin(path) == {
             **PROVENANCE, "version": accelstudy.__version__, "commit": git_commit(),
@@ -159,8 +158,8 @@ def files(folder):
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
 def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
-    table = simulate_cells(tmp_path / "source", make_cells(grid(replicates=3)).values())
-    content = pq.read_table(table)
+    paths = simulate_cells(tmp_path / "source", make_cells(grid(replicates=3)).values())
+    content = pq.read_table(paths["estimates"])
     path = tmp_path / "target" / "estimates.parquet"
 
     def write(then):
@@ -213,9 +212,9 @@ def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return chunks(cell, *which)
+        return simulated_cell(cell, *which)
 
-    monkeypatch.setattr(module, "chunks", broken)
+    monkeypatch.setattr(module, "simulated_cell", broken)
     with pytest.raises(KeyboardInterrupt):
         simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]
@@ -261,3 +260,12 @@ def test_sigmas_that_no_weights_span_are_said():
     found = estimability(cell.positions, cell.estimated_model, cell.conditions, cell.noise)
     assert not found.estimable
     assert "the sigmas differ too much" in found.reason
+
+
+def test_a_study_has_batches_of_many_small_cells():
+    cells = [*make_cells(grid(schemes="all", approaches="robot", replicates=20_000)).values()]
+    shared = batches(cells)
+    assert [cell for each in shared for cell in each] == cells
+    assert max(sum(cell.replicates for cell in each) for each in shared) <= 400_000
+    assert len(shared) == -(-len(cells) // 20)
+    assert memory(shared[0]) == 1000 + round(120e-6 * 20_000 * 9)

@@ -153,7 +153,6 @@ def test_all_is_made(single):
     for name in TABLES:
         table = read_table(results / f"{name}.parquet")
         assert table["cell"].nunique() == (8 if name in ("cells", "summary") else 7)
-    assert read_table(results / "rare.parquet")["cell"].nunique() == 7
     estimates = read_table(results / "estimates")
     assert len(estimates) == 60 * (2 * 2 * 6 + 9 + 2 * 9)
     hashes = {read_origin(path)["config_hash"] for path in results.rglob("*.parquet")}
@@ -210,7 +209,7 @@ def planned(folder, **options):
 
 def test_dry_run(tmp_path):
     plan = planned(tmp_path)
-    once = ("simulate", "rare", "summarise", "collect", "figures", "explorer")
+    once = ("simulate", "collect", "figures", "explorer")
     assert plan == dict.fromkeys(once, 1)
     assert not (tmp_path / "results").exists()
 

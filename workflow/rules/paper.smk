@@ -35,7 +35,7 @@ rule sensitivity:
 
 rule claims:
     input:
-        **(parts_of_claims() if STUDY.paper else {}),
+        estimates=expand(ESTIMATES, batch=batches_of_claims()) if STUDY.paper else [],
         cells=f"{RESULTS}/cells.parquet",
         summary=f"{RESULTS}/summary.parquet",
         correlations=f"{RESULTS}/correlations.parquet",

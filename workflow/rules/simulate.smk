@@ -1,45 +1,42 @@
 rule simulate:
     output:
-        **WRITTEN,
+        estimates=ESTIMATES,
+        **{name: f"{BATCH}/{name}.parquet" for name in TABLES},
     log:
-        f"{RESULTS}/logs/simulate/{{part}}.log",
+        f"{RESULTS}/logs/simulate/{{batch}}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/simulate/{{part}}.tsv"
+        f"{RESULTS}/benchmarks/simulate/{{batch}}.tsv"
     conda:
         "../envs/accelstudy.yaml"
     threads: 1
     resources:
-        mem_mb=megabytes(MEMORY),
+        mem_mb=lambda wildcards, attempt: memory(BATCHES[wildcards.batch]) * attempt,
     params:
-        spec=lambda wildcards: part_spec(wildcards.part),
+        spec=lambda wildcards: batch_spec(wildcards.batch),
         code=code_of("simulate"),
     message:
-        "Simulate and calibrate batch {wildcards.part}"
+        "Simulate and calibrate batch {wildcards.batch}"
     script:
         "../scripts/simulate.py"
 
 
-rule rare:
+rule collect:
+    input:
+        **{table: expand(f"{BATCH}/{table}.parquet", batch=BATCHES) for table in TABLES},
     output:
-        f"{BATCH}/rare.parquet",
+        **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
     log:
-        f"{RESULTS}/logs/rare/{{batch}}.log",
+        f"{RESULTS}/logs/collect.log",
     benchmark:
-        f"{RESULTS}/benchmarks/rare/{{batch}}.tsv"
+        f"{RESULTS}/benchmarks/collect.tsv"
     conda:
         "../envs/accelstudy.yaml"
     threads: 1
     resources:
-        mem_mb=megabytes(MEMORY),
+        mem_mb=megabytes(1000),
     params:
-        spec=lambda wildcards: {
-            "seed": STUDY.seed,
-            "cells": [RARE_CELLS[cell.name].to_dict() for cell in BATCHES[wildcards.batch].cells],
-            "leveling": STUDY.leveling.model_dump(),
-            "shares": STUDY.rare.shares,
-        },
-        code=code_of("rare"),
+        code=code_of("collect"),
     message:
-        "Simulate rare tilt errors of batch {wildcards.batch}"
+        "Join the tables of all batches"
     script:
-        "../scripts/rare.py"
+        "../scripts/collect.py"

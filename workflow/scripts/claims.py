@@ -6,7 +6,7 @@ with job(snakemake) as provenance:
     study = StudyConfig.model_validate(snakemake.config)
     judge_claims(
         study,
-        lists(snakemake.input),
+        lists(snakemake.input)["estimates"],
         {name: snakemake.input[name] for name in TABLES},
         dict(snakemake.output.items()),
         provenance,

@@ -9,8 +9,8 @@ import numpy as np
 from accelstudy.basics.units import recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.study.claims.base import Array, Claim, Evidence, SchemeClaim, register, verdict
+from accelstudy.study.monte_carlo.distributions import PROBABILITIES
 from accelstudy.study.monte_carlo.followed import EFFECT, POSTERIORI
-from accelstudy.study.monte_carlo.moments import PROBABILITIES
 
 EFFECTS = {"bias": "bias", "scale": "scale", "nonorthogonality": "misalignment"}
 """Effect -> the paper's word for it."""

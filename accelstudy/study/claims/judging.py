@@ -7,9 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from accelstudy.basics.wording import interval, number
 from accelstudy.files.outputs import whole_file
@@ -21,26 +19,25 @@ from accelstudy.study.claims.base import Array, Evidence, judge, schemes_with_bo
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.distributions import (
-    EXACT,
+    EDGES,
+    PROBABILITIES,
     Controlled,
     Sample,
-    kept_pairs,
-    kept_sketches,
+    apart_by_quantile,
 )
 from accelstudy.study.monte_carlo.followed import EFFECT, cell_tilt_error
-from accelstudy.study.monte_carlo.moments import EDGES, PROBABILITIES, apart_by_quantile
-from accelstudy.study.monte_carlo.sketch import Sketch
-from accelstudy.study.monte_carlo.statistics import Statistics, read_trees
+from accelstudy.study.monte_carlo.replicates import Replicates, read_replicates
+from accelstudy.study.monte_carlo.statistics import Statistics
 
 TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
-"""What the claims are judged by, beside moments, sketches and estimates."""
+"""What the claims are judged by, beside estimates."""
 SWEEP = "config/sweeps/positions.yaml"
 """A study for readers of the claims who want one of their own."""
 
 
 def judge_claims(
     study: StudyConfig,
-    parts: Mapping[str, Sequence[str | Path]],
+    estimates: Sequence[str | Path],
     tables: Mapping[str, str | Path],
     outputs: Mapping[str, str],
     provenance: Mapping[str, Any],
@@ -50,7 +47,7 @@ def judge_claims(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    parts : see `evidence_from`
+    estimates : files with the estimates of the cells that the claims use
     tables : paths of the tables of `TABLES`, by their names
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
@@ -67,7 +64,7 @@ def judge_claims(
     beyond = beyond_linear_theory(read["cells"], read["summary"]) if known else None
     evidence = evidence_from(
         cells,
-        parts,
+        estimates,
         study.leveling.model_dump(),
         scheme=settings.scheme,
         correlations=read["correlations"],
@@ -87,7 +84,7 @@ def judge_claims(
 
 def evidence_from(
     cells: Iterable[Cell],
-    parts: Mapping[str, Sequence[str | Path]],
+    estimates: Sequence[str | Path],
     leveling: Mapping[str, Any],
     **rest: Any,
 ) -> Evidence:
@@ -96,24 +93,26 @@ def evidence_from(
     Parameters
     ----------
     cells : cells with the model of the claims
-    parts : paths of `moments`, `sketches` and, where they are kept, `estimates` of these cells
+    estimates : files with the estimates of these cells
     leveling : mapping with max_tilt_gon and attitudes
     **rest : as in `Evidence`
     """
-    by_name = {cell.name: cell for cell in cells}
     found = {}
-    for name, tree in read_trees(parts["moments"], by_name).items():
-        cell = by_name[name]
+    for cell in cells:
+        if not cell.estimability.estimable:
+            continue
         tilt = cell_tilt_error(cell, leveling)
         control = Control.of(cell, tilt)
-        statistics = Statistics.of(cell, tree, control, tilt)
-        found[cell.scheme, cell.approach] = _Calibrations(cell, statistics, control)
+        replicates = read_replicates(estimates, cell, control)
+        if replicates is not None:
+            statistics = Statistics.of(cell, replicates, control, tilt)
+            found[cell.scheme, cell.approach] = _Calibrations(cell, statistics, control, replicates)
     ratios: dict[tuple[str, str], Controlled] = {}
     for scheme in schemes_with_both(found):
         pair = found[scheme, "gravity"], found[scheme, "robot"]
-        if all(each.statistics.moments.redundancy > 0 and each.number for each in pair):
+        if all(each.statistics.redundancy > 0 and each.statistics.converged for each in pair):
             for effect in pair[0].statistics.followed.effects:
-                ratios[scheme, effect] = _ratio(*pair, effect, parts)
+                ratios[scheme, effect] = _ratio(*pair, effect)
     return Evidence(
         statistics={key: each.statistics for key, each in found.items()},
         ratios=ratios,
@@ -128,29 +127,17 @@ class _Calibrations(NamedTuple):
     cell: Cell
     statistics: Statistics
     control: Control | None
-
-    @property
-    def number(self) -> int:
-        """Number of those that converged."""
-        return self.statistics.converged
+    replicates: Replicates
 
 
-def _ratio(
-    gravity: _Calibrations,
-    robot: _Calibrations,
-    effect: str,
-    parts: Mapping[str, Sequence[str | Path]],
-) -> Controlled:
+def _ratio(gravity: _Calibrations, robot: _Calibrations, effect: str) -> Controlled:
     """Ratio of the sigma of an effect, robot-aided over gravity-based, of independent sessions.
 
-    Kept calibrations are paired by their number; with sketches, each is paired with each.
+    Calibrations are paired by their number.
     """
-    n = min(gravity.number, robot.number)
-    if not parts.get("estimates") or max(gravity.number, robot.number) > EXACT:
-        sketches = [kept_sketches(parts["sketches"], each.cell) for each in (robot, gravity)]
-        return Controlled(RatioOfSketches(*(each[EFFECT, effect] for each in sketches)), n)
-    above, linear_above = _kept(robot, effect, parts["estimates"])
-    below, linear_below = _kept(gravity, effect, parts["estimates"])
+    n = min(gravity.statistics.converged, robot.statistics.converged)
+    above, linear_above = _sigmas(robot, effect)
+    below, linear_below = _sigmas(gravity, effect)
     ratio = above[:n] / below[:n]
     numerator, denominator = robot.control, gravity.control
     if numerator is None or denominator is None:
@@ -166,46 +153,14 @@ def _ratio(
     )
 
 
-def _kept(of: _Calibrations, effect: str, estimates: Sequence[str | Path]) -> tuple[Array, Array]:
-    """Sigma of an effect in the kept calibrations that converged, and by linear theory."""
-    followed, values = of.statistics.followed, []
+def _sigmas(of: _Calibrations, effect: str) -> tuple[Array, Array]:
+    """Sigma of an effect in the calibrations that converged, and by linear theory."""
+    followed, (simulated, linear) = of.statistics.followed, of.replicates
     column = followed.keys.index((EFFECT, effect))
-    for simulated, linear in kept_pairs(estimates, of.cell, of.control):
-        own = followed.values(simulated)[:, column]
-        theory = own if linear is None else followed.values(linear)[simulated.converged, column]
-        values.append((own, theory))
-    own, theory = zip(*values, strict=True)
-    return np.concatenate(own), np.concatenate(theory)
-
-
-class RatioOfSketches:
-    """Ratio of two independent quantities that have sketches; within 0.2 %."""
-
-    def __init__(self, above: Sketch, below: Sketch) -> None:
-        self.above = above
-        self.below, counts = below.occupied()
-        self.weights = counts / counts.sum()
-        above_values, _ = above.occupied()
-        self.ends = (
-            above_values.min() / self.below.max() / 2,
-            above_values.max() / self.below.min() * 2,
-        )
-
-    def share_below(self, values: ArrayLike) -> Array:
-        """Shares that are below given values."""
-        limits = np.multiply.outer(np.asarray(values, dtype=float), self.below)
-        return self.above.share_below(limits) @ self.weights
-
-    def quantile(self, probabilities: ArrayLike) -> Array:
-        """Quantiles."""
-        from scipy import optimize  # slow to import, and studies that keep replicates do without
-
-        wanted = np.asarray(probabilities, dtype=float)
-        each = [
-            optimize.brentq(lambda x, p=p: self.share_below(x) - p, *self.ends, rtol=1e-9)
-            for p in wanted.ravel()
-        ]
-        return np.reshape(each, wanted.shape)
+    own = followed.values(simulated)[:, column]
+    if linear is None:
+        return own, own
+    return own, followed.values(linear)[simulated.converged, column]
 
 
 def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:

@@ -30,7 +30,7 @@ def slips(evidence: Evidence) -> Iterable[Claim]:
         "says, and not with roll.",
     )
     gravity, robot = (
-        evidence.statistics[evidence.scheme, a].moments.redundancy for a in ("gravity", "robot")
+        evidence.statistics[evidence.scheme, a].redundancy for a in ("gravity", "robot")
     )
     yield Claim(
         "degree-of-freedom",

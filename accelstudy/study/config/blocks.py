@@ -18,8 +18,6 @@ from accelstudy.files.validation import (
     Interval,
     OneOrMore,
     Pitch,
-    RareReplicates,
-    RareShare,
     Rate,
     Replicates,
     Resamples,
@@ -150,16 +148,6 @@ class LevelingConfig(Block):
     )
     attitudes: Attitudes = Field(
         ATTITUDES, description="number of attitudes, spread evenly over these tilts"
-    )
-
-
-class RareConfig(Block):
-    """Rare tilt errors of every cell, by importance sampling."""
-
-    replicates: RareReplicates = Field(description="simulated calibrations per cell")
-    shares: OneOrMore[RareShare] = Field(
-        default=[1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
-        description="shares of the calibrations that leave more",
     )
 
 

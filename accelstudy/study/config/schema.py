@@ -39,7 +39,6 @@ from accelstudy.study.config.blocks import (
     NoiseConfig,
     Presets,
     Quantity,
-    RareConfig,
     SensitivityConfig,
 )
 
@@ -52,6 +51,13 @@ _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 class StudyConfig(Configuration):
     """A study."""
+
+    retired = {  # noqa: RUF012
+        "keep": "every calibration is stored in estimates/: leave it out",
+        "control": "linear theory is always the control variate: leave it out",
+        "rare": "quantiles of small shares, such as 1e-6, are in the table quantiles where "
+        "replicates are enough: leave it out",
+    }
 
     study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=LONGEST)] = Field(
         description="name; results go to results/<study>/"
@@ -80,20 +86,7 @@ class StudyConfig(Configuration):
     )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
     presets: Presets | None = Field(None, description="Table 1 of the paper")
-    control: Literal["linear", "none"] = Field(
-        "linear",
-        description="How estimates are made of the replicates: with linear theory as control "
-        "variate, or as plain averages",
-    )
-    keep: Literal["replicates", "summary"] = Field(
-        "replicates",
-        description="replicates: store every calibration in estimates/; summary: store none. Both "
-        "give all tables and figures; with summary, quantiles are right to 0.1 %",
-    )
     leveling: LevelingConfig = LevelingConfig()
-    rare: RareConfig | None = Field(
-        None, description="tilt errors that few calibrations leave, such as one in a million"
-    )
     sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
     angle_unit: Literal["gon", "deg"] | None = Field(
         None,

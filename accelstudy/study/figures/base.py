@@ -20,7 +20,7 @@ Draw: TypeAlias = "Callable[[Tables, StudyConfig], Figure]"
 
 TABLES = (
     *("cells", "summary", "correlations", "leveling", "quantiles"),
-    *("rare", "sensitivity", "shapley"),
+    *("sensitivity", "shapley"),
 )
 """Names of the tables that a figure may need."""
 

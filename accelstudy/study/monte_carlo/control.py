@@ -56,8 +56,8 @@ class Control:
 
     @classmethod
     def of(cls, cell: Cell, tilt: TiltError) -> Control | None:
-        """Return that of a cell; None if the cell wants none, or has no noise-free calibration."""
-        theory = cell.linear_theory if cell.control == "linear" else None
+        """Return the linear theory of a cell, or None if it has no calibration without noise."""
+        theory = cell.linear_theory
         if theory is None:
             return None
         return cls(theory, Followed.of(cell), tilt)

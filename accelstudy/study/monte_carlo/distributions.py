@@ -1,56 +1,47 @@
-"""Distributions over the calibrations of a cell: exact where they are kept, else from sketches.
-
-Files are read cell by cell, one row group at a time.
-"""
+"""Distributions over the calibrations of a cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import ArrayLike, NDArray
+from scipy import special
 
-from accelstudy.adjustment.calibration import Block
-from accelstudy.files.parquet import whole_parquet
-from accelstudy.files.tables import REMEDY
+from accelstudy.leveling.error import TiltError
 from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.followed import LINEAR, Distributed, cell_tilt_error
-from accelstudy.study.monte_carlo.moments import EDGES, PROBABILITIES, Node, Tree
-from accelstudy.study.monte_carlo.replicates import Pair, chunks
-from accelstudy.study.monte_carlo.sketch import (
-    RELATIVE_ERROR,
-    Key,
-    Sketch,
-    merged_sketches,
-)
+from accelstudy.study.monte_carlo.followed import Distributed, Followed, Key, cell_tilt_error
+from accelstudy.study.monte_carlo.replicates import Replicates, simulate
 from accelstudy.study.monte_carlo.statistics import LEAST, Estimates, Statistics
-from accelstudy.study.monte_carlo.summing import CellSketches, Summed
 
 Array = NDArray[np.float64]
 
-EXACT = 1_000_000
-"""Kept calibrations of a cell up to which quantiles are exact. Beyond, they come from sketches. The
-error of these is negligible against that of the simulation itself."""
+LOWER = (1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.025, 0.05, 0.25)
+PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
+"""Probabilities of the quantiles of a study."""
+_NORMAL = special.ndtri(PROBABILITIES)
+EDGES = special.ndtr((_NORMAL[1:] + _NORMAL[:-1]) / 2)
+"""Probabilities between them."""
 MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))
 """Mean absolute value of a standard normal variable."""
 ENOUGH = 10
 """Differences from which an sd is taken."""
 
 
-class Distribution(Protocol):
-    """A distribution, with quantiles."""
+def apart_by_quantile(differences: Array, expected: Array, edges: Array) -> Array:
+    """Sums of differences from linear theory, (3, b), by its quantiles; see `Controlled.apart`.
 
-    def quantile(self, probabilities: ArrayLike) -> Array:
-        """Quantiles, as `numpy.quantile` defines them."""
-
-    def share_below(self, values: ArrayLike) -> Array:
-        """Shares that are below given values."""
+    differences, expected : (R,), a quantity minus that of linear theory, and the latter
+    edges : (b − 1,), quantiles of linear theory at `EDGES`; NaN where they are not known
+    """
+    if not np.isfinite(edges).all():
+        return np.zeros((3, len(edges) + 1))
+    place = np.searchsorted(edges, expected)
+    powers = np.ones(len(place)), differences, differences**2
+    return np.stack([np.bincount(place, each, len(edges) + 1) for each in powers])
 
 
 class Sample:
@@ -81,28 +72,25 @@ class Controlled:
 
     Parameters
     ----------
-    plain : Distribution, of the converged calibrations
+    plain : Sample, of the converged calibrations
     count, failed : int, number of the converged calibrations, and of the others
     levels : (k,) array, probabilities of the quantiles, in order
-    linear : Distribution or None, of all replicates by linear theory
+    linear : Sample or None, of all replicates by linear theory
     known : (k,) array, its quantiles at the levels; NaN where they are not known
-    apart : (3, b) array, see `Moments.apart`
+    apart : (3, b) array
+        The number of converged replicates, Σ d and Σ d² of their differences d from linear theory,
+        by the quantile of linear theory next to them.
     inexact : (k,) array, relative errors of `known`
     """
 
-    plain: Distribution
+    plain: Sample
     count: int
     failed: int = 0
     levels: Array = field(default_factory=lambda: PROBABILITIES)
-    linear: Distribution | None = None
+    linear: Sample | None = None
     known: Array | None = None
     apart: Array | None = None
     inexact: Array | None = None
-
-    @property
-    def relative_error(self) -> float:
-        """Bound of the relative error of quantiles by the buckets of sketches."""
-        return RELATIVE_ERROR if isinstance(self.plain, Sketch) else 0.0
 
     def quantile(self, chosen: NDArray[np.int_]) -> Estimates:
         """Quantiles at some of the levels, by their number."""
@@ -158,49 +146,61 @@ class Controlled:
         return float(np.sqrt(max(square - total**2 / n, 0.0) / (n - 1))) if n > 1 else np.inf
 
 
-def cell_distributions(
-    parts: Mapping[str, Sequence[str | Path]],
-    statistics: Statistics,
-    distributed: Distributed,
-    control: Control | None,
+def distributions(
     cell: Cell,
+    replicates: Replicates,
+    control: Control | None,
+    tilt: TiltError,
+    levels: Array = PROBABILITIES,
 ) -> dict[Key, Controlled]:
     """Distributions of the quantities of a cell, and of the tilt error.
 
     Parameters
     ----------
-    parts : paths of `estimates` or, where they are not kept, of `sketches`
-    statistics : Statistics, with at least one calibration
-    distributed : Distributed, the quantities
-    control : Control or None
     cell : Cell
+    replicates : Replicates
+    control : Control or None
+    tilt : TiltError, of the calibrations of the cell
+    levels : probabilities of the quantiles
+
+    Returns
+    -------
+    dict of Controlled; empty if no calibration converged
     """
-    if "estimates" in parts and statistics.converged <= EXACT:
-        samples = _samples(kept_pairs(parts["estimates"], cell, control), distributed)
-        return _controlled(*samples, statistics, distributed, control)
-    if "estimates" in parts:
-        counted = CellSketches(distributed)
-        for pair in kept_pairs(parts["estimates"], cell, control):
-            counted.add(pair)
-        sketches = counted.by_key
-    else:
-        sketches = kept_sketches(parts["sketches"], cell)
-    plain = {key: sketches[key] for key in distributed.keys}
-    linear = {key: sketches.get((LINEAR + key[0], key[1])) for key in plain}
-    return _controlled(plain, linear, statistics, distributed, control)
-
-
-def simulated_distributions(
-    cell: Cell, seed: int, leveling: Mapping[str, Any], levels: Array = PROBABILITIES
-) -> tuple[Statistics, dict[Key, Controlled]]:
-    """Return what `simulated_cell` does, without the replicates."""
-    return simulated_cell(cell, seed, leveling, levels)[:2]
+    simulated, linear = replicates
+    converged = simulated.converged
+    count, failed = int(converged.sum()), int((~converged).sum())
+    if not count:
+        return {}
+    distributed = Distributed(Followed.of(cell), simulated.redundancy, tilt)
+    own = distributed.of(simulated)
+    samples = map(Sample, own.T)
+    if control is None or linear is None or len(converged) < LEAST:
+        pairs = zip(distributed.keys, samples, strict=True)
+        return {key: Controlled(each, count, failed, levels) for key, each in pairs}
+    theory = distributed.of(linear)
+    differences, expected = own - theory[converged], theory[converged]
+    edges = control.quantiles(EDGES, exact=False)
+    known, inexact = control.quantiles(levels), control.inexact(levels)
+    return {
+        key: Controlled(
+            sample,
+            count,
+            failed,
+            levels,
+            Sample(theory[:, i]),
+            known[i],
+            apart_by_quantile(differences[:, i], expected[:, i], edges[i]),
+            inexact[i],
+        )
+        for i, (key, sample) in enumerate(zip(distributed.keys, samples, strict=True))
+    }
 
 
 def simulated_cell(
     cell: Cell, seed: int, leveling: Mapping[str, Any], levels: Array = PROBABILITIES
-) -> tuple[Statistics, dict[Key, Controlled], Block]:
-    """Simulate a cell in memory.
+) -> tuple[Statistics, dict[Key, Controlled], Replicates]:
+    """Simulate a cell.
 
     Parameters
     ----------
@@ -213,134 +213,10 @@ def simulated_cell(
     -------
     statistics : Statistics
     distributions : dict of Controlled; empty if no calibration converged
-    replicates : Block, all of them
+    replicates : Replicates
     """
     tilt = cell_tilt_error(cell, leveling)
     control = Control.of(cell, tilt)
-    centre, drawn = chunks(cell, seed, 0, cell.n_chunks, control)
-    summed, tree, pairs = Summed(cell, control, tilt, centre), Tree(), []
-    for index, pair in drawn:
-        pairs.append(pair)
-        tree.add(Node(index, 1, summed.moments(pair)))
-    statistics = Statistics.of(cell, tree, control, tilt)
-    replicates = Block.joined(pair.simulated for pair in pairs)
-    if not statistics.converged:
-        return statistics, {}, replicates
-    samples = _samples(pairs, summed.distributed)
-    found = _controlled(*samples, statistics, summed.distributed, control, levels)
-    return statistics, found, replicates
-
-
-def _samples(
-    pairs: Iterable[Pair], distributed: Distributed
-) -> tuple[dict[Key, Sample], dict[Key, Sample | None]]:
-    """Values of the calibrations, and of linear theory."""
-    own, theory = [], []
-    for simulated, linear in pairs:
-        own.append(distributed.of(simulated))
-        if linear is not None:
-            theory.append(distributed.of(linear))
-    keys = distributed.keys
-    plain = dict(zip(keys, map(Sample, np.concatenate(own).T), strict=True))
-    if not theory:
-        return plain, dict.fromkeys(keys)
-    return plain, dict(zip(keys, map(Sample, np.concatenate(theory).T), strict=True))
-
-
-def _controlled(
-    plain: Mapping[Key, Distribution],
-    linear: Mapping[Key, Distribution | None],
-    statistics: Statistics,
-    distributed: Distributed,
-    control: Control | None,
-    levels: Array = PROBABILITIES,
-) -> dict[Key, Controlled]:
-    moments = statistics.moments
-    count, failed = moments.converged, moments.simulated - moments.converged
-    if control is None or moments.simulated < LEAST:
-        return {key: Controlled(plain[key], count, failed, levels) for key in distributed.keys}
-    known, inexact = control.quantiles(levels), control.inexact(levels)
-    return {
-        key: Controlled(
-            plain[key],
-            count,
-            failed,
-            levels,
-            linear[key],
-            known[i],
-            moments.apart[:, i],
-            inexact[i],
-        )
-        for i, key in enumerate(distributed.keys)
-    }
-
-
-def plain_sketches(distributions: Mapping[Key, Controlled]) -> dict[Key, Sketch]:
-    """Sketches of the calibrations and of linear theory, where distributions come from such."""
-    plain = {key: each.plain for key, each in distributions.items()}
-    linear = {(LINEAR + key[0], key[1]): each.linear for key, each in distributions.items()}
-    return {key: each for key, each in (plain | linear).items() if isinstance(each, Sketch)}
-
-
-def kept_pairs(
-    paths: Iterable[str | Path], cell: Cell, control: Control | None = None
-) -> Iterator[Pair]:
-    """Kept replicates of a cell, chunk by chunk.
-
-    Parameters
-    ----------
-    paths : files of estimates, in order; they may hold other cells too
-    cell : Cell
-    control : Control, optional
-
-    Returns
-    -------
-    iterator of Pair, whose `correlation_sum`, which is not kept, is NaN
-
-    Raises
-    ------
-    InputError
-        If a file is missing or damaged.
-    """
-    u = len(cell.parameter_units)
-    columns = ["estimate", "sigma_priori", "omega", "redundancy", "iterations", "converged"]
-    by_theory = [] if control is None else ["linear_estimate", "linear_omega"]
-    for rows in _row_groups(paths, cell.name, [*columns, *by_theory]):
-        each = {name: rows[name].to_numpy() for name in (*columns, *by_theory)}
-        block = Block(
-            estimates=each["estimate"].reshape(-1, u),
-            sigma_priori=each["sigma_priori"].reshape(-1, u),
-            omega=each["omega"][::u],
-            redundancy=int(each["redundancy"][0]),
-            iterations=each["iterations"][::u],
-            converged=each["converged"][::u],
-            correlation_sum=np.full((u, u), np.nan),
-        )
-        linear = None
-        if control is not None:
-            estimates = each["linear_estimate"].reshape(-1, u)
-            linear = control.kept(estimates, each["linear_omega"][::u])
-        yield Pair(block, linear)
-
-
-def kept_sketches(paths: Iterable[str | Path], cell: Cell) -> dict[Key, Sketch]:
-    """Sketches of a cell, merged from files of its parts; errors as in `kept_pairs`."""
-    return merged_sketches(_row_groups(paths, cell.name, ["quantity", "name", "bucket", "count"]))
-
-
-def _row_groups(
-    paths: Iterable[str | Path], cell: str, columns: Sequence[str]
-) -> Iterator[pa.Table]:
-    """Row groups of a cell; each row group holds one cell."""
-    for path in paths:
-        with whole_parquet(path, REMEDY) as file:
-            for number in range(file.num_row_groups):
-                if _cell_of(file, number) == cell:
-                    yield file.read_row_group(number, list(columns))
-
-
-def _cell_of(file: pq.ParquetFile, number: int) -> str:
-    statistics = file.metadata.row_group(number).column(0).statistics
-    if statistics is not None and statistics.has_min_max:
-        return str(statistics.min)
-    return str(file.read_row_group(number, ["cell"])["cell"][0])  # a name too long for statistics
+    replicates = simulate(cell, seed, control)
+    statistics = Statistics.of(cell, replicates, control, tilt)
+    return statistics, distributions(cell, replicates, control, tilt, levels), replicates

@@ -16,16 +16,15 @@ from accelstudy.basics.units import GON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.sketch import Key
 
 Array = NDArray[np.float64]
+Key = tuple[str, str]
+"""Quantity, and the name of what it is of."""
 
 ERROR, PRIORI, POSTERIORI, EFFECT = "error", "sd_priori", "sd_posteriori", "sd_of_effect"
 TILT = "tilt"
 """Quantities: of each parameter, of each effect (the mean of its parameters' sds a posteriori), and
 the rms over attitudes of the errors of roll and of pitch."""
-LINEAR = "linear_"
-"""What the name of a quantity begins with where it is that of linear theory."""
 ANGLES = ("roll", "pitch")
 TILTS = (*ANGLES, "both")
 """Names of the tilt errors that have quantiles: of each angle by itself, and of the larger of the

@@ -2,101 +2,175 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import islice
-from typing import NamedTuple
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
+from accelstudy.files.parquet import whole_parquet
+from accelstudy.files.tables import REMEDY
 from accelstudy.simulation.sessions import BLOCK
-from accelstudy.study.cell import CHUNK, Cell
+from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
 from accelstudy.study.monte_carlo.control import Control
 
 Array = NDArray[np.float64]
 
+_NAME = pa.dictionary(pa.int32(), pa.string())
 
-class Pair(NamedTuple):
-    """Replicates as they were simulated and as linear theory has them; None without a control."""
+ESTIMATES = pa.schema(
+    {
+        "cell": _NAME,
+        "replicate": pa.int64(),
+        "parameter": _NAME,
+        "unit": _NAME,
+        "truth": pa.float64(),
+        "estimate": pa.float64(),
+        "linear_estimate": pa.float64(),
+        "sigma_priori": pa.float64(),
+        "omega": pa.float64(),
+        "linear_omega": pa.float64(),
+        "redundancy": pa.int32(),
+        "iterations": pa.int32(),
+        "converged": pa.bool_(),
+    }
+)
+"""One row per cell, replicate and parameter, SI. Columns that follow from these are not stored: the
+error is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
+(`read_estimates` adds them). `linear_estimate` and `linear_omega` are those of linear theory of the
+same noise; null without a control. Columns that repeat within a replicate need next to no space."""
+
+
+class Replicates(NamedTuple):
+    """Calibrations as they were simulated and as linear theory has them; None without a control."""
 
     simulated: Block
     linear: Block | None
 
-    @classmethod
-    def joined(cls, pairs: Iterable[Pair]) -> Pair:
-        """Join replicates that follow each other."""
-        simulated, linear = zip(*pairs, strict=True)
-        controlled = linear[0] is not None
-        return cls(Block.joined(simulated), Block.joined(linear) if controlled else None)
 
-
-def blocks(
-    cell: Cell, seed: int, first: int, count: int, control: Control | None = None
-) -> Iterator[Pair]:
-    """Simulate and calibrate blocks of an estimable cell, one after another.
+def simulate(cell: Cell, seed: int, control: Control | None) -> Replicates:
+    """Simulate and calibrate all replicates of an estimable cell.
 
     Parameters
     ----------
     cell : Cell
     seed : int, of the study
-    first, count : int, number of the first block, from 0 on, and how many are asked for; there are
-        no more than `Cell.n_blocks`
-    control : Control, optional
+    control : Control or None
     """
     calibrate, angles = calibrator(cell), cell.conditions.uses_angles
     drawn = cell.ideal.draw_blocks(
         cell.noise,
         cell.replicates,
-        range(first, min(first + count, cell.n_blocks)),
+        range(cell.n_blocks),
         lambda block: np.random.default_rng(cell.seed(seed, block)),
         BLOCK,
         angles=angles,
     )
+    simulated, linear = [], []
     for errors, observed in drawn:
-        linear = None if control is None else control.block(errors, angles)
-        yield Pair(calibrate(cell.estimated_model, cell.conditions, observed), linear)
+        simulated.append(calibrate(cell.estimated_model, cell.conditions, observed))
+        if control is not None:
+            linear.append(control.block(errors, angles))
+    return Replicates(Block.joined(simulated), Block.joined(linear) if linear else None)
 
 
-def chunks(
-    cell: Cell, seed: int, first: int, count: int, control: Control | None
-) -> tuple[Array, Iterator[tuple[int, Pair]]]:
-    """Centre of the estimates, and number and content of chunks of an estimable cell.
+def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
+    """Rows of `ESTIMATES` of a cell."""
+    units = cell.parameter_units
+    simulated, linear = replicates
+    n_replicates, u = simulated.estimates.shape
+
+    def per_replicate(values: Any) -> Any:
+        return np.repeat(values, u)
+
+    def per_parameter(values: list[Any]) -> Any:
+        return np.tile(values, n_replicates)
+
+    columns = {
+        "cell": _coded(np.zeros(n_replicates * u), [cell.name]),
+        "replicate": per_replicate(np.arange(n_replicates)),
+        "parameter": _coded(per_parameter(list(range(u))), list(units)),
+        "unit": _coded(per_parameter(list(range(u))), list(units.values())),
+        "truth": per_parameter([*cell.true_values]),
+        "estimate": simulated.estimates.ravel(),
+        "linear_estimate": None if linear is None else linear.estimates.ravel(),
+        "sigma_priori": simulated.sigma_priori.ravel(),
+        "omega": per_replicate(simulated.omega),
+        "linear_omega": None if linear is None else per_replicate(linear.omega),
+        "redundancy": np.full(n_replicates * u, simulated.redundancy),
+        "iterations": per_replicate(simulated.iterations),
+        "converged": per_replicate(simulated.converged),
+    }
+    missing = pa.nulls(n_replicates * u, pa.float64())
+    whole = {name: missing if each is None else each for name, each in columns.items()}
+    return pa.table(whole, schema=ESTIMATES)
+
+
+def _coded(codes: Any, names: list[str]) -> pa.DictionaryArray:
+    return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array(names))
+
+
+def read_replicates(
+    paths: Iterable[str | Path], cell: Cell, control: Control | None
+) -> Replicates | None:
+    """Read the stored replicates of a cell; None if the files hold none of it.
 
     Parameters
     ----------
+    paths : files of estimates; they may hold other cells too
     cell : Cell
-    seed : int, of the study
-    first, count : int, number of the first chunk, and how many there are
     control : Control or None
 
     Returns
     -------
-    centre : (u,) array, near the mean of the estimates; the same whichever chunks are asked for
-    chunks : iterator of number and Pair
+    Replicates, whose `correlation_sum`, which is not stored, is NaN; or None
+
+    Raises
+    ------
+    InputError
+        If a file is missing or damaged.
     """
-    drawn = blocks(cell, seed, first * CHUNK, count * CHUNK, control)
-    opening = list(islice(drawn, CHUNK))
+    columns = ["estimate", "sigma_priori", "omega", "redundancy", "iterations", "converged"]
+    if control is not None:
+        columns += ["linear_estimate", "linear_omega"]
+    tables = []
+    for path in paths:
+        with whole_parquet(path, REMEDY) as file:
+            groups = [i for i in range(file.num_row_groups) if _cell_of(file, i) == cell.name]
+            tables += [file.read_row_group(i, columns) for i in groups]
+    if not tables:
+        return None
+    rows, u = pa.concat_tables(tables), len(cell.parameter_units)
 
-    def each() -> Iterator[tuple[int, Pair]]:
-        yield first, Pair.joined(opening)
-        for index in range(first + 1, first + count):
-            yield index, Pair.joined(islice(drawn, CHUNK))
+    def per_parameter(name: str) -> Any:
+        return rows[name].to_numpy().reshape(-1, u)
 
-    pilot = blocks(cell, seed, 0, CHUNK, control) if first else opening
-    return _pilot_mean(cell, control, pilot), each()
+    def per_replicate(name: str) -> Any:
+        return rows[name].to_numpy()[::u]
+
+    simulated = Block(
+        estimates=per_parameter("estimate"),
+        sigma_priori=per_parameter("sigma_priori"),
+        omega=per_replicate("omega"),
+        redundancy=int(rows["redundancy"][0].as_py()),
+        iterations=per_replicate("iterations"),
+        converged=per_replicate("converged"),
+        correlation_sum=np.full((u, u), np.nan),
+    )
+    if control is None:
+        return Replicates(simulated, None)
+    linear = control.kept(per_parameter("linear_estimate"), per_replicate("linear_omega"))
+    return Replicates(simulated, linear)
 
 
-def _pilot_mean(cell: Cell, control: Control | None, pilot: Iterable[Pair]) -> Array:
-    """Mean of the estimates in the first block of a cell in which a calibration converged, (u,).
-
-    It is the truth if no calibration of the first chunk converged.
-    """
-    for block, linear in pilot:
-        if block.converged.any():
-            estimates = block.estimates[block.converged]
-            if control is not None and linear is not None and block.converged.all():
-                return control.theory.reference + (estimates - linear.estimates).mean(axis=0)
-            return np.asarray(estimates.mean(axis=0))
-    return cell.true_values
+def _cell_of(file: pq.ParquetFile, number: int) -> str:
+    """Cell of a row group; each row group holds one."""
+    statistics = file.metadata.row_group(number).column(0).statistics
+    if statistics is not None and statistics.has_min_max:
+        return str(statistics.min)
+    return str(file.read_row_group(number, ["cell"])["cell"][0])  # a name too long for statistics

@@ -1,4 +1,4 @@
-"""Statistics of the calibrations of a cell, from all its chunks.
+"""Statistics of the calibrations of a cell.
 
 Means are estimated with linear theory as control variate (Owen, *Monte Carlo theory, methods and
 examples*, ch. 8). With the number x of a calibration, the number y of linear theory of the same
@@ -12,18 +12,16 @@ Where calibrations fail, x is that of the others and y that of all: the mean is 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import Any
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.files.parquet import read_parquet
-from accelstudy.files.tables import REMEDY
+from accelstudy.adjustment.calibration import Block
 from accelstudy.leveling.error import TiltError
+from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.cell import Cell
 from accelstudy.study.monte_carlo.averaged import (
     CORRELATION,
@@ -35,13 +33,7 @@ from accelstudy.study.monte_carlo.averaged import (
 )
 from accelstudy.study.monte_carlo.control import Control
 from accelstudy.study.monte_carlo.followed import ERROR, Followed
-from accelstudy.study.monte_carlo.moments import (
-    PROBABILITIES,
-    Moments,
-    Tree,
-    paired_moments,
-    read_nodes,
-)
+from accelstudy.study.monte_carlo.replicates import Replicates
 
 Array = NDArray[np.float64]
 
@@ -49,6 +41,8 @@ ROUNDING = 1e-24
 """Variances below this share of that of plain averages are rounding."""
 LEAST = 20
 """Replicates from which on a coefficient is estimated; fewer are only averaged."""
+AT_ONCE = 20 * BLOCK
+"""Replicates whose numbers are in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -83,29 +77,84 @@ class Estimates:
         return Estimates(self.value * factor, self.error * factor, self.gain, self.plain * factor)
 
 
+class Moments(NamedTuple):
+    """Means and squares of R numbers x of calibrations and of the same numbers y of linear theory.
+
+    Attributes
+    ----------
+    size : int, R; x is 0 where a calibration did not converge, y is 0 without linear theory
+    difference, linear : (k,) arrays, means of x − y and of y
+    squares : (3, k) array, Σ of (x − y)², (x − y) y and y² about the means
+    linear_converged : (k,) array, Σ y over the converged replicates
+    """
+
+    size: int
+    difference: Array
+    linear: Array
+    squares: Array
+    linear_converged: Array
+
+    @classmethod
+    def of(cls, x: Array, y: Array, converged: NDArray[np.bool_]) -> Moments:
+        """Sum up numbers (R, k)."""
+        apart, n = x - y, max(len(x), 1)
+        difference, linear = apart.sum(axis=0) / n, y.sum(axis=0) / n
+        apart -= difference
+        centred = y - linear
+        pairs = (apart, apart), (apart, centred), (centred, centred)
+        squares = np.stack([np.einsum("rk,rk->k", *pair) for pair in pairs])
+        return cls(len(x), difference, linear, squares, y[converged].sum(axis=0))
+
+    def merged(self, later: Moments) -> Moments:
+        """Merge with the moments of other replicates (Chan, Golub & LeVeque 1983)."""
+        weight = later.size / (self.size + later.size)
+        steps = later.difference - self.difference, later.linear - self.linear
+        outer = np.stack([steps[0] * steps[0], steps[0] * steps[1], steps[1] * steps[1]])
+        return Moments(
+            self.size + later.size,
+            self.difference + weight * steps[0],
+            self.linear + weight * steps[1],
+            self.squares + later.squares + (weight * self.size) * outer,
+            self.linear_converged + later.linear_converged,
+        )
+
+
 @dataclass(frozen=True)
 class Statistics:
-    """The calibrations of a cell, summed up.
+    """Statistics of the calibrations of a cell.
 
     Attributes
     ----------
     averaged : Averaged, the numbers of which there are means
-    moments : Moments, of all calibrations
+    block : Block, the calibrations; None of a cell that was not simulated
+    moments : Moments, of `averaged`
     known : (k,) array, means of the numbers by linear theory, NaN where it does not know them; None
         without a control
     """
 
     averaged: Averaged
+    block: Block | None
     moments: Moments
     known: Array | None
 
     @classmethod
-    def of(cls, cell: Cell, tree: Tree, control: Control | None, tilt: TiltError) -> Statistics:
-        """Return those of a cell from the moments of all its chunks."""
-        moments = tree.total
-        averaged = Averaged(Followed.of(cell), moments.centre, cell.estimability.cofactors, tilt)
+    def of(
+        cls, cell: Cell, replicates: Replicates, control: Control | None, tilt: TiltError
+    ) -> Statistics:
+        """Return the statistics of the replicates of a cell."""
+        simulated, linear = replicates
+        centre = _pilot_mean(cell, replicates, control)
+        averaged = Averaged(Followed.of(cell), centre, cell.estimability.cofactors, tilt)
+
+        def moments(first: int) -> Moments:
+            rows = slice(first, first + AT_ONCE)
+            x = averaged.of(simulated.rows(rows))
+            y = np.zeros_like(x) if linear is None else averaged.of(linear.rows(rows))
+            return Moments.of(x, y, simulated.converged[rows])
+
+        each = map(moments, range(0, len(simulated.converged), AT_ONCE))
         known = None if control is None else control.means(averaged)
-        return cls(averaged, moments, known)
+        return cls(averaged, simulated, reduce(Moments.merged, each), known)
 
     @classmethod
     def of_none(cls, cell: Cell) -> Statistics:
@@ -113,20 +162,8 @@ class Statistics:
         followed = Followed.of(cell)
         u = len(followed.units)
         averaged = Averaged(followed, followed.truth, np.full((u, u), np.nan), None)
-        k, nan = averaged.count, np.full(len(followed.keys), np.nan)
-        empty = np.zeros((0, k)), np.zeros((0, k)), np.zeros(0, bool)
-        apart = np.zeros((3, 0, len(PROBABILITIES)))
-        moments = Moments(
-            0,
-            0,
-            0,
-            followed.truth,
-            **paired_moments(*empty),
-            apart=apart,
-            correlation_sum=np.zeros((u, u)),
-            first=nan,
-        )
-        return cls(averaged, moments, None)
+        empty = np.zeros((0, averaged.count))
+        return cls(averaged, None, Moments.of(empty, empty, np.zeros(0, bool)), None)
 
     @property
     def followed(self) -> Followed:
@@ -136,17 +173,31 @@ class Statistics:
     @property
     def control(self) -> str:
         """Which control variate the estimates have: `linear` or `none`."""
-        controlled = self.known is not None and self.moments.simulated >= LEAST
+        controlled = self.known is not None and self.simulated >= LEAST
         return "linear" if controlled else "none"
 
     @property
+    def simulated(self) -> int:
+        """Number of simulated calibrations."""
+        return self.moments.size
+
+    @cached_property
     def converged(self) -> int:
         """Number of calibrations that converged."""
-        return self.moments.converged
+        return 0 if self.block is None else int(self.block.converged.sum())
+
+    @property
+    def redundancy(self) -> int:
+        """Redundancy of a calibration; 0 of a cell that was not simulated."""
+        return 0 if self.block is None else self.block.redundancy
 
     def first(self, quantity: str) -> Array:
         """A quantity of `Followed` in the first calibration that converged, (u,) or (e,)."""
-        return self.moments.first[self.followed.columns(quantity)]
+        columns = self.followed.columns(quantity)
+        if self.block is None or not self.converged:
+            return np.full(len(self.followed.keys), np.nan)[columns]
+        first = int(np.argmax(self.block.converged))
+        return self.followed.values(self.block.rows(slice(first, first + 1)))[0, columns]
 
     def mean(self, quantity: str) -> Estimates:
         """Means of a quantity of `Averaged`, SI; NaN without calibrations.
@@ -176,7 +227,9 @@ class Statistics:
     @property
     def mean_correlation(self) -> Array:
         """Mean of the correlations from Σ_xx, (u, u)."""
-        return self.moments.correlation_sum / (self.converged or np.nan)
+        u = len(self.followed.units)
+        total = np.zeros((u, u)) if self.block is None else self.block.correlation_sum
+        return total / (self.converged or np.nan)
 
     @property
     def correlation(self) -> Estimates:
@@ -231,7 +284,7 @@ class Statistics:
     def _means(self) -> Estimates:
         """Means of all numbers, (k,)."""
         m = self.moments
-        n, converged = m.simulated, m.converged
+        n, converged = m.size, self.converged
         if not converged:
             return Estimates(*np.full((4, len(m.linear)), np.nan))
         share = converged / n
@@ -257,15 +310,18 @@ class Statistics:
         return Estimates(value, error, gain, plain)
 
 
-def read_trees(paths: Iterable[str | Path], cells: Iterable[str]) -> dict[str, Tree]:
-    """Moments of cells from the files of their parts, in order, by name of the cell.
+def _pilot_mean(cell: Cell, replicates: Replicates, control: Control | None) -> Array:
+    """Mean of the estimates in the first block of a cell in which a calibration converged, (u,).
 
-    Cells that were not simulated are not in it.
+    It is the truth if none of the first replicates converged.
     """
-    wanted = set(cells)
-    trees: dict[str, Tree] = {}
-    for path in paths:
-        for name, node in read_nodes(read_parquet(path, REMEDY)):
-            if name in wanted:
-                trees.setdefault(name, Tree()).add(node)
-    return trees
+    simulated, linear = replicates
+    for first in range(0, min(len(simulated.converged), AT_ONCE), BLOCK):
+        rows = slice(first, first + BLOCK)
+        converged = simulated.converged[rows]
+        if converged.any():
+            estimates = simulated.estimates[rows][converged]
+            if control is not None and linear is not None and converged.all():
+                return control.theory.reference + (estimates - linear.estimates[rows]).mean(axis=0)
+            return np.asarray(estimates.mean(axis=0))
+    return cell.true_values
