@@ -9,11 +9,10 @@ from typing import Annotated, Any, Literal, Self, TypeVar, cast
 from pydantic import BaseModel, Field, model_validator
 
 from accelstudy.basics.errors import InputError
-from accelstudy.data_sheets import data_sheet_names, of_sigma
+from accelstudy.data_sheets import of_sigma
 from accelstudy.files.validation import (
     Block,
     Configuration,
-    OneOrMore,
     PathName,
     Replicates,
     Seed,
@@ -71,36 +70,26 @@ class PlanCase(Block):
 
 
 class PlanConfig(Block):
-    """The plans, and the sensors that are compared."""
+    """The plans."""
 
+    retired = {  # noqa: RUF012
+        "sensors": "plan each sensor as a case of its own, with sensor: NAME, and leave it out"
+    }
     cases: dict[PathName, PlanCase] = Field(default_factory=dict, description="name: question")
-    sensors: OneOrMore[str] = Field(
-        default=["all"], description="data sheets that are compared: names, files, or all"
-    )
     replicates: Replicates = Field(200, description="simulated calibrations of each at the top")
-
-    @model_validator(mode="after")
-    def _sensors_exist(self) -> Self:
-        try:
-            for name in self.chosen_sensors:
-                get_sensor(name)
-        except InputError as error:
-            raise ValueError(f"sensors: {error}") from None
-        return self
-
-    @property
-    def chosen_sensors(self) -> list[str]:
-        """Names and paths of the data sheets."""
-        return list(data_sheet_names()) if self.sensors == ["all"] else list(self.sensors)
 
 
 Section = TypeVar("Section", bound=BaseModel)
-SECTIONS = ("plan", "designs", "sequential", "pole", "field")
+SECTIONS = ("plan", "designs", "sequential", "pole")
 """Each has rules in `workflow/rules/` under its name."""
 
 
 class Example(Configuration):
     """The sections of a run; results go to ``results/<study>``."""
+
+    retired = {  # noqa: RUF012
+        "field": "`accelstudy plan` says what is left in use; leave it out"
+    }
 
     study: PathName = Field(description="name; results go to results/<study>/")
     seed: Annotated[Seed, Field(description="of all random numbers")] = 1
@@ -108,7 +97,6 @@ class Example(Configuration):
     designs: dict[str, Any] = Field(default_factory=dict, description="optimal schemes")
     sequential: dict[str, Any] = Field(default_factory=dict, description="one position at a time")
     pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
-    field: dict[str, Any] = Field(default_factory=dict, description="what limits a sensor in use")
 
     @model_validator(mode="after")
     def _has_a_section(self) -> Self:

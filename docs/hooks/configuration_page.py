@@ -5,7 +5,6 @@ from schemas import blocks
 
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
-from accelstudy.field.config import FieldConfig
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.real_noise import RealNoiseConfig
 from accelstudy.planning.config import Example, PlanConfig
@@ -19,7 +18,6 @@ SECTIONS = {
     "designs": DesignsConfig,
     "sequential": SequentialConfig,
     "pole": PoleConfig,
-    "field": FieldConfig,
 }
 """Sections of the example of plans."""
 

@@ -48,11 +48,9 @@ OF_STUDIES = {
 """Pictures of the pages of a study."""
 DRAWN = {
     "plan": ("make plan-example", "accelstudy/planning/figure.py"),
-    "plan-sensors": ("make plan-example", "accelstudy/planning/comparison.py"),
     "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
     "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
     "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),
-    "field-adxl355": ("make plan-example", "accelstudy/field/figure.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in

@@ -9,9 +9,8 @@ from snakemake_helpers import jobs, one_line, run_workflow
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.field import config as field
 from accelstudy.files.reading import read_layer
-from accelstudy.files.tables import read_origin, read_table
+from accelstudy.files.tables import read_origin
 from accelstudy.planning.config import PlanConfig, parse_example, parse_section
 from accelstudy.pole import output as pole
 from accelstudy.pole.config import PoleConfig
@@ -21,7 +20,6 @@ from accelstudy.sequential.simulation import SetUp
 CLASSES = {
     "plan": PlanConfig,
     "pole": PoleConfig,
-    "field": field.FieldConfig,
     "sequential": SequentialConfig,
 }
 
@@ -41,7 +39,8 @@ def case(section, content):
     ("plam", {}, "file: plam: unknown key; did you mean 'plan'?"),
     ("study", "a/b", "file: study: "),
     ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key; did you"),
-    ("plan", {"sensors": "adxl35"}, "did you mean 'adxl355'?"),
+    ("plan", {"sensors": "all"}, "file: plan.sensors: no longer a key; plan each sensor as a case"),
+    ("field", {}, "file: field: no longer a key; `accelstudy plan` says"),
     ("plan", 5, "file: plan: "),
     ("sequential", {"approaches": "robots"}, "unknown approach 'robots'; did you mean 'robot'?"),
     ("sequential", {"rules": ["bounds"]}, "unknown rule 'bounds'; did you mean 'bound'?"),
@@ -71,11 +70,6 @@ def test_a_section_that_cannot_be_used_is_said_in_a_line(section, content, messa
     ("pole", {"hold": "2m"}, "mine: hold: '2m': the unit must be one of"),
     ("pole", {"calibration": "c.json", "hold": "2s"}, "calibration and hold exclude each"),
     ("pole", {"tilt_sigma": "10"}, "mine: tilt_sigma: expected a number with its unit"),
-    ("field", {"sensor": "adxl35"}, "file: field.cases.mine: sensor: unknown sensor 'adxl35'"),
-    ("field", {"age": "8"}, "mine: age: expected a number with its unit"),
-    ("field", {"temperature_change": "300K"}, "mine: temperature_change: '300K': must be"),
-    ("field", {"pitch_gon": [90]}, "file: field.cases.mine.pitch_gon.0: "),
-    ("field", {"restart": True}, "mine.restart: unknown key; did you mean 'restarted'?"),
 ])  # fmt: skip
 def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message):
     with refused(message):
@@ -83,9 +77,11 @@ def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message)
 
 
 def test_the_workflow_says_it_too(tmp_path):
-    result = run_workflow("plan", tmp_path, {"study": "tiny", "plan": {"sensors": ["adxl35"]}})
+    result = run_workflow(
+        "plan", tmp_path, {"study": "tiny", "plan": {"cases": {"a": {"sensor": "adxl35"}}}}
+    )
     assert result.returncode == 1
-    one_line(result.stdout, "tiny.yaml: plan.sensors: unknown sensor 'adxl35'")
+    one_line(result.stdout, "tiny.yaml: plan.cases.a: sensor: unknown sensor 'adxl35'")
     assert not (tmp_path / "results").exists()
 
 
@@ -104,10 +100,6 @@ def test_a_fixed_scheme_must_determine_the_model():
         _ = SetUp(SequentialConfig(instead_of="faces-6"), "gravity", "known", 1.0).promise
 
 
-def test_the_sensors_of_the_example_can_be_used():
-    assert of_example("plan").chosen_sensors
-
-
 def test_the_pole_of_the_example_is_worked_out(tmp_path, monkeypatch):
     monkeypatch.setattr(pole, "save", lambda *_: "")
     station = of_example("pole").cases["total-station"].model_copy(update={"replicates": 10})
@@ -123,21 +115,3 @@ def test_a_pole_takes_sigmas_of_roll_and_pitch_and_files_of_ones_own():
     sensor = case("pole", {"tilt_sigma": "10mgon"}).calibrated_sensor()
     assert sensor.tilt_sigma == pytest.approx(10 * MGON)
     assert case("pole", {"calibration": "c.json"}).files == ["c.json"]
-
-
-def test_the_field_of_the_example_is_worked_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(field, "save", lambda *_: "")
-    sensor = of_example("field").cases["adxl355"]
-    level = sensor.model_copy(update={"roll_gon": [0], "pitch_gon": [0]})
-    level.write(tmp_path, {"config_hash": "abc", "seed": 3})
-    use = read_table(tmp_path / "shares.parquet").query("over == 'use'")
-    assert use[["hours", "kelvin"]].drop_duplicates().to_numpy().tolist() == [[8, 10]]
-    # Ten kelvins leave nothing to improve in the calibration.
-    shares = use.groupby(["output", "source"])["shapley_effect"].sum()
-    assert shares["roll", "temperature"] > 0.99
-
-
-def test_a_field_is_the_usual_use_unless_it_says_otherwise():
-    assert field.FieldCase().use == field.Use()
-    said = field.FieldCase(age="2h", restarted=False)
-    assert said.use == field.Use(age=7200.0, restarted=False)

@@ -2,10 +2,7 @@ from accelstudy.planning.config import PlanConfig
 
 PLAN = section(EXAMPLE, "plan", PlanConfig, SOURCE)
 PLAN_FILES = ["plan.parquet", "plan.md", "plan.svg", "plan.png", "positions.yaml", "study.yaml"]
-OUTPUTS += [
-    *[f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES],
-    *[f"{RESULTS}/plan/sensors.{kind}" for kind in ("parquet", "svg", "png")],
-]
+OUTPUTS += [f"{RESULTS}/plan/cases/{name}/{path}" for name in PLAN.cases for path in PLAN_FILES]
 
 
 rule plan:
@@ -30,28 +27,3 @@ rule plan:
         "Plan the calibration {wildcards.plan}"
     script:
         "../scripts/plan.py"
-
-
-rule plan_sensors:
-    output:
-        table=f"{RESULTS}/plan/sensors.parquet",
-        svg=f"{RESULTS}/plan/sensors.svg",
-        png=f"{RESULTS}/plan/sensors.png",
-    log:
-        f"{RESULTS}/logs/plan/sensors.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plan/sensors.tsv"
-    conda:
-        "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
-    params:
-        sensors=PLAN.chosen_sensors,
-        seed=EXAMPLE.seed,
-        angle_unit=angle_unit(),
-        code=code_of("plan_sensors"),
-    message:
-        "Compare the sensors"
-    script:
-        "../scripts/plan_sensors.py"
