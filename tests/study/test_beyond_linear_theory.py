@@ -52,7 +52,6 @@ def test_what_differs_from_zero_is_a_number_and_the_rest_a_limit(empirical):
 def test_it_is_drawn_where_linear_theory_knows_what_is_simulated():
     assert NAME in figure_names(make_study())
     without = [
-        {"control": "none"},
         {"noise": {"effects": ["heavy_tails(nu=3)"]}},
         {"simulated_effects": ["bias", "scale"]},
     ]
@@ -62,7 +61,7 @@ def test_it_is_drawn_where_linear_theory_knows_what_is_simulated():
 
 def test_at_the_noise_that_it_shows_linear_theory_is_off_by_one_percent(tmp_path):
     def simulated(sigma, seed):
-        keys = {"seed": seed, "keep": "summary", "leveling": {"attitudes": 10}}
+        keys = {"seed": seed, "leveling": {"attitudes": 10}}
         cells = grid(replicates=REPLICATES, approaches="gravity", sensor_sigma_mps2=sigma)
         return run_study(tmp_path / str(seed), grids=[cells], **keys)
 

@@ -116,9 +116,11 @@ def test_coverage_of_the_confidence_intervals(summary):
     assert abs(known["coverage_95"].mean() - 0.95) < STANDARD_ERRORS * single / np.sqrt(cells)
 
 
-def test_wilson_interval_of_the_coverage(tmp_path):
-    tables = run_study(tmp_path, grids=[grid(replicates=500, approaches="robot")], control="none")
-    row = of(tables["summary"], f"{MCLAREN}/robot").loc["b_x"]
+def test_wilson_interval_of_the_coverage():
+    """Of plain averages."""
+    inside = Estimates(*(np.array([x]) for x in (0.93, 1e-2, 1.0, 0.93)))
+    statistics = SimpleNamespace(converged=500, redundancy=3, inside=inside)
+    row = module_of_tables._coverage(statistics, 0)
     p, n, z = row["coverage_95"], 500, 1.959964
     centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
@@ -129,8 +131,7 @@ def test_wilson_interval_of_the_coverage(tmp_path):
 def test_a_coverage_that_rounds_to_more_than_one():
     """A mean of ones is made of differences and of linear theory's, each rounded."""
     inside = Estimates(*(np.array([x]) for x in (0.95, 1e-4, 9.0, np.nextafter(1, 2))))
-    moments = SimpleNamespace(redundancy=3)
-    statistics = SimpleNamespace(converged=30, moments=moments, inside=inside)
+    statistics = SimpleNamespace(converged=30, redundancy=3, inside=inside)
     row = module_of_tables._coverage(statistics, 0)
     assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
     assert row["coverage_95_se"] == 0

@@ -12,7 +12,7 @@ from accelstudy.jobs.code import code_files, code_hash
 
 PACKAGE = Path(accelstudy.__file__).parent
 SCRIPTS = {path.stem: path for path in (ROOT / "workflow" / "scripts").glob("*.py")}
-STAGES = {"simulate", "summarise", "sensitivity", "claims", "figures", "calibrate", "overview"}
+STAGES = {"simulate", "sensitivity", "claims", "figures", "calibrate", "overview"}
 BUT_OVERVIEW = STAGES - {"overview"}
 
 
