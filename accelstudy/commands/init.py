@@ -16,19 +16,16 @@ if TYPE_CHECKING:
 
 @click.command(
     "init",
-    epilog=example(
-        "accelstudy init my-study", "accelstudy init my-plan --template plan --sensor adxl355"
-    ),
+    epilog=example("accelstudy init my-study", "accelstudy init mine --sensor adxl355"),
 )
 @click.argument("folder", type=PATH)
 @click.option(
     "--template",
     type=Name("template", "accelstudy.study.new_study", "TEMPLATES"),
-    metavar="[study|campaigns|diagnose|plan]",
+    metavar="[study|campaigns]",
     default="study",
     show_default=True,
-    help="What to set up: a study, a batch of campaigns, a hidden effect that is simulated and "
-    "diagnosed, or a plan.",
+    help="What to set up: a study, or a batch of campaigns.",
 )
 @click.option(
     "--sensor",
@@ -48,9 +45,11 @@ def init_command(folder: Path, template: str, sensor: str | None, force: bool) -
     """
     from importlib.util import find_spec
 
-    from accelstudy.basics.errors import UnknownNameError
-    from accelstudy.study.new_study import TEMPLATES, new_study
+    from accelstudy.basics.errors import InputError, UnknownNameError
+    from accelstudy.study.new_study import RETIRED, TEMPLATES, new_study
 
+    if template in RETIRED:
+        raise InputError(f"--template {template}: no longer a template; {RETIRED[template]}")
     if template not in TEMPLATES:
         raise UnknownNameError("template", template, TEMPLATES)
     name = new_study(folder, template, _sensor(sensor), force)
@@ -63,7 +62,7 @@ def init_command(folder: Path, template: str, sensor: str | None, force: bool) -
 
 def _sensor(given: str | None) -> NewSensor | None:
     """Read the sensor from a data sheet or a campaign."""
-    from accelstudy.data_sheets import data_sheet_names, get_data_sheet
+    from accelstudy.data_sheets import get_data_sheet
     from accelstudy.planning.question import USUAL_HOLD
     from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
 
@@ -71,8 +70,6 @@ def _sensor(given: str | None) -> NewSensor | None:
         return None
     if Path(given).is_dir():
         return _sensor_of_campaign(Path(given))
-    from accelstudy.data_sheets.measured import yaml_of
-
     sheet = get_data_sheet(given)
     errors: dict[str, tuple[float, ...]] = dict(OF_THE_PAPER)
     source = {}
@@ -87,7 +84,6 @@ def _sensor(given: str | None) -> NewSensor | None:
         noise=f"{mean}, by the data sheet {sheet.name}",
         errors=errors,
         source=source,
-        sheet=given if given in data_sheet_names() else yaml_of(sheet),
     )
 
 
@@ -95,7 +91,7 @@ def _sensor_of_campaign(folder: Path) -> NewSensor:
     """Calibrate a campaign, and take what was found for the truth."""
     from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
     from accelstudy.campaign.format import read_campaign
-    from accelstudy.data_sheets.measured import sheet_of_campaign, yaml_of
+    from accelstudy.data_sheets.measured import sheet_of_campaign
     from accelstudy.sensors.models import get_model
     from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
 
@@ -114,9 +110,6 @@ def _sensor_of_campaign(folder: Path) -> NewSensor:
         gravity=campaign.gravity,
         errors=errors,
         source=dict.fromkeys(OF_THE_PAPER, f"as the calibration of {campaign.name} finds them"),
-        positions=campaign.n_positions,
-        approach=approach.name,
-        sheet=yaml_of(sheet),
         campaign=folder,
         **robot,
     )

@@ -23,12 +23,13 @@ TEMPLATE = Path(__file__).with_name("template")
 TEMPLATES = {
     "study": "A Monte Carlo study of accelerometer calibrations",
     "campaigns": "A batch of measured campaigns",
-    "diagnose": "A hidden effect, simulated and diagnosed",
-    "plan": "A plan of calibrations for a tilt accuracy",
 }
 """What may be set up, and what it is."""
-SHEET = "sensor.yaml"
-"""File of the sensor in the new folder."""
+RETIRED = {
+    "plan": "`accelstudy plan` needs no folder",
+    "diagnose": "`accelstudy simulate-campaign` and `accelstudy diagnose` need no folder",
+}
+"""Templates of earlier versions, and what takes their place."""
 UNITS = {"bias": ("m/s^2", 1.0), "scale": ("ppm", 1e-6), "nonorthogonality": ("mgon", MGON)}
 """Unit of the true errors in a configuration, and its size in SI."""
 OF_THE_PAPER = {
@@ -50,9 +51,6 @@ class NewSensor:
     gravity : float
     errors : dict of the name of an effect to the true values of its parameters
     source : dict of the name of an effect to where its values come from
-    positions : int, of a session
-    approach : str
-    sheet : str, name of its data sheet, or its content as YAML
     campaign : Path of its campaign, if there is one
     """
 
@@ -62,9 +60,6 @@ class NewSensor:
     gravity: float = STANDARD_GRAVITY
     errors: dict[str, tuple[float, ...]] = field(default_factory=lambda: dict(OF_THE_PAPER))
     source: dict[str, str] = field(default_factory=dict)
-    positions: int = 36
-    approach: str = "robot"
-    sheet: str = "paper"
     campaign: Path | None = None
 
     def shown(self) -> dict[str, Any]:
@@ -86,9 +81,6 @@ class NewSensor:
             "sigma_mgon": _number(self.sigma_angle / MGON),
             "gravity": _number(self.gravity, 9),
             "effects": effects,
-            "scheme": f"fibonacci-{self.positions}",
-            "approach": self.approach,
-            "sheet": SHEET if "\n" in self.sheet else self.sheet,
             "campaign": None if self.campaign is None else str(self.campaign.resolve()),
         }
 
@@ -143,8 +135,6 @@ def new_study(
                 file.write(f"\n{yaml.safe_dump(named)}")
         for source in sorted(shipped("profiles").glob("*/*.yaml")):
             _write(new / "profiles" / source.parent.name / source.name, source.read_text("utf-8"))
-        if template == "plan" and "\n" in sensor.sheet:
-            _write(new / SHEET, sensor.sheet)
         if template == "campaigns" and sensor.campaign is None:
             write_campaign(_example(sensor), new / "campaigns" / "example")
     return name
