@@ -29,8 +29,7 @@ from accelstudy.commands.options import PATH, angle_unit_option, example, force_
 def public_command(name: str | None, out: Path | None, folder: Path, force: bool) -> None:
     """Make a campaign of public data, or list what there is.
 
-    NAME is that of the data; without it they are listed. A download is checked by its sha256, and
-    goes on where an earlier one broke off.
+    NAME is that of the data; without it they are listed. A download is checked by its sha256.
     """
     from accelstudy.campaign.importing.logs import import_to
     from accelstudy.campaign.importing.public import import_settings, public_data, public_file

@@ -14,7 +14,6 @@ from errno import ENOTDIR
 from pathlib import Path
 from stat import S_ISDIR
 from tempfile import mkdtemp
-from time import sleep
 from types import ModuleType
 
 from accelstudy.basics.errors import InputError
@@ -26,8 +25,6 @@ except ImportError:  # without locks, the leftovers of a killed run stay until s
     fcntl = None
 
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
-WAIT = 0.05
-"""Seconds within which another run may take a new folder for a leftover, and remove it."""
 
 
 @dataclass(frozen=True)
@@ -217,13 +214,8 @@ def _staging(near: Path) -> Iterator[Path]:
         if (lock := _locked(left)) is not None:
             shutil.rmtree(left, ignore_errors=True)
             os.close(lock)
-    while True:
-        stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
-        lock = _locked(stage)
-        if lock is None and fcntl is not None:  # another run was quicker, and is removing it
-            sleep(WAIT)
-        if stage.exists():
-            break
+    stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
+    lock = _locked(stage)
     try:
         yield stage
     finally:

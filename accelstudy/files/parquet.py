@@ -1,14 +1,7 @@
-"""Parquet files with checksums of their pages and of their footer: damaged ones are refused.
-
-Parquet itself has checksums of pages only. A flipped bit in the footer, which holds the schema,
-could rename a column. So the digest of the footer stands right before it, where other programs
-find nothing that the footer points to, and do not look.
-"""
+"""Parquet files with checksums of their pages: damaged ones are refused."""
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,17 +17,12 @@ from accelstudy.files.reading import readable
 if TYPE_CHECKING:
     import pandas as pd
 
-_MARK = b"accelstudy:sha256"
-_DIGEST = hashlib.sha256().digest_size
-_END = 8  # bytes after the footer: its length, and the letters PAR1
-
 
 @contextmanager
 def parquet_file(path: str | Path, schema: pa.Schema, **options: Any) -> Iterator[pq.ParquetWriter]:
     """Open a new file, which is written table by table; `options` are those of Arrow's writer."""
     with pq.ParquetWriter(path, schema, write_page_checksum=True, **options) as writer:
         yield writer
-    _seal(Path(path))
 
 
 def write_parquet(path: str | Path, table: pa.Table, **options: Any) -> None:
@@ -52,14 +40,13 @@ def write_frame(path: str | Path, frame: pd.DataFrame) -> None:
 def read_parquet(path: str | Path, remedy: str = "", **options: Any) -> pa.Table:
     """Read a whole table; `remedy` and errors as in `whole_parquet`, `options` those of Arrow."""
     with _whole(path, remedy):
-        _check_footer(Path(path))
         return pq.read_table(path, partitioning=None, page_checksum_verification=True, **options)
 
 
 def read_frame(path: str | Path, remedy: str = "", **options: Any) -> pd.DataFrame:
     """Read a whole table of pandas; see `read_parquet`."""
     table = read_parquet(path, remedy, **options)
-    with _whole(path, remedy):  # a file without our digest may have odd metadata
+    with _whole(path, remedy):  # its metadata may be odd
         return table.to_pandas()
 
 
@@ -87,40 +74,13 @@ def whole_parquet(path: str | Path, remedy: str = "", **options: Any) -> Iterato
     Raises
     ------
     InputError
-        If the file is missing, is no whole Parquet file, or its footer or a page is not what was
-        written.
+        If the file is missing, is no whole Parquet file, or a page is not what was written.
     """
-    with _whole(path, remedy):
-        _check_footer(Path(path))
-        with pq.ParquetFile(path, page_checksum_verification=True, **options) as file:
-            yield file
-
-
-def _seal(path: Path) -> None:
-    """Put the digest of the footer before it."""
-    with path.open("r+b") as file:
-        start = _footer_start(file)
-        footer = file.read()
-        file.seek(start)
-        file.write(_MARK + hashlib.sha256(footer).digest() + footer)
-
-
-def _check_footer(path: Path) -> None:
-    """Refuse a footer that is not what was written; files of other programs have no digest."""
-    with path.open("rb") as file:
-        start = _footer_start(file)
-        file.seek(max(0, start - len(_MARK) - _DIGEST))
-        mark, digest, footer = file.read(len(_MARK)), file.read(_DIGEST), file.read()
-    if mark == _MARK and digest != hashlib.sha256(footer).digest():
-        raise ValueError("its footer is not what was written")
-
-
-def _footer_start(file: Any) -> int:
-    """Place where the footer begins; the file is left there."""
-    size = file.seek(0, os.SEEK_END)
-    file.seek(max(0, size - _END))
-    length = int.from_bytes(file.read(4), "little")
-    return file.seek(max(0, size - _END - length))
+    with (
+        _whole(path, remedy),
+        pq.ParquetFile(path, page_checksum_verification=True, **options) as file,
+    ):
+        yield file
 
 
 @contextmanager

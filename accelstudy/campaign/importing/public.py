@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import cache
-from http.client import HTTPException
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.error import HTTPError
 from urllib.parse import unquote, urlsplit
-from urllib.request import Request, urlopen
 
 from pydantic import Field
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.files.outputs import is_temporary, whole_file
+from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import read_layer
 from accelstudy.files.validation import Block, checked
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
 """Longest time without data from a server, s."""
-BLOCK = 1 << 16
-"""Bytes that are read at a time."""
 
 
 class PublicData(Block):
@@ -144,93 +136,28 @@ def next_attempt(path: str | Path) -> int:
 def fetch(data: PublicData, searched: Path, target: Path) -> Path:
     """Find a file below the folder `searched`, or download it to the folder `target`.
 
-    A download that breaks off is continued as long as each try brings some data. If it remains
-    incomplete, the next call continues its `.part` file. Two calls at the same time do not collide:
-    each writes to its own file.
-
     Raises
     ------
     InputError
         If the file cannot be downloaded, or is not the expected one.
     """
+    import pooch
+
+    pooch.get_logger().setLevel("WARNING")
     try:
         for path in sorted(searched.rglob(data.file_name)):
-            if path.is_file() and not is_temporary(path) and _sha256(path) == data.sha256:
+            if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
                 return path
-        target.mkdir(parents=True, exist_ok=True)
-        path = target / data.file_name
-        with whole_file(path) as temporary:
-            _download_after_earlier(data.url, temporary, path.with_name(f"{path.name}.part"))
-            checksum = _sha256(temporary)
-            if checksum != data.sha256:
-                raise InputError(
-                    f"{data.url}: the sha256 is {checksum}, not {data.sha256}: damaged on the way "
-                    "or changed at its source; try again"
-                )
-        return path
-    except (OSError, HTTPException) as error:
-        reason = getattr(error, "reason", None) or error
-        reason = getattr(reason, "strerror", None) or reason
+        download = pooch.HTTPDownloader(timeout=TIMEOUT)
+        checksum = f"sha256:{data.sha256}"
+        return Path(pooch.retrieve(data.url, checksum, data.file_name, target, downloader=download))
+    except ValueError:
         raise InputError(
-            f"{data.url}: cannot be downloaded: {' '.join(str(reason).split())}; try again, or put "
+            f"{data.url}: has another sha256 than {data.sha256}: damaged on the way or changed at "
+            "its source; try again"
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"{data.url}: cannot be downloaded: {' '.join(str(error).split())}; try again, or put "
             f"the file {data.file_name} below {searched}"
         ) from None
-
-
-def _download_after_earlier(url: str, path: Path, left: Path) -> None:
-    """Claim the part file of an earlier call, so that no other call uses it, and leave it again."""
-    if left.is_symlink():  # no download of ours: it would be written to another place
-        left.unlink()
-    with suppress(FileNotFoundError):
-        left.replace(path)
-    try:
-        _download_with_retries(url, path)
-    except BaseException:
-        if path.exists():
-            path.replace(left)
-        raise
-
-
-def _download_with_retries(url: str, path: Path) -> None:
-    while True:
-        have = _size(path)
-        try:
-            return _download(url, path, have)
-        except (OSError, HTTPException):
-            if _size(path) <= have:
-                raise
-
-
-def _download(url: str, path: Path, have: int) -> None:
-    """Download to `path`, which already holds the first `have` bytes."""
-    request = Request(url, headers={"Range": f"bytes={have}-"} if have else {})
-    try:
-        with urlopen(request, timeout=TIMEOUT) as response:
-            # A server that does not know ranges sends the whole file, with another status.
-            resumed = response.headers.get("Content-Range", "").startswith(f"bytes {have}-")
-            with path.open("ab" if resumed else "wb") as file:
-                start = file.tell()
-                # Completeness can be checked only if the server states the size.
-                expected = response.headers.get("Content-Length", "").strip()
-                stated = expected.isascii() and expected.isdigit()
-                total = int(expected[:18]) if stated else None
-                with stage(f"download of {path.name}", total) as advance:
-                    while block := response.read(BLOCK):
-                        advance(file.write(block))
-                came = file.tell() - start
-            # A broken connection looks like the end of the file.
-            if total is not None and came < total:
-                raise OSError(f"the connection broke after {came} of {expected} bytes")
-    except HTTPError as error:
-        # Nothing comes after what is there: it is whole, or wrong, which its checksum will tell.
-        if not (have and error.code == 416):
-            raise
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.exists() else 0
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
