@@ -15,6 +15,7 @@ from accelstudy.adjustment.calibration import Block
 from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY, Given
 from accelstudy.basics.wording import counted
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
+REPLICATES = Range(2, bounds.REPLICATES.most)
+"""Calibrations of a cell, of which there is a standard deviation."""
 DIGITS = 12
 """Of a quantity in the configuration, so that 3.2 mgon stays that number."""
 
@@ -228,7 +231,7 @@ def simulate(
         "schemes": [get_scheme(one).name for one in names("scheme", scheme)],
         "approaches": [get_approach(one).name for one in names("approach", approach)],
         "sensor_sigma_mps2": [_si("sigma", one, QUANTITIES["sigma"]) for one in each(sigma)],
-        "replicates": whole("replicates", replicates, bounds.REPLICATES),
+        "replicates": whole("replicates", replicates, REPLICATES),
     }
     for key, values in zip(("model", "scheme", "approach", "sigma"), grid.values(), strict=False):
         if not values:

@@ -256,7 +256,7 @@ def test_the_list_of_a_lot_loads_nothing():
     assert not Path("evil").exists()
 
 
-@pytest.mark.parametrize("template", ["study", "plan"])
+@pytest.mark.parametrize("template", ["study", "campaigns"])
 def test_a_new_study_names_those_it_was_set_up_with(template):
     with forgotten():
         succeed("--plugin", "ripple.py", "init", "new", "--template", template)

@@ -38,7 +38,7 @@ def case(section, content):
 @pytest.mark.parametrize(("section", "content", "message"), [
     ("plam", {}, "file: plam: unknown key; did you mean 'plan'?"),
     ("study", "a/b", "file: study: "),
-    ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key; did you"),
+    ("plan", {"sensor": "paper"}, "file: plan.sensor: unknown key (known: cases, "),
     ("plan", {"sensors": "all"}, "file: plan.sensors: no longer a key; plan each sensor as a case"),
     ("field", {}, "file: field: no longer a key; `accelstudy plan` says"),
     ("plan", 5, "file: plan: "),
@@ -78,10 +78,12 @@ def test_a_case_that_cannot_be_used_is_said_in_a_line(section, content, message)
 
 def test_the_workflow_says_it_too(tmp_path):
     result = run_workflow(
-        "plan", tmp_path, {"study": "tiny", "plan": {"cases": {"a": {"sensor": "adxl35"}}}}
+        "plan",
+        tmp_path,
+        {"study": "tiny", "plan": {"cases": {"a": {"tilt_accuracy": "1mgon", "sensor": "adxl35"}}}},
     )
     assert result.returncode == 1
-    one_line(result.stdout, "tiny.yaml: plan.cases.a: sensor: unknown sensor 'adxl35'")
+    one_line(result.stdout, "tiny.yaml: plan.cases.a: unknown sensor 'adxl35'")
     assert not (tmp_path / "results").exists()
 
 

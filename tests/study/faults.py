@@ -40,7 +40,7 @@ def content(folder):
 def study(folder, config=STUDY):
     """Arguments of a run of the study in small batches."""
     path = in_batches(folder)
-    path.write_text(path.read_text().replace("size=240", "size=8100"))
+    path.write_text(path.read_text().replace("most=240", "most=8100"))
     return {"snakefile": path, "config": config}
 
 

@@ -33,7 +33,7 @@ TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 IN_BATCHES = f"""\
 from functools import partial
 from accelstudy.study import batches
-batches.batches = partial(batches.batches, size=240)
+batches.batches = partial(batches.batches, most=240)
 include: "{ROOT}/workflow/Snakefile"
 rule study:
     default_target: True
