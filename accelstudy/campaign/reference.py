@@ -79,7 +79,8 @@ class ReferenceSensor(Block):
         roll, pitch = angles[:, 0], np.clip(angles[:, 1], -most, most)
         forces = np.column_stack(specific_force(roll, pitch, gravity))
         own, model, p = self.axes.from_frd(forces), self.model, np.array(self.parameters)
-        by_parameters = model.correction_jacobian(model.sense(own, p, gravity), p, gravity)
-        by_force = jacobian(forces)
-        sigma = self.sigma_mps2 * np.linalg.norm(by_force, axis=-1)
-        return sigma, by_force @ self.axes.matrix @ by_parameters @ self._root
+        output = model.sense(own, p, gravity)
+        by_force = jacobian(forces) @ self.axes.matrix
+        by_output = by_force @ model.output_jacobian(output, p, gravity)
+        by_parameters = by_force @ model.correction_jacobian(output, p, gravity)
+        return self.sigma_mps2 * np.linalg.norm(by_output, axis=-1), by_parameters @ self._root

@@ -133,6 +133,26 @@ def tilt_slope(
     return np.asarray(jacobian(f_b) @ model.correction_jacobian(f_s, parameters, g, hold))
 
 
+def tilt_by_output(
+    model: SensorModel,
+    parameters: Array,
+    f_s: Array,
+    f_b: Array,
+    g: float,
+    hold: HoldConditions | None = None,
+) -> Array:
+    """Partial derivatives of roll and pitch with respect to the output of the sensor.
+
+    Where a sensor loses gain, as beyond the knee of a saturation, a small error of its output is a
+    large one of the force. Parameters as in `tilt_slope`; f_s and f_b are (..., 3).
+
+    Returns
+    -------
+    (..., 2, 3) array, rad/(m/s²)
+    """
+    return np.asarray(jacobian(f_b) @ model.output_jacobian(f_s, parameters, g, hold))
+
+
 def sigma_roll_pitch(f: ArrayLike, cov: ArrayLike) -> Array:
     """Propagate the covariance matrix of a specific force to roll and pitch (section 3.1).
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import jacobian, specific_force, tilt_slope
+from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
 from accelstudy.leveling.sensitivity import (
     FORCES,
     NEGLIGIBLE_VARIANCE,
@@ -56,7 +56,7 @@ def leveling_slope(
         What else is known of the attitudes, where effects depend on it.
     """
     f_b = model.correct(f_s, parameters, g, hold)
-    by_output = jacobian(f_b) @ model.output_jacobian(f_s, parameters, g, hold)
+    by_output = tilt_by_output(model, parameters, f_s, f_b, g, hold)
     by_parameters = tilt_slope(model, parameters, f_s, f_b, g, hold)
     return np.concatenate([by_output, by_parameters], axis=-1)
 

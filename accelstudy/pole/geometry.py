@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 PARAMETERS = "parameters"
 """Errors of the calibration's parameters, (u,), SI."""
 FORCE = "force"
-"""Error of the reading in the axes of the sensor, (3,), m/s²."""
+"""Error of the reading, the sensor's output, in its axes, (3,), m/s²."""
 INPUTS = (
     "top_north",
     "top_east",
@@ -155,6 +155,16 @@ class Situation:
         return sensor.model.sense(forces, sensor.parameters, sensor.gravity, self.hold)
 
     @cached_property
+    def by_last(self) -> Array:
+        """What the effects that act last make of a small change that comes before them, (k, 3, 3).
+
+        A bias and a scale act before them, and noise comes after them.
+        """
+        model, p, g = self.sensor.model, self.sensor.parameters, self.sensor.gravity
+        f_a = model.sensitive_force(self.readings, p, g, self.hold)
+        return model.slope_of_last(f_a, p, self.hold)[:, 0]
+
+    @cached_property
     def inputs(self) -> Array:
         """True `INPUTS` of `foot`, (k, 13), without bending."""
         inputs = np.zeros((len(self.tilt), len(INPUTS)))
@@ -185,15 +195,10 @@ class Situation:
             return self._jacobian[..., [INPUTS.index(name) for name in names]]
         angles = [INPUTS.index("roll"), INPUTS.index("pitch")]
         by_force = self._jacobian[..., angles] @ leveling_jacobian(self.forces)
-        # Errors of a reading propagate by ∂f_b/∂f_s, which is close to I.
-        by_force = by_force @ self.sensor.mounting.matrix
-        if names == (FORCE,):
-            return by_force
-        sensor = self.sensor
-        by_parameters = sensor.model.correction_jacobian(
-            self.readings, sensor.parameters, sensor.gravity, self.hold
-        )
-        return by_force @ by_parameters[:, 0]
+        sensor, model = self.sensor, self.sensor.model
+        of_model = model.output_jacobian if names == (FORCE,) else model.correction_jacobian
+        by_names = of_model(self.readings, sensor.parameters, sensor.gravity, self.hold)
+        return by_force @ sensor.mounting.matrix @ by_names[:, 0]
 
     def errors(self, wrong: Mapping[tuple[str, ...], Array]) -> Array:
         """Error of the foot that is computed from wrong values, with the exact geometry.

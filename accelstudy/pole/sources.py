@@ -7,7 +7,7 @@ and register it with a title and a remedy.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +127,7 @@ def drift(situation: Situation) -> InputErrors:
     """Change of the bias with time, and by switching the sensor off and on."""
     age = situation.setup.age
     sigma = situation.sensor.sheet.bias_change(age, restarted=True) if age > 0 else 0.0
-    return scatter(situation, (FORCE,), sigma, sigma, sigma)
+    return _before_last(situation, sigma, sigma, sigma)
 
 
 @source(
@@ -141,7 +141,13 @@ def drift(situation: Situation) -> InputErrors:
 def temperature(situation: Situation) -> InputErrors:
     """Change of bias and scales, as far as the calibration does not correct it."""
     bias, scale = situation.sensor.warmed(situation.setup.temperature_change)
-    return scatter(situation, (FORCE,), *np.hypot(bias, scale * situation.sensor_forces.T))
+    return _before_last(situation, *np.hypot(bias, scale * situation.sensor_forces.T))
+
+
+def _before_last(situation: Situation, *sigma: Array | float) -> InputErrors:
+    """Changes of bias and scale as errors of the reading: what clips, clips them, too."""
+    changes, slope = scatter(situation, (FORCE,), *sigma), situation.by_last
+    return replace(changes, covariance=slope @ changes.covariance @ np.swapaxes(slope, -2, -1))
 
 
 @source(

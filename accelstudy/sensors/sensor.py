@@ -199,11 +199,11 @@ class SensorModel:
     def slope_of_last(
         self, f_a: NDArray[np.float64], parameters: ArrayLike, hold: HoldConditions | None
     ) -> NDArray[np.float64]:
-        """Derivative of the output, by what the effects before the last ones leave, (n, 3, 3).
+        """Derivative of the output, by what the effects before the last ones leave, (..., n, 3, 3).
 
-        Parameters as in `sense`, with the force f_a (n, 3) in the sensitive axes.
+        Parameters (u,) as in `sense`, with the force f_a (..., n, 3) in the sensitive axes.
         """
-        f, x = np.asarray(f_a).T, np.asarray(parameters, dtype=float)
+        f, x = _components(f_a), np.asarray(parameters, dtype=float)
         g = np.asarray(STANDARD_GRAVITY)
         slope = self.trace.evaluate(self.trace.by_last, f, f, x, self.settings, g, hold)
         return np.moveaxis(slope, (0, 1), (-2, -1))

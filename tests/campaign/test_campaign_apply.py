@@ -86,6 +86,23 @@ def test_sigmas_of_leveling_hold_over_calibrations_and_readings(plain):
     assert np.abs(normalised.std(axis=0) - 1).max() < 4 / np.sqrt(2 * 300)
 
 
+def test_sigmas_hold_where_the_sensor_loses_gain(plain):
+    """Beyond a knee of 6 m/s² half the gain is left, so noise counts twice: σ/(½ g) in pitch."""
+    model, g, noise = get_model("saturation(knee=6)"), 9.80665, 0.002
+    calibration = replace(
+        plain, model=model, parameters=np.full(3, 0.5), covariance=np.zeros((3, 3)), gravity=g
+    )
+    attitude = np.array([0.0, 50 * GON])  # x and z feel 6.9 m/s²
+    reading = model.sense(np.column_stack(specific_force(*attitude, g)), calibration.parameters, g)
+    _, ((_, sigma),) = calibration.level(reading, noise)
+    assert sigma == pytest.approx(noise / (0.5 * g), rel=1e-9)
+    drawn = reading + noise * np.random.default_rng(1).standard_normal((20_000, 3))
+    angles, sigmas = calibration.level(drawn, noise)
+    assert angles[:, 1].std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * 20_000))
+    pulls = (angles - attitude) / sigmas
+    np.testing.assert_allclose(pulls.std(axis=0), 1, rtol=4.5 / np.sqrt(2 * 20_000))
+
+
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"parameters": 3}', "\x00"])
 def test_what_is_no_calibration_is_one_line(tmp_path, content):
     path = tmp_path / "calibration.json"

@@ -247,6 +247,24 @@ def test_a_calibration_that_knows_the_temperature_corrects_it(sensor):
     )
 
 
+def test_beyond_a_knee_noise_counts_more_and_a_change_of_bias_as_before(sensor):
+    """A pole leans forward by 50 gon: x feels 6.9 m/s², with half the gain left, y nothing."""
+    tilt, model, half = 50 * GON, get_model("saturation(knee=6)"), np.full(3, 0.5)
+    ideal = replace(sensor, model=model, parameters=np.zeros(3), covariance=np.zeros((3, 3)))
+    clipping = replace(ideal, parameters=half)
+    setup, given = Setup(age=1.0, temperature_change=20.0), {"age": 1.0, "temperature_change": 20.0}
+    for name in ("drift", "temperature"):  # before the sensor clips
+        np.testing.assert_allclose(
+            of(name, clipping, [tilt], **given), of(name, ideal, [tilt], **given), rtol=1e-6
+        )
+    c, sigma = np.cos(tilt), SHEET.sigma_mean(setup.averaging)
+    expected = setup.length * sigma / STANDARD_GRAVITY * np.sqrt((2 * c) ** 2 + 1 / c**2)
+    (horizontal,), _ = of("noise", clipping, [tilt])
+    assert horizontal[0] == pytest.approx(expected, rel=1e-6)
+    for _, row in simulate(setup, clipping, np.array([tilt]), 400, 5).iterrows():
+        assert_within_chance(row)
+
+
 @pytest.mark.parametrize("direction", [0.0, 0.7, np.pi / 2])
 def test_sigmas_of_roll_and_pitch_may_be_given_instead(direction):
     given = from_tilt_sigma(10 * MGON, SHEET)

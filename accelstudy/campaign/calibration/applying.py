@@ -6,19 +6,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field, model_validator
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
-from accelstudy.leveling.angles import angles_of, jacobian, tilt_slope
+from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
@@ -32,7 +32,7 @@ FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibration as it stays with the sensor, without the effects of the rig.
 
@@ -98,12 +98,10 @@ class Calibration:
         """
         forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
         corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
-        slope = share * tilt_slope(
-            self.model, self.parameters, forces, corrected, self.gravity, hold
-        )
+        at = self.model, self.parameters, forces, corrected, self.gravity, hold
+        slope = share * tilt_slope(*at)
         variance = np.sum((slope @ self.covariance) * slope, axis=-1)
-        # Noise of a reading propagates by ∂f_b/∂f_s, which is close to I.
-        variance += np.square(sigma_force) * np.sum(jacobian(corrected) ** 2, axis=-1)
+        variance += np.square(sigma_force) * np.sum(tilt_by_output(*at) ** 2, axis=-1)
         return angles_of(corrected), np.sqrt(variance)
 
     def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
@@ -254,6 +252,33 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
         log=document.log,
         ranges=document.ranges,
     )
+
+
+class Calibrated(Protocol):
+    """What has the content of a calibration.json, such as what `accelstudy.calibrate` returns."""
+
+    @property
+    def content(self) -> Mapping[str, Any]:
+        """Content of calibration.json."""
+        ...
+
+
+def applicable(calibration: Calibration | Calibrated) -> Calibration:
+    """Return a calibration as `read_calibration` does, whether or not it was written to a file.
+
+    Raises
+    ------
+    InputError
+        If it is no calibration.
+    """
+    if isinstance(calibration, Calibration):
+        return calibration
+    if not hasattr(calibration, "content"):
+        raise InputError(
+            f"calibration: expected what `calibrate` returns or `read_calibration` reads, not "
+            f"{shown(calibration)}"
+        )
+    return calibration_of(calibration.content)
 
 
 def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:

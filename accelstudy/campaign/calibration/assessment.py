@@ -14,9 +14,11 @@ from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise, usual_approach
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
-from accelstudy.leveling.angles import jacobian, tilt_slope
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import tilt_by_output, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -136,7 +138,7 @@ def tilt_missing(fit: CampaignFit) -> Array:
     if not fit.sigma_known or fit.trusts_sigma:
         return np.zeros(2)
     excess = fit.sigma_position_posteriori**2 - campaign_noise(fit.campaign).sigma_force ** 2
-    slope = jacobian(cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity))
+    slope = tilt_by_output(*_in_use(fit))
     return np.sqrt(max(excess, 0.0) * np.mean(np.sum(slope**2, axis=-1), axis=0))
 
 
@@ -149,17 +151,12 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     reading. Effects that depend on temperature or time have those of the campaign. Effects of the
     rig have no share: the sensor in use has left the rig.
     """
-    model, campaign, g = fit.model, fit.campaign, fit.gravity
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
-    hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
-    p = np.where(model.stays, fit.parameters, 0.0)
-    output = model.sense(f_b, p, g, hold)
-    slope = tilt_slope(model, p, output, f_b, g, hold) * model.stays
-    covariance = fit.covariance
+    model, covariance = fit.model, fit.covariance
+    slope = tilt_slope(*_in_use(fit)) * model.stays
 
     def rms(columns: slice, covariance: Array = covariance) -> Array:
         part, block = slope[..., columns], covariance[columns, columns]
-        return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(f_b))
+        return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(part))
 
     shares, first = {"all": rms(slice(None))}, 0
     if fit.by_reference is not None:
@@ -170,3 +167,15 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
             shares[effect.name] = rms(slice(first, last))
         first = last
     return shares
+
+
+def _in_use(fit: CampaignFit) -> tuple[SensorModel, Array, Array, Array, float, HoldConditions]:
+    """Return the calibrated sensor in all tilts, as `tilt_slope` takes it.
+
+    These are the model, its parameters, readings and forces (k, 3), m/s², gravity and conditions.
+    """
+    model, campaign, g = fit.model, fit.campaign, fit.gravity
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
+    hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
+    p = np.where(model.stays, fit.parameters, 0.0)
+    return model, p, model.sense(f_b, p, g, hold), f_b, g, hold

@@ -88,8 +88,12 @@ static inline void accel_solve(accel_real a[3][3], const accel_real b[3], accel_
 SIGMAS = """\
 for (n = 0; n < 2; n++) {{
     accel_real variance = 0;
-    for (i = 0; i < 3; i++)
-        variance += noise * noise * angle_by[n][i] * angle_by[n][i];
+    for (k = {u}; k < {u} + 3; k++) {{
+        accel_real sum = 0;
+        for (i = 0; i < 3; i++)
+            sum += angle_by[n][i] * partial[k][i];
+        variance += noise * noise * sum * sum;
+    }}
     for (j = 0; j < {u}; j++) {{
         accel_real sum = 0;
         for (k = 0; k < {u}; k++)
@@ -439,10 +443,11 @@ class _Code:
         signed = [int(sign) * a for sign, a in zip(self._frame.signs, angles, strict=False)]
         count = len(self._stages)
         arrays = [f"f{n}[3]" for n in range(count + 1)] + [f"slope{n}[3][3]" for n in range(count)]
+        arrays = [f"partial[{u + 3}][3]", *arrays]
         lines = [
             f"static const accel_real axes[3][3] = {_table(self._axes)};",
             f"static const accel_real root[{u}][{u}] = {_table(root)};",
-            f"accel_real force[3], angle_by[2][3], partial[{u}][3], step[3], {', '.join(arrays)};",
+            f"accel_real force[3], angle_by[2][3], step[3], {', '.join(arrays)};",
             "int i, j, k, n;",
             *self._kept(),
             f"accel_calibrate(reading{''.join(f', {c}' for c in self.columns)}, force);",
@@ -454,11 +459,14 @@ class _Code:
             given = "".join(f", {name}" for name in stage.columns)
             lines += [f"{stage.name}(f{n}{given}, f{n + 1}, slope{n});"]
             lines += [f"{stage.name}_by(f{n}{given}, partial + {firsts[n]});"]
+        # The noise of a reading comes after all effects, and is solved for like their parameters.
+        lines += ["for (j = 0; j < 3; j++)", "    for (i = 0; i < 3; i++)"]
+        lines += [f"        partial[{u} + j][i] = i == j;"]
         for n in range(count)[::-1]:
-            lines += [f"for (k = {firsts[n]}; k < {u}; k++) {{"]
+            lines += [f"for (k = {firsts[n]}; k < {u + 3}; k++) {{"]
             lines += [f"    accel_solve(slope{n}, partial[k], step);"]
             lines += ["    for (i = 0; i < 3; i++)", "        partial[k][i] = step[i];", "}"]
-        lines += [f"for (k = 0; k < {u}; k++) {{", "    for (i = 0; i < 3; i++)"]
+        lines += [f"for (k = 0; k < {u + 3}; k++) {{", "    for (i = 0; i < 3; i++)"]
         lines += ["        step[i] = axes[i][0] * partial[k][0] + axes[i][1] * partial[k][1]"]
         lines += ["            + axes[i][2] * partial[k][2];"]
         lines += ["    for (i = 0; i < 3; i++)", "        partial[k][i] = -step[i];", "}"]
