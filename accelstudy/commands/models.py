@@ -20,5 +20,6 @@ def models_command() -> None:
         model = get_model(name)
         click.echo(f"{name} ({model.n_parameters}): {', '.join(model.parameter_names)}")
     click.echo("\nTable 1:")
+    width = max(len(preset.source) for preset in PRESETS)
     for preset in PRESETS:
-        click.echo(f"  {preset.source:28s} {preset.model} in {preset.scheme}")
+        click.echo(f"  {preset.source:{width}s} {preset.model} in {preset.scheme}")

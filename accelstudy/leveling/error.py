@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,18 +16,38 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 ATTITUDES = 200
-"""Number of attitudes over which a tilt error is averaged, unless another is given."""
+"""Least number of attitudes over which a tilt error is averaged, unless another is given."""
 MAX_TILT_GON = 50.0
 """Tilt up to which they lie, unless another is given."""
+RINGS = (0.0, 0.323911810519907637, 0.529656775285156812, 0.883861700758049036)
+"""Chebyshev's nodes, and their negatives: the mean over all seven of a polynomial up to degree 7 is
+that over [−1, 1] (Abramowitz & Stegun, table 25.5)."""
+GOLDEN = (np.sqrt(5) - 1) / 2
 
 
 def cap_forces(max_tilt: float, attitudes: int, g: float = STANDARD_GRAVITY) -> Array:
-    """Specific forces (k, 3) of attitudes spread evenly over all tilts up to `max_tilt` (rad)."""
-    i = np.arange(attitudes) + 0.5
-    z = 1 - i / attitudes * (1 - np.cos(max_tilt))
-    azimuth = np.pi * (1 + np.sqrt(5)) * i
+    """Specific forces (k, 3) of attitudes spread evenly over all tilts up to `max_tilt` (rad).
+
+    They are rings of equally many, at Chebyshev's nodes of the cosine of the tilt, so that a plain
+    mean over them is a quadrature: up to 50 gon, that of a squared tilt error is right to nine
+    digits. Their order is mixed, since effects that depend on conditions meet them one by one.
+
+    Parameters
+    ----------
+    max_tilt : float, rad
+    attitudes : int, k is at least so many
+    g : float, m/s²
+    """
+    panels = max(1, math.isqrt(attitudes // (4 * 7 * 7)))
+    nodes = np.unique([RINGS, np.negative(RINGS)])
+    across = (np.arange(panels)[:, None] + (1 + nodes) / 2).ravel() / panels
+    around = math.ceil(attitudes / len(across))
+    ring = np.arange(len(across))[:, None]
+    azimuth = 2 * np.pi / around * (np.arange(around) + GOLDEN * ring % 1)
+    z = 1 - across[:, None] * (1 - np.cos(max_tilt)) + 0 * azimuth
     radius = np.sqrt(1 - z * z)
-    return -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
+    force = -g * np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=-1)
+    return force.reshape(-1, 3)[np.argsort(GOLDEN * np.arange(z.size) % 1)]
 
 
 def holds_in_use(hold: HoldConditions, n: int, f_b: Array) -> HoldConditions:

@@ -173,6 +173,7 @@ class Preset:
 
 _SIX_MODEL, _NINE_MODEL = "bias-scale", "bias-scale-nonorthogonality"
 _CROSS_AXIS = "bias-scale-nonorthogonality-crossaxis"
+_PRETTO_TEDALDI = "[25] Pretto & Grisetti, [26] Tedaldi 2014"
 
 PRESETS: tuple[Preset, ...] = (
     Preset("loetters-1998", "[21] Lötters 1998", _SIX_MODEL, "faces-6"),
@@ -185,9 +186,9 @@ PRESETS: tuple[Preset, ...] = (
     Preset("fong-2008-24", "[20] Fong 2008, 24", _CROSS_AXIS, "rings-24"),
     Preset("zhang-2010", "[17] Zhang 2010", _NINE_MODEL, "d-optimal-9"),
     Preset("cai-2013", "[24] Cai 2013", f"{_NINE_MODEL}-quadratic", "mclaren-24"),
-    Preset("tedaldi-2014-36", "[25, 26] Tedaldi 2014, 36", _NINE_MODEL, "fibonacci-36"),
-    Preset("tedaldi-2014-38", "[25, 26] Tedaldi 2014, 38", _NINE_MODEL, "xsens-38"),
-    Preset("tedaldi-2014-50", "[25, 26] Tedaldi 2014, 50", _NINE_MODEL, "fibonacci-50"),
+    Preset("tedaldi-2014-36", f"{_PRETTO_TEDALDI}, 36", _NINE_MODEL, "fibonacci-36"),
+    Preset("tedaldi-2014-38", f"{_PRETTO_TEDALDI}, 38", _NINE_MODEL, "xsens-38"),
+    Preset("tedaldi-2014-50", f"{_PRETTO_TEDALDI}, 50", _NINE_MODEL, "fibonacci-50"),
     Preset("lv-2017", "[19] Lv 2017", _CROSS_AXIS, "icosidodecahedron-30"),
 )
 """Table 1 of Thalmann & Neuner (2018); the misalignment of [19] spans the cross-axis angles."""

@@ -6,7 +6,7 @@ from study_helpers import NINE, PAPER_TRUTH
 
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import roll_pitch
-from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
+from accelstudy.leveling.error import ATTITUDES, cap_forces, leveling_error, tilt_error
 from accelstudy.sensors.models import compose, get_model
 
 G = STANDARD_GRAVITY
@@ -41,25 +41,33 @@ def estimates_about(center, sigma, replicates=200, seed=1):
 # --- attitudes -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("attitudes", [1, 60, 200, 4000])
 @pytest.mark.parametrize("tilt", [10 * GON, 50 * GON, 99 * GON])
-def test_attitudes_are_spread_evenly_over_the_cap(tilt):
-    f_b = cap_forces(tilt, 4000, 9.81)
+def test_attitudes_are_spread_evenly_over_the_cap(tilt, attitudes):
+    f_b = cap_forces(tilt, attitudes, 9.81)
+    assert attitudes <= len(f_b) <= max(7, 1.2 * attitudes)
     np.testing.assert_allclose(np.linalg.norm(f_b, axis=1), 9.81, rtol=1e-14)
     u = -f_b / 9.81
     assert np.arccos(u[:, 2]).max() < tilt
     # Uniform over a cap: z is uniform in (cos tilt, 1), and the azimuth over the circle.
-    quantiles = np.quantile(u[:, 2], [0, 0.25, 0.5, 0.75, 1])
-    expected = 1 - (1 - np.cos(tilt)) * np.array([1, 0.75, 0.5, 0.25, 0])
-    np.testing.assert_allclose(quantiles, expected, atol=1e-3 * (1 - np.cos(tilt)))
-    assert u[:, 2].mean() == pytest.approx((1 + np.cos(tilt)) / 2, rel=1e-12)
-    azimuth = np.arctan2(u[:, 1], u[:, 0])
-    for half in (azimuth[:2000], azimuth[2000:]):
-        counts, _ = np.histogram(half, bins=8, range=(-np.pi, np.pi))
-        assert np.abs(counts - 250).max() <= 5
+    depth = (1 - u[:, 2]) / (1 - np.cos(tilt))
+    for power in range(1, 8):
+        assert np.mean(depth**power) == pytest.approx(1 / (power + 1), rel=1e-12)
+    if attitudes >= 60:
+        np.testing.assert_allclose(u[:, :2].mean(axis=0), 0, atol=1e-14)
+        square = np.mean(1 - u[:, 2] ** 2) / 2
+        np.testing.assert_allclose(u[:, :2].T @ u[:, :2] / len(u), square * np.eye(2), atol=1e-14)
 
 
-def test_one_attitude():
-    assert cap_forces(50 * GON, 1).shape == (1, 3)
+@pytest.mark.parametrize(("tilt", "digits"), [(10, 1e-12), (50, 1e-9), (80, 3e-5)])
+def test_the_mean_over_attitudes_is_that_over_the_cap(tilt, digits):
+    """Biases that are wrong by σ: σ/g in pitch, σ/(g cos θ) in roll, integrated in closed form."""
+    sigma, z = 0.002, np.cos(tilt * GON)
+    ideal = np.zeros(3)
+    error = tilt_error(BIAS, ideal, BIAS, ideal, cap_forces(tilt * GON, ATTITUDES, 9.81), 9.81)
+    roll, pitch = error.rms_of_all(sigma**2 * np.eye(3))
+    assert pitch == pytest.approx(sigma / 9.81, rel=1e-12)
+    assert roll == pytest.approx(sigma / 9.81 * np.sqrt(-np.log(z) / (1 - z)), rel=digits)
 
 
 # --- brute force ---------------------------------------------------------------------------------

@@ -89,7 +89,7 @@ def reliability(
     solution : Solution
     alpha, power : float, of the single test
     max_tilt : float, rad
-    attitudes : int, number of attitudes over which leveling is averaged
+    attitudes : int, least number of attitudes over which leveling is averaged
     """
     n, c = solution.misclosures.shape
     root, rank = solution.root
@@ -101,7 +101,7 @@ def reliability(
     on_parameters = solution.cofactors @ np.swapaxes(a, 1, 2) @ root
     slope = _leveling_slope(solution, max_tilt, attitudes)
     # The largest singular value of the changes of all attitudes, by their sum of squares.
-    squares = np.einsum("kau,kav->auv", slope, slope) / attitudes
+    squares = np.einsum("kau,kav->auv", slope, slope) / len(slope)
     on_level = on_parameters[:, None, : slope.shape[-1]]
     on_leveling = np.swapaxes(on_level, 2, 3) @ squares @ on_level
     largest = np.sqrt(np.maximum(np.linalg.eigvalsh(on_leveling)[..., -1], 0.0))
@@ -123,7 +123,7 @@ def _leveling_slope(solution: Solution, max_tilt: float, attitudes: int) -> Arra
     p = np.where(model.stays, solution.parameters[: model.n_parameters], 0.0)
     f_b = cap_forces(max_tilt, attitudes, g)
     roll, pitch = roll_pitch(tuple(f_b.T))
-    at_rest = dict.fromkeys(HoldConditions.columns(), np.zeros(attitudes))
-    reference = np.full(attitudes, REFERENCE_TEMPERATURE)
+    at_rest = dict.fromkeys(HoldConditions.columns(), np.zeros(len(f_b)))
+    reference = np.full(len(f_b), REFERENCE_TEMPERATURE)
     hold = HoldConditions(**{**at_rest, "roll": roll, "pitch": pitch, "temperature": reference})
     return tilt_slope(model, p, model.sense(f_b, p, g, hold), f_b, g, hold) * model.stays

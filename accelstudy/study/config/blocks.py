@@ -147,7 +147,7 @@ class LevelingConfig(Block):
         MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
     )
     attitudes: Attitudes = Field(
-        ATTITUDES, description="number of attitudes, spread evenly over these tilts"
+        ATTITUDES, description="least number of attitudes, spread evenly over these tilts"
     )
 
 
