@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 SIGMA = Given("m/s^2", "", "Noise of a reading.")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """A calibration of a campaign.
 

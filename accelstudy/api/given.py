@@ -84,7 +84,7 @@ def whole(name: str, value: Any, allowed: Range) -> int:
 def quantity(name: str, value: Any, given: Given) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
-        value = f"{float(value)!r}{given.unit}"
+        value = f"{float(value)!r} {given.unit}"  # the unit may begin with a digit, as 1/K does
     of_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
     try:
         return given.read(value)

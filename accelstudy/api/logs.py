@@ -22,7 +22,7 @@ from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Log:
     """A log, and how it is read; its numbers stay in the file until they are needed.
 

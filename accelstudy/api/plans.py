@@ -47,7 +47,7 @@ _MORE = (
 _OPTIONAL = ("sigma", "max_time")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """The cheapest calibrations for a tilt accuracy.
 

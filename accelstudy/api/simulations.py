@@ -52,7 +52,7 @@ class _Simulated:
     replicates: Block | None
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Simulation:
     """Simulated calibrations of one set-up, or of several: the cells of a study.
 

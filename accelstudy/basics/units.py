@@ -106,8 +106,8 @@ CLOCK_UNITS = ("s", "ms", "us", "ns")
 ANGLE_UNITS = {"gon": "mgon", "deg": "mdeg"}
 """Units in which angles can be shown: that of an attitude -> that of a small angle."""
 ANGLE_UNIT_VARIABLE = "ACCELSTUDY_ANGLE_UNIT"
-"""Environment variable by which a user chooses one for commands and workflows."""
-_angle_unit: ContextVar[str] = ContextVar("angle_unit", default="gon")
+"""Environment variable by which a user chooses one for commands, workflows and programs."""
+_angle_unit: ContextVar[str | None] = ContextVar("angle_unit", default=None)
 
 
 @contextmanager
@@ -130,24 +130,21 @@ def angles_in(unit: str | None) -> Iterator[None]:
         _angle_unit.reset(token)
 
 
-def user_angle_unit() -> str:
-    """Unit of angles that the user's environment names, else the one in which they are shown.
+def attitude_unit() -> str:
+    """Unit in which attitudes are shown, gon or deg; small angles have that of `display_unit`.
+
+    It is that of `angles_in`, else the one that the user's environment names, else gon.
 
     Raises
     ------
     InputError
-        If it names no such unit.
+        If the environment names no such unit.
     """
-    unit = os.environ.get(ANGLE_UNIT_VARIABLE) or attitude_unit()
+    unit = _angle_unit.get() or os.environ.get(ANGLE_UNIT_VARIABLE) or "gon"
     if unit not in ANGLE_UNITS:
         known = " or ".join(ANGLE_UNITS)
         raise InputError(f"{ANGLE_UNIT_VARIABLE}: {unit!r} is no unit of angles; choose {known}")
     return unit
-
-
-def attitude_unit() -> str:
-    """Unit in which attitudes are shown, gon or deg; small angles have that of `display_unit`."""
-    return _angle_unit.get()
 
 
 def to_attitude(angle: ArrayLike) -> NDArray[np.float64]:

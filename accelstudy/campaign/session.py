@@ -20,7 +20,7 @@ from accelstudy.sensors.conversion import Conversion
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
     """One calibration session of one sensor, in SI; n static holds in order of acquisition.
 

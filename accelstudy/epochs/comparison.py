@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import Calibrated, Calibration, applicable
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common, session_like
 from accelstudy.epochs.congruence import Epochs, Test
@@ -97,13 +97,16 @@ class Comparison:
 
 
 def compare(
-    first: Calibration, second: Calibration, tilt_range: float = MAX_TILT_GON * GON
+    first: Calibration | Calibrated,
+    second: Calibration | Calibrated,
+    tilt_range: float = MAX_TILT_GON * GON,
 ) -> Comparison:
     """Compare two calibrations of one sensor.
 
     Parameters
     ----------
-    first, second : Calibration, the older one first
+    first, second : what `accelstudy.calibrate` returns or `read_calibration` reads, the older one
+        first
     tilt_range : float, rad, over which tilts are compared
 
     Raises
@@ -111,4 +114,5 @@ def compare(
     InputError
         As `in_common`.
     """
-    return Comparison(first, second, in_common((first, second)), tilt_range)
+    pair = applicable(first), applicable(second)
+    return Comparison(*pair, in_common(pair), tilt_range)

@@ -27,7 +27,7 @@ from scipy import optimize, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import Calibrated, Calibration, applicable
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common
 from accelstudy.epochs.congruence import LEVEL, POWER, noncentrality, tail
@@ -184,8 +184,12 @@ class History:
         return tuple(course.found(self.level) for course in self.courses)
 
 
-def history_of(calibrations: Sequence[Calibration], dates: Sequence[datetime]) -> History:
+def history_of(
+    calibrations: Sequence[Calibration | Calibrated], dates: Sequence[datetime]
+) -> History:
     """Put calibrations of one sensor in the order of time, and bring them to common effects.
+
+    They are what `accelstudy.calibrate` returns or `read_calibration` reads, each with its date.
 
     Raises
     ------
@@ -199,9 +203,10 @@ def history_of(calibrations: Sequence[Calibration], dates: Sequence[datetime]) -
         )
     if len(set(dates)) < 2:
         raise InputError("--date: all are the same; a rate needs two dates or more")
-    common = in_common(calibrations)
+    given = [applicable(one) for one in calibrations]
+    common = in_common(given)
     order = np.argsort(np.array(dates, dtype="datetime64[us]"), kind="stable")
     ordered = Common(
         common.model, common.values[order], common.covariances[order], common.dof[order]
     )
-    return History(tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered)
+    return History(tuple(given[i] for i in order), tuple(dates[i] for i in order), ordered)

@@ -3,6 +3,8 @@
 import ast
 import subprocess
 import sys
+from copy import copy
+from datetime import UTC, datetime
 
 import matplotlib
 import numpy as np
@@ -14,8 +16,13 @@ from places import ROOT
 from study_helpers import grid, run_study
 
 import accelstudy as acs
+from accelstudy.api.given import quantity
+from accelstudy.basics.units import UNITS, Given
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.drawing.style import STYLE
+from accelstudy.epochs.comparison import compare
+from accelstudy.epochs.history import history_of
 from accelstudy.schemes import get_scheme
 
 matplotlib.use("agg")
@@ -66,6 +73,57 @@ def test_a_result_shows_itself_on_one_line_and_in_a_notebook(guide, name):
     assert len(repr(guide[name])) <= 100
     assert "\n" not in repr(guide[name])
     assert "<table" in guide[name]._repr_html_()
+
+
+@pytest.mark.parametrize("name", ["log", "campaign", "calibration", "diagnosis", "plan", "result"])
+def test_a_result_is_equal_to_itself_alone(guide, name):
+    one, other = guide[name], copy(guide[name])
+    assert (one == one, one == other) == (True, False)
+    assert len({one, other}) == 2
+
+
+def test_calibrations_are_compared_and_followed_as_they_are_returned(guide):
+    one, folder = guide["calibration"], guide["folder"]
+    read = read_calibration(folder / "calibrated/calibration.json")
+    other = acs.calibrate(guide["campaign"], model="bias-scale")
+    as_returned, as_read = compare(one, other), compare(read, other)
+    assert as_returned.model.name == "bias-scale"
+    np.testing.assert_array_equal(as_returned.values, as_read.values)
+    assert as_returned.test == as_read.test
+    dates = [datetime(2025, month, 1, tzinfo=UTC) for month in (1, 4, 7)]
+    assert len(history_of([one, other, read], dates).calibrations) == 3
+    with pytest.raises(acs.InputError, match="calibration: expected what `calibrate` returns"):
+        compare(one, 3)
+
+
+def test_the_unit_of_angles_is_that_of_the_environment(guide, monkeypatch):
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
+    leveled = guide["calibration"].apply(logged(), sigma=0.005)
+    assert {"roll_deg", "sigma_pitch_mdeg"} <= set(leveled)
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
+    with pytest.raises(acs.InputError, match="'grad' is no unit of angles; choose gon or deg"):
+        guide["calibration"].apply(logged(), sigma=0.005)
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_quantity_is_a_number_in_si_or_a_text_with_its_unit(unit):
+    """Also where the unit begins with a digit, as 1/K does."""
+    given = Given(unit, "", "", -np.inf)
+    for number in (0.25, 2e-4, -3, np.float64(1e-9)):
+        assert quantity("x", number, given) == number
+    for name, size in UNITS[unit].items():
+        assert quantity("x", f"2 {name}", given) == 2 * size
+
+
+def test_a_truth_is_in_si_or_with_its_unit():
+    given = {"model": "bias-scale", "scheme": "faces-6", "approach": "robot"}
+    given |= {"sigma": 1e-3, "replicates": 2}
+    numbers, texts = (
+        acs.simulate(**given, truth=truth).parameters
+        for truth in ({"s_x": 2e-4, "b_y": -0.05}, {"s_x": "200 ppm", "b_y": "-50 mm/s^2"})
+    )
+    pd.testing.assert_frame_equal(numbers, texts)
+    assert numbers.loc[["s_x", "b_y"], "truth"].tolist() == [2e-4, -0.05]
 
 
 @pytest.mark.parametrize("name", ["calibration", "diagnosis", "plan"])

@@ -7,7 +7,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import user_angle_unit
+from accelstudy.basics.units import attitude_unit
 from accelstudy.files.reading import read_layer
 from accelstudy.files.outputs import check_writable
 from accelstudy.jobs.code import code_hash
@@ -35,7 +35,7 @@ def in_a_line():
 
 
 # Unit of angles on pages, where the configuration names none.
-angle_unit = in_a_line()(user_angle_unit)
+angle_unit = in_a_line()(attitude_unit)
 
 
 @in_a_line()

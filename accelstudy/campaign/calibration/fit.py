@@ -54,7 +54,7 @@ class JudgedNoise:
     variance: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CampaignFit:
     """A calibrated campaign.
 

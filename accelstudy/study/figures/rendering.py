@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from accelstudy.basics.units import angle_note, angles_in, user_angle_unit
+from accelstudy.basics.units import angle_note, angles_in, attitude_unit
 from accelstudy.basics.wording import comma_list
 from accelstudy.files.outputs import whole_file
 from accelstudy.study.figures.base import FigureEntry, Tables, figure_tables, get_figure
@@ -48,7 +48,7 @@ def _caption(entry: FigureEntry, study: StudyConfig) -> str:
 
 def angle_unit(study: StudyConfig) -> str:
     """Unit of angles in figures: that of the study or, where it names none, of the user."""
-    return study.angle_unit or user_angle_unit()
+    return study.angle_unit or attitude_unit()
 
 
 def render(
