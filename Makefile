@@ -51,7 +51,7 @@ test-processors: $(READY) ## run all tests with the instructions of other proces
 
 test-processors-part: $(READY) ## run a few tests with the instructions of an old processor
 	OPENBLAS_CORETYPE=Nehalem $(OLD_NUMPY) $(TEST) $(addprefix tests/,planning/test_plan.py \
-	  repository/test_examples.py design/test_schemes.py planning/test_pole.py \
+	  repository/test_examples.py design/test_schemes.py repository/test_pole.py \
 	  simulation/test_simulation.py)
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare

@@ -39,7 +39,7 @@ def data_sheet_command(
     SOURCE is a log in which the sensor rests, the longer the better, or the folder of a campaign.
     White noise, bias instability and random walk come from the Allan deviation of the log; of a
     campaign only the noise of its positions is known. What the maker says can be added to the file,
-    which `accelstudy plan --sensor` and `accelstudy pole` take.
+    which `accelstudy plan --sensor` takes.
     """
     from accelstudy.commands.importing import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log, yaml_of

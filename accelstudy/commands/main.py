@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.advise import advise_command
 from accelstudy.commands.apply import apply_command
@@ -31,7 +32,6 @@ from accelstudy.commands.lot import lot_command
 from accelstudy.commands.models import models_command
 from accelstudy.commands.options import ANGLE_UNIT, plugin_option
 from accelstudy.commands.plan import plan_command
-from accelstudy.commands.pole import pole_command
 from accelstudy.commands.public import public_command
 from accelstudy.commands.scheme import scheme_command
 from accelstudy.commands.schemes import schemes_command
@@ -55,7 +55,6 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
     "Before a calibration, and what it is worth": (
         plan_command,
         data_sheet_command,
-        pole_command,
     ),
     "What there is to choose from": (
         models_command,
@@ -72,6 +71,10 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
     ),
 }
 """Commands in the order of use."""
+RETIRED = {
+    "pole": "the tutorial 'The foot of a pole' (examples/pole) works it out with a calibration"
+}
+"""Commands of earlier versions, and what takes their place."""
 
 
 class Commands(click.Group):
@@ -97,6 +100,14 @@ class Commands(click.Group):
         """Run the command line; also its help may meet a full disk."""
         with bad_input_as_one_line():
             return super().main(*args, **kwargs)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that is called; one of an earlier version says what to do instead."""
+        if args[0] in RETIRED:
+            raise InputError(f"{args[0]}: no longer a command; {RETIRED[args[0]]}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""

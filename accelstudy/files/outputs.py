@@ -75,11 +75,6 @@ BATCH_JOB = Kind(
     ("calibration.json", "positions.parquet", "report.html"),
     ("figures", "campaign"),
 )
-POLE = Kind(
-    "budget of a pole",
-    "pole.json",
-    ("budget.parquet", "monte-carlo.parquet", "budget.svg", "budget.png"),
-)
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
 HISTORY = Kind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = Kind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
@@ -95,7 +90,7 @@ STUDY = Kind(
     ("profiles", "campaigns/example"),
     replaced=False,
 )
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, POLE, PLAN, COMPARISON, HISTORY, LOT)
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, PLAN, COMPARISON, HISTORY, LOT)
 
 
 @contextmanager

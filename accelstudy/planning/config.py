@@ -80,7 +80,7 @@ class PlanConfig(Block):
 
 
 Section = TypeVar("Section", bound=BaseModel)
-SECTIONS = ("plan", "designs", "sequential", "pole")
+SECTIONS = ("plan", "designs", "sequential")
 """Each has rules in `workflow/rules/` under its name."""
 
 
@@ -88,7 +88,8 @@ class Example(Configuration):
     """The sections of a run; results go to ``results/<study>``."""
 
     retired = {  # noqa: RUF012
-        "field": "`accelstudy plan` says what is left in use; leave it out"
+        "field": "`accelstudy plan` says what is left in use; leave it out",
+        "pole": "examples/pole works it out with a calibration; leave it out",
     }
 
     study: PathName = Field(description="name; results go to results/<study>/")
@@ -96,7 +97,6 @@ class Example(Configuration):
     plan: dict[str, Any] = Field(default_factory=dict, description="the cheapest calibration")
     designs: dict[str, Any] = Field(default_factory=dict, description="optimal schemes")
     sequential: dict[str, Any] = Field(default_factory=dict, description="one position at a time")
-    pole: dict[str, Any] = Field(default_factory=dict, description="tilt of a pole")
 
     @model_validator(mode="after")
     def _has_a_section(self) -> Self:

@@ -25,7 +25,7 @@ KIND = "formulas"
 """Under which it is kept."""
 ROOMS = (
     *("basics", "files", "symbolic", "effects", "leveling", "approaches"),
-    *("sensors", "adjustment", "kernel", "pole"),
+    *("sensors", "adjustment", "kernel"),
 )
 """Folders of the package with all that formulas, and what is made of them, depend on."""
 

@@ -265,7 +265,7 @@ def data_sheets():
     return page(
         "# Data sheets and public data",
         "## Data sheets",
-        "`--sensor` of `accelstudy plan`, `pole` and `data-sheet` takes one of these names, or a "
+        "`--sensor` of `accelstudy plan` and `data-sheet` takes one of these names, or a "
         "YAML file like them. What a data sheet does not say is left out.",
         table(("quantity", "meaning", "unit", *(code(sheet.name) for sheet in sheets)), rows),
         table(

@@ -8,7 +8,6 @@ from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.hidden.config import HiddenConfig
 from accelstudy.hidden.real_noise import RealNoiseConfig
 from accelstudy.planning.config import Example, PlanConfig
-from accelstudy.pole.config import PoleConfig
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
@@ -17,7 +16,6 @@ SECTIONS = {
     "plan": PlanConfig,
     "designs": DesignsConfig,
     "sequential": SequentialConfig,
-    "pole": PoleConfig,
 }
 """Sections of the example of plans."""
 

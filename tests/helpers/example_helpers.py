@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from unittest import mock
 
 from click.testing import CliRunner
 from places import ROOT
@@ -34,6 +35,7 @@ FIGURES = {
     "log": ["box.png", "box/segmentation.png", "calibrated/figures/residuals.png"],
     "hidden": ["diagnosed/figures/gap.png", "diagnosed/figures/evidence.png"],
     "lot": ["lot/figures/sensors.png"],
+    "pole": ["pole.png"],
 }
 """Figures of the examples that pages show."""
 
@@ -85,7 +87,7 @@ def _output_of(command):
         return result.output
     if program == "python":
         printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
+        with contextlib.redirect_stdout(printed), mock.patch.object(sys, "argv", arguments):
             runpy.run_path(arguments[0], run_name="__main__")
         return printed.getvalue()
     if program == "snakemake":

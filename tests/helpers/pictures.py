@@ -50,7 +50,6 @@ DRAWN = {
     "plan": ("make plan-example", "accelstudy/planning/figure.py"),
     "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
     "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
-    "pole-gnss": ("make plan-example", "accelstudy/pole/figure.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
 from accelstudy.files.tables import read_table
-from accelstudy.pole.sources import sources
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
@@ -358,13 +356,6 @@ def test_colours_of_causes_keep_apart(eye):
     for colour in style.CAUSES.values():
         distances = [np.linalg.norm(seen(colour, eye) - seen(o, eye)) for o in others]
         assert sorted(distances)[1] > 15, colour
-
-
-@pytest.mark.parametrize("eye", EYES)
-def test_colours_of_sources_keep_apart(eye):
-    """What makes the foot of a pole uncertain."""
-    for one, other in combinations([each.colour for each in sources()], 2):
-        assert np.linalg.norm(seen(one, eye) - seen(other, eye)) > 15, (one, other)
 
 
 @pytest.mark.parametrize("cmap", ["viridis", "cividis", "Blues", "RdBu_r"])

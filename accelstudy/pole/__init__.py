@@ -1,1 +1,0 @@
-"""The pole: the error of its foot if roll and pitch correct the tilt, and its sources."""

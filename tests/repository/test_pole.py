@@ -1,0 +1,171 @@
+"""The example of a pole: geometry, closed forms, and a Monte Carlo of the whole."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import ROOT
+from scipy.spatial.transform import Rotation
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.data_sheets import DataSheet
+from accelstudy.design.estimability import estimability
+from accelstudy.leveling.angles import roll_pitch
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
+from accelstudy.simulation.sessions import Noise
+
+NINE = get_model("bias-scale-nonorthogonality")
+SHEET = DataSheet(
+    "test", velocity_random_walk=2e-3, bias_instability=1e-3, bias_per_kelvin=2e-4,
+    scale_per_kelvin=1e-4, repeatability=3e-3,
+)  # fmt: skip
+TILTS = np.array([0.0, 10.0, 30.0, 50.0]) * GON
+
+
+@pytest.fixture(scope="module")
+def pole():
+    spec = importlib.util.spec_from_file_location("pole_example", ROOT / "examples/pole/pole.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def calibrated(model=NINE, parameters=None, covariance=None):
+    """A calibration in McLaren's positions, predicted by linear theory unless it is given."""
+    if covariance is None:
+        noise = Noise(sigma_force=SHEET.sigma_mean(10.0))
+        found = estimability(get_scheme("mclaren-24"), model, get_approach("gravity"), noise)
+        covariance = found.cofactors
+    parameters = np.zeros(model.n_parameters) if parameters is None else parameters
+    return Calibration(model, parameters, covariance, STANDARD_GRAVITY, {})
+
+
+def of(pole, name, tilt, calibration=None, setup=None, sheet=SHEET):
+    """What one source contributes by direction, m: horizontal and down."""
+    setup = pole.Pole() if setup is None else setup
+    situation = pole.situation_at(setup, calibration or calibrated(), sheet, tilt)
+    squares = pole.mean_squares(situation)[name]
+    return np.sqrt(squares[:, :2].sum(axis=1)), np.sqrt(squares[:, 2])
+
+
+def point(pole, **values):
+    return np.array([values.get(name, 0.0) for name in pole.INPUTS])
+
+
+def test_the_foot_is_where_rotations_put_it(pole):
+    values = np.random.default_rng(1).uniform(-0.7, 0.7, len(pole.INPUTS))
+    given = dict(zip(pole.INPUTS, values, strict=True))
+    body = Rotation.from_euler("ZYX", [given["yaw"], given["pitch"], given["roll"]])
+    bore = Rotation.from_euler("YX", [given["mounting_right"], given["mounting_forward"]])
+    arm = [given["bend_forward"], given["bend_right"], given["length"]]
+    expected = values[:3] + body.apply(bore.apply(arm))
+    np.testing.assert_allclose(pole.foot(values), expected, atol=1e-14)
+
+
+def test_a_pole_leans_where_it_is_said_to(pole):
+    for direction, (north, east) in ((0.0, (-1, 0)), (np.pi / 2, (0, -1)), (np.pi, (1, 0))):
+        roll, pitch = roll_pitch(tuple(pole.leaning(30 * GON, direction, 9.8)))
+        placed = pole.foot(point(pole, length=2.0, roll=roll, pitch=pitch))
+        reach = 2 * np.sin(30 * GON)
+        expected = [reach * north, reach * east, 2 * np.cos(30 * GON)]
+        np.testing.assert_allclose(placed, expected, atol=1e-12)
+
+
+def bent_pole(setup, tilt):
+    """Foot that is computed less the true one, along the lean and down, m, by integration."""
+    x = np.linspace(0, setup.length, 40001)
+    head, metre = (
+        mass * STANDARD_GRAVITY * np.sin(tilt) for mass in (setup.head_mass, setup.pole_mass)
+    )
+    moment = head * (setup.length - x) + metre * (setup.length - x) ** 2 / 2
+    moment -= moment[0] * np.clip(1 - x / setup.hand_height, 0, None)
+    slope = np.concatenate([[0], np.cumsum((moment[1:] + moment[:-1]) / 2)]) * x[1]
+    slope /= setup.stiffness
+    sag = np.concatenate([[0], np.cumsum((slope[1:] + slope[:-1]) / 2)]) * x[1]
+    along, across = np.array([np.sin(tilt), -np.cos(tilt)]), np.array([np.cos(tilt), np.sin(tilt)])
+    top = along * setup.length + across * sag[-1]  # sags towards the lean, and down
+    at = np.interp(setup.sensor_height, x, slope)
+    return top - setup.length * (along + across * at)
+
+
+@pytest.mark.parametrize("heights", [(2.0, 1.2), (1.0, 1.2), (1.5, 0.5), (0.3, 2.0)])
+def test_bending_is_that_of_a_beam(pole, heights):
+    setup, tilt = pole.Pole(sensor_height=heights[0], hand_height=heights[1]), 40 * GON
+    horizontal, down = of(pole, "bending", tilt, setup=setup)
+    along, below = bent_pole(setup, tilt)
+    np.testing.assert_allclose(horizontal, abs(along), rtol=1e-4)
+    np.testing.assert_allclose(down, abs(below), rtol=1e-4)
+
+
+def force_error(length, tilt, direction, sigma, g):
+    """Errors of a force, equal on all axes: horizontal and down, m (docs/tutorials/pole.md)."""
+    s, c = np.sin(tilt), np.cos(tilt)
+    across = s**2 * np.sin(direction) * np.cos(direction)
+    level = 1 - s**2 * np.cos(direction) ** 2
+    size = length * sigma / g
+    return size * np.sqrt(c**2 + (c**2 + across**2) / level**2), size * s + 0 * direction
+
+
+def test_each_source_has_its_closed_form(pole):
+    setup, g = pole.Pole(), STANDARD_GRAVITY
+    noise, drift = SHEET.sigma_mean(setup.averaging), SHEET.bias_change(setup.age, restarted=True)
+    for tilt in TILTS:
+        s, c = np.sin(tilt), np.cos(tilt)
+        expected = {
+            "noise": force_error(2.0, tilt, pole.DIRECTIONS, noise, g),
+            "drift": force_error(2.0, tilt, pole.DIRECTIONS, drift, g),
+            "mounting": 2.0 * setup.mounting_sigma * np.array([np.sqrt(1 + c**2), s]),
+            "heading": (2.0 * setup.heading_sigma * s, 0.0),
+            "length": (setup.length_sigma * s, setup.length_sigma * c),
+            "position of the top": (setup.top_sigma, setup.top_sigma_down),
+        }
+        for name, pair in expected.items():
+            for got, wanted in zip(of(pole, name, tilt), pair, strict=True):
+                np.testing.assert_allclose(got, wanted, rtol=1e-7, atol=1e-12, err_msg=name)
+
+
+def test_correlated_parameters_count_with_their_covariance(pole):
+    """A bias of x and a scale of x that cancel where the pole leans forward by 30 gon."""
+    force = pole.leaning(30 * GON, 0.0, STANDARD_GRAVITY)[0]
+    direction = NINE.vector({"b_x": 1.0, "s_x": -1.0 / force})
+    whole = 1e-6 * np.outer(direction, direction)
+    cancelling, forgetting = (
+        of(pole, "calibration", 30 * GON, calibrated(covariance=each))[0][0]
+        for each in (whole, np.diag(np.diag(whole)))
+    )
+    assert cancelling < 1e-9
+    assert forgetting > 1e-5
+
+
+def test_beyond_a_knee_noise_counts_more_and_a_change_of_bias_as_before(pole):
+    """A pole leans forward by 50 gon: x feels 6.9 m/s², with half the gain left, y nothing."""
+    tilt, model, none = 50 * GON, get_model("saturation(knee=6)"), np.zeros((3, 3))
+    ideal = calibrated(model, covariance=none)
+    clipping = calibrated(model, np.full(3, 0.5), none)
+    for name in ("drift", "temperature"):  # before the sensor clips
+        np.testing.assert_allclose(
+            of(pole, name, tilt, clipping), of(pole, name, tilt, ideal), rtol=1e-6, atol=1e-12
+        )
+    c, sigma = np.cos(tilt), SHEET.sigma_mean(2.0)
+    expected = 2.0 * sigma / STANDARD_GRAVITY * np.sqrt((2 * c) ** 2 + 1 / c**2)
+    assert of(pole, "noise", tilt, clipping)[0][0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("tilt", TILTS[1:])
+def test_the_budget_agrees_with_the_exact_geometry(pole, tilt):
+    """No derivative anywhere; with parameters that are far from zero."""
+    parameters = NINE.vector({"b_x": 0.2, "b_z": -0.3, "s_y": 0.01, "alpha_zx": 500 * MGON})
+    setup = replace(pole.Pole(), top_sigma=2e-3, sensor_height=1.5)
+    calibration = calibrated(parameters=parameters)
+    table = pole.budget(setup, calibration, SHEET, [tilt]).set_index("source")
+    errors = pole.simulate(setup, calibration, SHEET, tilt, 1000, 5)
+    for column, squares in (
+        ("horizontal", np.sum(errors[..., :2] ** 2, axis=-1)), ("down", errors[..., 2] ** 2),
+    ):  # fmt: skip
+        # Directions differ systematically, so the variance is taken within each.
+        error = np.sqrt(np.mean(np.var(squares, axis=0, ddof=1)) / squares.size)
+        assert abs(np.mean(squares) - table.loc["all together", column] ** 2) < 4.5 * error
