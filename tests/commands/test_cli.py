@@ -235,7 +235,7 @@ def test_cells(tmp_path):
     *lines, gap, effort = output("cells", base).splitlines()
     assert len(lines) == 4
     assert gap == ""
-    assert effort.startswith("4 cells, up to 240 calibrations: ")
+    assert effort.startswith("4 cells, up to 240 calibrations")
     assert f"{NINE}/mclaren-24/gravity: r = 15, 60 replicates" in lines
     assert f"{NINE}/mclaren-24/robot: r = 63, 60 replicates" in lines
     assert lines[0].startswith(f"{NINE}/faces-6/gravity: rank 6 of 9: alpha_yz, ")
