@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import ROBOT_UNITS, STANDARD_GRAVITY, UNITS
+from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.campaign.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
 from accelstudy.leveling.angles import specific_force, usual_norm
 
@@ -121,7 +121,7 @@ def likely_fault(raw: Array, forces: Array, unit: str, gravity: float) -> Fault:
     if near(norm, STANDARD_GRAVITY):
         return Fault("gravity", given, norm)
     sizes = UNITS["m/s^2"]
-    better = [u for u in ("m/s^2", "g") if u != unit and near(given * sizes[u], gravity)]
+    better = [u for u in SENSOR_UNITS if u != unit and near(given * sizes[u], gravity)]
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
     return Fault(better[0] if better else "unknown", given, norm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import date as calendar_date
 from typing import Annotated, Any, Literal, Self
 
@@ -80,6 +81,19 @@ Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
 """A column by its name in the header, or by its place, counted from 0."""
 
 
+def _delimiter(value: Any) -> Any:
+    """Delimiter by any usual name."""
+    names = {"\t": "tab", "\\t": "tab", " ": "blank", "blanks": "blank", "space": "blank"}
+    names |= {"comma": ",", "semicolon": ";"}
+    value = names.get(value, value) if isinstance(value, str) else value
+    if not isinstance(value, str) or not (value in ("tab", "blank") or _IS_DELIMITER(value)):
+        raise ValueError("must be one mark, as ; or |, or tab or blank")
+    return value
+
+
+_IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
+
+
 class LogLayout(BaseModel):
     """How the numbers of a log are read: what `import` was told, and `apply` needs again.
 
@@ -99,7 +113,15 @@ class LogLayout(BaseModel):
     variable: str | None = Field(
         None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
     )
-    unit: Literal["m/s^2", "g", "counts"] = Field("m/s^2", description="unit of the forces")
+    delimiter: Annotated[str, BeforeValidator(_delimiter)] | None = Field(
+        None,
+        description="between the columns of a text, as ; or tab or blank; told from its rows if "
+        "absent",
+    )
+    unit: Annotated[
+        Literal["m/s^2", "g", "mg", "counts"],
+        BeforeValidator(lambda unit: "mg" if unit == "milli-g" else unit),
+    ] = Field("m/s^2", description="unit of the forces")
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
     offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")
     frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
@@ -177,7 +199,7 @@ class Header(Block):
     date: Annotated[str, BeforeValidator(_iso), AfterValidator(_is_date)] | None = Field(
         None, description="when it was measured, as 2026-03-01 or 2026-03-01T14:00"
     )
-    unit: Literal["m/s^2", "g", "counts"] = Field(
+    unit: Literal["m/s^2", "g", "mg", "counts"] = Field(
         description="of the forces in the table; g is 9.80665 m/s²"
     )
     nominal: Nominal | None = None

@@ -33,7 +33,7 @@ class Campaign:
     positions : (n,) int array, the column `position`
     forces : (n, 3) array, m/s², mean specific force of the holds in sensor axes
     gravity, sigma_gravity : float, m/s²
-    unit : str, of the file ("m/s^2", "g" or "counts")
+    unit : str, of the file ("m/s^2", "g", "mg" or "counts")
     sensor : str, optional
     date : str, optional, ISO 8601
     sigma_force : float, m/s², a-priori sd of a position mean; None if unknown

@@ -23,8 +23,9 @@ from accelstudy.commands.options import PATH, angle_unit_option, example, force_
 @click.option("--time", help="Column of the time, by name or number.")
 @click.option("--time-unit", help="Unit of the time: s, ms, us or ns.")
 @click.option("--rate", type=float, help="Samples per second, where there is no time.")
+@click.option("--delimiter", help="Between the columns of a text: ; or tab or blank.")
 @click.option("--variable", help="Array of a MATLAB file, topic of a bag or instance of a ULog.")
-@click.option("--unit", help="Unit of the readings: m/s^2, g or counts.")
+@click.option("--unit", help="Unit of the readings: m/s^2, g, mg or counts.")
 @click.option(
     "--start",
     type=click.FloatRange(min=0),

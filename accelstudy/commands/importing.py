@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _RANGE = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 
 _SECTIONS = {
-    "The log": ("columns", "sensor", "time", "time_unit", "rate", "variable"),
+    "The log": ("columns", "sensor", "time", "time_unit", "rate", "delimiter", "variable"),
     "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
     "The holds": ("threshold", "exclude", "join", "figure"),
     "A log of blocks instead": ("block",),

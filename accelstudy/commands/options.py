@@ -219,10 +219,11 @@ def log_options(command: Command) -> Command:
     """Add the options that say how the numbers of a log are read, in the order of the help."""
     for name, help_text in {
         "--scale": "For counts: m/s² per count, one number or three.",
-        "--unit": "Unit of the readings: m/s^2, g or counts.  [default: m/s^2]",
+        "--unit": "Unit of the readings: m/s^2, g, mg or counts.  [default: as named, or m/s^2]",
         "--variable": "Array of a MATLAB file, topic of a bag or instance of a ULog.",
+        "--delimiter": "Between columns of text: ; or tab or blank.  [default: from its rows]",
         "--rate": "Samples per second, where there is no time.",
-        "--time-unit": "Unit of the time: s, ms, us or ns.  [default: s]",
+        "--time-unit": "Unit of the time: s, ms, us or ns.  [default: as named, or s]",
         "--time": "Column of the time, by name or number.",
         "--columns": "Columns by name, or by number from 0: fx=1,fy=2,fz=3.",
     }.items():

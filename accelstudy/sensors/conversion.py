@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import UNITS
+from accelstudy.basics.units import SENSOR_UNITS, UNITS
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def conversion_of(
 
     Parameters
     ----------
-    unit : "m/s^2", "g" or "counts"
+    unit : "m/s^2", "g", "mg" or "counts"
     scale : number or (3,), m/s² per count; only with counts, which need it
     offset : number or (3,), counts at 0 m/s²; only with counts, 0 if omitted
 
@@ -66,7 +66,7 @@ def conversion_of(
         return Conversion(factor, zero)
     if scale is not None or offset is not None:
         raise InputError(f"a nominal scale or offset goes with unit counts, not {unit}")
-    sizes = {name: UNITS["m/s^2"][name] for name in ("m/s^2", "g")}
+    sizes = {name: UNITS["m/s^2"][name] for name in SENSOR_UNITS}
     if unit not in sizes:
         raise UnknownNameError("unit of a log", unit, (*sizes, "counts"))
     return Conversion(np.full(3, sizes[unit]), np.zeros(3))

@@ -422,7 +422,7 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
      "about 1.02 m.s.2: these look like g; give --unit g"),
     ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "give the --unit or the --columns"),
-    ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-1000\n" + "1,2,-9\n", "nowhere near gravity"),
+    ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-3000\n" + "1,2,-9\n", "nowhere near gravity"),
     ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
     ("log.parquet", "fx,fy,fz\n1,2,9\n", "not a whole Parquet file"),
 ])  # fmt: skip

@@ -186,7 +186,7 @@ class _Document(BaseModel):
     approach: str = ""
     n_positions: int | None = None
     effects: Annotated[list[str], Field(min_length=1)]
-    unit: Literal["m/s^2", "g", "counts"]
+    unit: Literal["m/s^2", "g", "mg", "counts"]
     nominal: Nominal | None
     gravity_mps2: Positive
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"

@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
-from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
+from accelstudy.basics.units import (
+    SENSOR_UNITS,
+    attitude_unit,
+    display_unit,
+    to_attitude,
+    to_display,
+)
 from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch, noise_of_reading
 from accelstudy.campaign.calibration.readings import Readings, readings_of
-from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet, numbers
+from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.importing.recording import AXES
 from accelstudy.campaign.importing.sources import CHUNK
@@ -218,7 +224,8 @@ class Account:
         lost = np.isnan(corrected[:, 0])
         if lost.any() and not self.empty:
             first = int(np.argmax(lost))
-            self._first_empty = self.rows + first, self._unusable(table, first)
+            absent = bool(np.isnan(forces[first]).any())
+            self._first_empty = self.rows + first, self._unusable(table, first, absent)
         self.rows += len(lost)
         self.empty += int(lost.sum())
         self._near += int(near.sum())
@@ -262,6 +269,7 @@ class Account:
     def warnings(self) -> Iterator[str]:
         """Warnings about the log."""
         of_all = f"of {counted(self.rows, 'row')}"
+        yield from self._readings.source.warnings
         if self.empty:
             first = self._reason()
             yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
@@ -296,15 +304,20 @@ class Account:
             f"{p.name} = {quantity_text(float(values[p.name]), p.unit)}" for p in effect.parameters
         )
 
-    def _unusable(self, table: pa.Table, row: int) -> str | None:
-        """Key of the first used column that has no number in a row of a chunk."""
+    def _unusable(self, table: pa.Table, row: int, absent: bool) -> str | None:
+        """Key of the first used column that has no number, or an absurd one, in a row of a chunk.
+
+        `absent` says whether a reading is missing there.
+        """
         names = column_names(self._readings.source)
         if all(not cell.is_valid for column in table.columns for cell in column.slice(row, 1)):
             return RAGGED
+        values = {}
         for key, place in self._readings.places.items():
-            if not np.isfinite(numbers(table[names[place]].slice(row, 1))).all():
+            (values[key],) = self._readings.numbers(table[names[place]].slice(row, 1), place)
+            if not np.isfinite(values[key]):
                 return key
-        return None
+        return max(AXES, key=lambda axis: abs(values[axis])) if absent else None
 
     def _reason(self) -> str:
         """Say why the first empty row is empty, and where it is."""
@@ -329,7 +342,7 @@ class Account:
             f"{readings.source.path}: the readings are about {fault.given:.3g} {readings.unit}: "
             + (
                 looks
-                if fault.cause in ("m/s^2", "g")
+                if fault.cause in SENSOR_UNITS
                 else "nowhere near gravity, "
                 f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
             )

@@ -16,14 +16,18 @@ from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.campaign.calibration.export import campaign_conversion, mending
 from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
 from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.clocks import nanoseconds
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import (
     AXES,
+    absurd,
+    absurd_from,
     locate,
     nanoseconds_beside,
     time_factor_of,
+    told_by_names,
 )
-from accelstudy.campaign.importing.sources import CHUNK, Source, nanoseconds
+from accelstudy.campaign.importing.sources import CHUNK, Source
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.reading import overlay
 from accelstudy.files.validation import checked
@@ -76,10 +80,13 @@ class Readings:
         """
         names, places = column_names(self.source), list(self.places.items())
         row, first = 0, np.nan
+        limit = absurd_from(self.source, self.places, self.conversion)
         course = Course(np.empty(0), np.empty(0))
         for table in read_chunks(self.source, chunk_size, typed):
-            values = {key: self._numbers(table[names[place]], place) for key, place in places}
-            forces = np.column_stack([values[axis] for axis in AXES])
+            values = {key: self.numbers(table[names[place]], place) for key, place in places}
+            raw = np.column_stack([values[axis] for axis in AXES])
+            forces = self.conversion.to_si(raw)
+            forces[absurd(raw, forces, limit)] = np.nan
             time = values.get("time")
             if time is not None and "nanoseconds" in values:
                 time = time + 1e-9 * values["nanoseconds"]
@@ -103,11 +110,12 @@ class Readings:
                 step_z=still,
                 course=course if len(course.time) else None,
             )
-            read = self.frame.to_frd(self.conversion.to_si(forces))
+            read = self.frame.to_frd(forces)
             yield table, read @ self.mending.T, hold
             row += len(table)
 
-    def _numbers(self, column: pa.ChunkedArray, place: int) -> Array:
+    def numbers(self, column: pa.ChunkedArray, place: int) -> Array:
+        """Numbers of a column at a place; of dates, s since 1970."""
         kind = column.type
         if place in self.source.dates:
             return 1e-9 * nanoseconds(column.to_pandas())
@@ -150,8 +158,9 @@ def readings_of(
     if {"time", "rate_hz"} <= set(given):
         raise InputError(f"{log}: give the rate or the column of time, not both")
     layout = _layout(calibration, given)
-    source = open_source(log, layout.variable)
-    layout = _layout(calibration, _with_format(source, calibration, given))
+    source = open_source(log, layout.variable, layout.delimiter)
+    own = _with_format(source, calibration, given)
+    layout = _layout(calibration, own)
     try:
         places = _places(source, layout, calibration, {*given, *given.get("columns", {})})
     except InputError as error:
@@ -174,7 +183,7 @@ def readings_of(
                 f"give it by {OPTIONS[condition]}"
             )
     unit = layout.unit
-    if calibration.log is None and "unit" not in given and "unit" not in source.layout:
+    if calibration.log is None and "unit" not in given and "unit" not in own:
         unit = calibration.content["unit"]
     # What the user says of this log is right, whatever was wrong with the campaign.
     option_of = {"unit_error": "unit", "axis_error": "frame"}
@@ -197,9 +206,10 @@ def _with_format(
     source: Source, calibration: Calibration, given: Mapping[str, Any]
 ) -> Mapping[str, Any]:
     """What the format of a log says, overlaid with `given`, unless the campaign's is like it."""
-    own = {**source.layout}
     if calibration.log is not None and calibration.log.columns.get("fx") in source.names:
         return given
+    layout = _layout(calibration, given)
+    own = {**told_by_names(source, layout.columns, layout.time)}
     if "rate_hz" in given:
         own.pop("time", None)
     return overlay(own, given)

@@ -141,7 +141,9 @@ def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
     width, none = source.width, [None] * source.width
     try:
         for row in rows:
-            yield row if len(row) == width else none
+            if source.least <= len(row) < width:
+                row += [""] * (width - len(row))
+            yield row[:width] if len(row) >= width and not any(row[width:]) else none
     except csv.Error as error:
         raise InputError(f"{source.path}: no table: {one_line(error)}") from None
 

@@ -63,10 +63,12 @@ class UnitError(GrossError):
     def mendings(self, campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
         """Convert the forces, or the angles, as if they were in another unit."""
         norm = usual_norm(campaign.forces) / campaign.gravity
-        for stated in ("g", "m/s^2") if campaign.unit == "g" else ("m/s^2", "g"):
+        own = campaign.unit if campaign.unit in SENSOR_UNITS else "m/s^2"
+        for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
             for unit, factor in _other_units("m/s^2", SENSOR_UNITS, stated).items():
                 if NEAR < factor * norm < 1 / NEAR:
-                    reason = f"the forces are in {unit}" + (", not in g" if stated == "g" else "")
+                    instead = "" if stated == "m/s^2" else f", not in {stated}"
+                    reason = f"the forces are in {unit}{instead}"
                     yield Mending(reason, _forces_times(campaign, factor), factor * np.eye(3))
         if sensor.expected is not None:
             for unit, factor in _other_angles().items():

@@ -62,6 +62,8 @@ def segment_blocks(
     left_out, scatter = {}, {}
     start = 0
     for number, rows in enumerate(_files(log) if size is None else _blocks(log, size), 1):
+        if len(rows) < PARTS:  # most are left out, which the report says
+            continue
         block = GrowingHold(start, 0, survey.extremes, full_range, 0)
         block.keep(rows)
         start += len(rows)
@@ -96,16 +98,20 @@ def _files(log: Recording) -> Iterator[Array]:
     yield np.concatenate(held)
 
 
-def _blocks(log: Recording, size: int) -> Iterator[Array]:
+def _blocks(log: Log | LogSeries, size: int) -> Iterator[Array]:
     """Samples of each block: time, forces, conditions."""
+    assert isinstance(log, Log)
     left, total = np.empty((0, 4 + len(log.conditions))), 0
-    for rows in log.chunks():
+    for rows, lost in log.all_rows():
         total += len(rows.time)
-        left = np.concatenate([left, np.column_stack([rows.time, rows.forces, rows.conditions])])
+        samples = np.column_stack([rows.time, rows.forces, rows.conditions])
+        samples[lost] = np.nan
+        left = np.concatenate([left, samples])
         whole = len(left) // size * size
-        yield from left[:whole].reshape(-1, size, left.shape[1])
+        for block in left[:whole].reshape(-1, size, left.shape[1]):
+            yield block[np.isfinite(block[:, 1])]
         left = left[whole:]
-    if len(left):
+    if np.isfinite(left[:, 1]).any():  # a note at the end is no sample
         fewer = total - len(left)
         raise InputError(
             f"{log.path}: {total} samples are no multiple of the {size} of a block (--block): "

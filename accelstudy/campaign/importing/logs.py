@@ -17,7 +17,14 @@ from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording, open_log
+from accelstudy.campaign.importing.recording import (
+    AXES,
+    Log,
+    LogSeries,
+    Recording,
+    open_log,
+    told_by_names,
+)
 from accelstudy.campaign.importing.segments import Segment, segment_logs
 from accelstudy.campaign.importing.settings import (
     ImportSettings,
@@ -47,7 +54,7 @@ class TellsAngles(Protocol):
 
 def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) -> Log:
     """Open a log by the settings; see `open_log` for `untimed`."""
-    source = open_source(path, settings.variable)
+    source = open_source(path, settings.variable, settings.delimiter)
     settings = as_its_format(settings, source)
     return open_layout(path, settings, source, untimed or settings.block is not None)
 
@@ -65,6 +72,7 @@ def open_layout(path: str | Path, layout: LogLayout, source: Source, untimed: bo
         offset=layout.offset,
         time_unit=layout.time_unit,
         variable=layout.variable,
+        delimiter=layout.delimiter,
         frame=layout.axes,
         source=source,
     )
@@ -73,7 +81,7 @@ def open_layout(path: str | Path, layout: LogLayout, source: Source, untimed: bo
 def as_its_format(settings: ImportSettings, source: Source) -> ImportSettings:
     """Settings with what the format of a log says, where they do not say it."""
     given = settings.model_dump(exclude_unset=True)
-    own = {**source.layout}
+    own = {**told_by_names(source, settings.columns, settings.time)}
     if "rate_hz" in given:
         own.pop("time", None)
     return ImportSettings.model_validate(overlay(own, given))
@@ -145,7 +153,7 @@ def import_sensors(
         if len(paths) > 1:
             raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
         return _import_blocks(paths, chosen)
-    logs = {name: _recording(paths, each) for name, each in chosen.items()}
+    logs = _turned_together({name: _recording(paths, each) for name, each in chosen.items()})
     chosen = {name: as_its_format(each, _source(logs[name])) for name, each in chosen.items()}
     if any(isinstance(log, LogSeries) and _whole_files(log, settings) for log in logs.values()):
         return _import_blocks(paths, chosen)
@@ -318,6 +326,19 @@ def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Log | L
     if len(parts) == 1:
         return parts[0]
     return LogSeries([replace(part, lively=False) for part in parts])
+
+
+def _turned_together(logs: dict[str, Log | LogSeries]) -> dict[str, Log | LogSeries]:
+    """Logs of sensors in one file, of which a row that lacks a reading of one is no row of any."""
+    result = dict(logs)
+    for name, log in logs.items() if len(logs) > 1 else ():
+        parts = []
+        for i, part in enumerate(_parts(log)):
+            others = {other: _parts(logs[other])[i].places for other in logs if other != name}
+            beside = {f"{other}: {axis}": at[axis] for other, at in others.items() for axis in AXES}
+            parts.append(replace(part, beside=beside))
+        result[name] = LogSeries(parts) if isinstance(log, LogSeries) else parts[0]
+    return result
 
 
 def _parts(log: Log | LogSeries) -> Sequence[Log]:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.allan import MeanAccuracy
 from accelstudy.campaign.importing.holds import DetectedHolds
-from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
+from accelstudy.campaign.importing.names import thermometers
+from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
@@ -123,6 +124,9 @@ def campaign_of_holds(
         missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
         warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
     assert isinstance(first, Log)
+    parts = log.parts if isinstance(log, LogSeries) else [first]
+    notes = [*_recognised(settings, first), *notes]
+    warnings += [warning for part in parts for warning in part.warnings()]
     columns: dict[str, Any] = {}
     if holds.size is None or "time" in first.places:
         columns = {"slope": holds.of_each("slope"), "sd_slope": holds.sd_slope}
@@ -151,6 +155,30 @@ def campaign_of_holds(
         len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
     )
     return campaign, report
+
+
+def _recognised(settings: ImportSettings, log: Log) -> Iterator[str]:
+    """How the columns of a log were taken."""
+    names = [name if log.source.named else f"column {name}" for name in log.source.names]
+    used = {key: names[place] for key, place in log.places.items()}
+    unused = [
+        name
+        for place, name in enumerate(names)
+        if place not in {*log.places.values(), *log.beside.values()}
+    ]
+    forces = ", ".join(used[axis] for axis in AXES)
+    time = f"time from {used['time']}, " if "time" in used else ""
+    if time and log.places["time"] not in log.source.dates:
+        time = f"time from {used['time']} ({settings.time_unit}), "
+    conditions = "".join(f", {key} from {used[key]}" for key in log.conditions)
+    yield (
+        f"columns: {time}forces from {forces} ({settings.unit}){conditions}"
+        + (f"; not used: {short_list(unused)}" if unused else "")
+    )
+    if "temperature" not in used and (heat := thermometers(log.source.names)):
+        each = short_list([names[place] for place in heat])
+        yield f"temperature: which of {each}, in °C? Give --columns temperature=NAME"
+    yield from log.source.notes
 
 
 def _doubts(holds: DetectedHolds, gravity: float) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from accelstudy.basics.errors import InputError
@@ -17,15 +18,42 @@ from accelstudy.files.reading import readable
 
 _BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")
 _ULOG = b"ULog\x01\x12\x35"
+_OTHERS = {
+    b"PK\x03\x04": "a zip archive; unpack it first",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook; save its sheet as CSV",
+    b"\x89HDF": "a MATLAB 7.3 (HDF5) file; save it with -v7",
+    b"BZh": "packed by bzip2; unpack it first",
+    b"\xfd7zXZ": "packed by xz; unpack it first",
+    b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
+    b"Rar!": "a RAR archive; unpack it first",
+    b"\x28\xb5\x2f\xfd": "packed by zstd; unpack it first",
+    b"%PDF": "a PDF; a log is text, MATLAB, Parquet, a bag or a ULog",
+}
+"""What files begin with that are no logs, and what they are."""
+_JSON = re.compile(rb"(\xef\xbb\xbf)?\s*(\{\s*[\"}]|\[\s*[\[{\"])")
 
 
-def open_source(path: str | Path, variable: str | None = None) -> Source:
-    """Open a file of numbers, by its ending and its first bytes."""
+def open_source(
+    path: str | Path, variable: str | None = None, delimiter: str | None = None
+) -> Source:
+    """Open a file of numbers, by its ending and its first bytes.
+
+    Parameters
+    ----------
+    path : file; a pipe is none, since a log is read more than once
+    variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
+    delimiter : str, between the columns of a text, see `LogLayout`
+    """
     path = Path(path)
     if (path / BAG_OF_FOLDER).is_file():
         return open_bag(path, variable)
-    with readable(path), path.open("rb") as file:
-        start = file.read(128)
+    with readable(path):
+        if not (path.is_file() or path.is_dir()) and path.stat():
+            raise InputError(
+                f"{path}: a pipe or a device, and a log is read more than once; save it in a file"
+            )
+        with path.open("rb") as file:
+            start = file.read(128)
     if not start:
         raise InputError(f"{path}: the file is empty")
     if path.suffix.lower() in (".parquet", ".pq"):
@@ -34,7 +62,7 @@ def open_source(path: str | Path, variable: str | None = None) -> Source:
         kind = Path(path.stem).suffix.lower()
         if kind in (".parquet", ".pq", ".mat"):
             raise InputError(f"{path}: unpack it first; only text is read from gzip")
-        return TextSource(path)
+        return TextSource(path, delimiter)
     # An ASCII .mat has no zero bytes; every binary one has some in its header.
     if path.suffix.lower() == ".mat" and 0 in start:
         return open_matlab(path, variable)
@@ -42,6 +70,12 @@ def open_source(path: str | Path, variable: str | None = None) -> Source:
         return open_bag(path, variable)
     if start.startswith(_ULOG):
         return open_ulog(path, variable)
-    if start.startswith(b"\x89HDF"):
-        raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7")
-    return TextSource(path)
+    for first, what in _OTHERS.items():
+        if start.startswith(first):
+            office = any(part in start for part in (b"[Content_Types]", b"docProps/", b"xl/"))
+            if first == b"PK\x03\x04" and (office or path.suffix.lower() == ".xlsx"):
+                what = "an Excel workbook; save its sheet as CSV"
+            raise InputError(f"{path}: {what}")
+    if _JSON.match(start):
+        raise InputError(f"{path}: JSON; save it as CSV, with a row for each sample")
+    return TextSource(path, delimiter)

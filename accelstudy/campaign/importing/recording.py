@@ -8,22 +8,27 @@ forces in m/s². An error is one line with its place in the file.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import CLOCK_UNITS, UNITS
-from accelstudy.basics.wording import short_list
+from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
+from accelstudy.basics.wording import counted, short_list
+from accelstudy.campaign.importing.names import (
+    places_by_name,
+    unit_in,
+    without_unit,
+)
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.sources import CHUNK, Source, check_numbers
-from accelstudy.sensors.conversion import Conversion, conversion_of
+from accelstudy.campaign.importing.sources import CHUNK, Source
+from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 
 Array = NDArray[np.float64]
@@ -35,25 +40,18 @@ AXES = ("fx", "fy", "fz")
 
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
+ABSURD = 1e4
+"""m/s², some 1000 g: what levels gives no larger reading."""
+SENTINELS = (2.0**31 - 1, -(2.0**31), 1 - 2.0**31, 2.0**32 - 1)
+"""Numbers that stand for a missing reading: the ends of the integers of 32 bits."""
+TYPICAL = 1000
+"""Rows of a log that tell how large its readings are."""
+MANY = 0.05
+"""Share of rows without a usable reading from which on a log is refused."""
+NAMED = 3
+"""Rows that are named of those left out."""
 GAP = 5.0
 """A step of time that is this many times the usual one is a gap."""
-_OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
-_KNOWN_NAMES = {
-    "fx": rf"f_?x|a_?x|acc?_?x|acc?el_?x|accelerationx|{_OF_ROS}acceleration_x|x",
-    "fy": rf"f_?y|a_?y|acc?_?y|acc?el_?y|accelerationy|{_OF_ROS}acceleration_y|y",
-    "fz": rf"f_?z|a_?z|acc?_?z|acc?el_?z|accelerationz|{_OF_ROS}acceleration_z|z",
-    "time": r"t|time|time_m?u?n?s|timestamp|seconds",
-    "temperature": r"_?(field_)?(temp|temperature)|temp(erature)?_(deg_?)?c",
-    "vibration": r"vibration|vibration_mps2",
-    "n_samples": r"n|n_samples|count",
-    "sd_fx": r"sd_?f?x|s_?x|sd_a_?x",
-    "sd_fy": r"sd_?f?y|s_?y|sd_a_?y",
-    "sd_fz": r"sd_?f?z|s_?z|sd_a_?z",
-    "roll": r"roll|roll_robot(_gon)?",
-    "pitch": r"pitch|pitch_robot(_gon)?",
-    "yaw": r"yaw|yaw_robot(_gon)?",
-}
-_SECONDS = r"(.*_)?secs?"
 _NANOSECONDS = re.compile(r"(.*?)n(ano)?(secs?)", re.IGNORECASE)
 """Whole seconds of a stamp of ROS, where there is no other time, and the rest of it."""
 _TIME_OR_CONDITION = re.compile(
@@ -119,6 +117,7 @@ def open_log(
     offset: ArrayLike | None = None,
     time_unit: str = "s",
     variable: str | None = None,
+    delimiter: str | None = None,
     frame: Frame = FRD,
     chunk_size: int = CHUNK,
     source: Source | None = None,
@@ -133,10 +132,11 @@ def open_log(
     time : column of time; by its name in the header if omitted
     rate : float, samples per second, instead of a column of time
     untimed : bool, whether a log may have neither; its times are numbers of samples then
-    unit : "m/s^2", "g" or "counts"
+    unit : "m/s^2", "g", "mg" or "counts"
     scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
     time_unit : "s", "ms", "us" or "ns"
     variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
+    delimiter : str, between the columns of a text, see `LogLayout`
     frame : Frame, the axes of the log
     chunk_size : int, rows held in memory at a time
     source : Source, the file if it is open already
@@ -153,7 +153,7 @@ def open_log(
         raise InputError(f"{path}: give the rate or the column of time, not both")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: the rate must be positive, not {rate:g}")
-    source = source or open_source(path, variable)
+    source = source or open_source(path, variable, delimiter)
     given = dict(columns or {})
     for key in given:
         if key not in (*AXES, *CONDITIONS):
@@ -206,15 +206,11 @@ def locate(
             raise UnknownNameError("column", key, wanted)
     places = {key: _place(source, key, column) for key, column in given.items()}
     for key in wanted:
-        patterns = [_KNOWN_NAMES.get(key, re.escape(key)), *([_SECONDS] if key == "time" else [])]
-        for pattern in patterns:
-            matches = [
-                i
-                for i, name in enumerate(source.names)
-                if re.fullmatch(pattern, re.sub(r"[\s.\-/]+", "_", name.strip()), re.IGNORECASE)
-            ]
-            if len(matches) == 1:
-                places.setdefault(key, matches[0])
+        matches = places_by_name(source.names, key) or (
+            [*source.dates] if key == "time" else []  # whatever its name
+        )
+        if len(matches) == 1:
+            places.setdefault(key, matches[0])
     if not places and tuple(wanted[:3]) == AXES and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
     for key, place in places.items():
@@ -255,6 +251,26 @@ def nanoseconds_beside(source: Source, places: Mapping[str, int]) -> dict[str, i
     return {"nanoseconds": found[0]} if len(found) == 1 else {}
 
 
+def told_by_names(
+    source: Source, columns: Mapping[str, Column], time: Column | None
+) -> Mapping[str, Any]:
+    """Keys of `LogLayout` that the names of the columns tell: the units of forces and of time."""
+    own: dict[str, Any] = dict(source.layout)
+    forces = {key: column for key, column in columns.items() if key in AXES}
+    try:
+        axes = locate(source, {**forces, **own.get("columns", {})}, AXES, needed=False)
+        clock = locate(source, {} if time is None else {"time": time}, ("time",), needed=False)
+    except InputError:  # who opens the log says it
+        return own
+    units = {unit_in(source.names[axes[axis]], axis) for axis in AXES if axis in axes}
+    if len(units) == 1 and units & set(SENSOR_UNITS):
+        own.setdefault("unit", units.pop())
+    dated = clock.get("time") in source.dates or nanoseconds_beside(source, clock)
+    if clock and not dated and (unit := unit_in(source.names[clock["time"]], "time")):
+        own.setdefault("time_unit", unit)
+    return own
+
+
 def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) -> float:
     """Seconds per unit of the column of time.
 
@@ -277,6 +293,10 @@ def _place(source: Source, key: str, column: Column) -> int:
         if names.count(column) > 1:
             raise InputError(f"{source.path}: {key}: there are several columns {column!r}")
         return names.index(column)
+    # A unit in brackets belongs to the column, and may be in one of the names only.
+    plain = [i for i, name in enumerate(names) if without_unit(name) == without_unit(str(column))]
+    if source.named and isinstance(column, str) and len(plain) == 1:
+        return plain[0]
     if isinstance(column, str) and re.fullmatch(r"[0-9]{1,9}", column):
         column = int(column)
     if isinstance(column, int):
@@ -286,6 +306,52 @@ def _place(source: Source, key: str, column: Column) -> int:
             f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
         )
     raise InputError(f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}")
+
+
+def absurd(raw: Array, forces: Array, limit: float) -> NDArray[np.bool_]:
+    """Which readings (k, 3) are none that a sensor gives; raw and in m/s², `limit` as below."""
+    return (np.abs(forces) > limit) | np.isin(raw, SENTINELS)
+
+
+def absurd_from(source: Source, places: Mapping[str, int], conversion: Conversion) -> float:
+    """Size, m/s², from which on a reading is absurd: `ABSURD`, and a thousand times the usual one.
+
+    The latter since the unit, which may be wrong, is checked by the means of the holds.
+    """
+    with closing(source.read([places[axis] for axis in AXES], TYPICAL)) as chunks:
+        raw = next(chunks, np.empty((0, 3)))
+    raw = raw[(np.abs(raw) <= LARGEST).all(axis=1) & ~np.isin(raw, SENTINELS).any(axis=1)]
+    usual = np.median(np.linalg.norm(conversion.to_si(raw), axis=1)) if len(raw) else 0.0
+    return max(ABSURD, 1000 * float(usual))
+
+
+@dataclass
+class Losses:
+    """Rows of a log that are left out, since a reading is missing or absurd.
+
+    Attributes
+    ----------
+    rows, count : int, rows of the log, and how many of them are left out
+    first : list of (row, key), the first ones, and what is missing there
+    """
+
+    rows: int = 0
+    count: int = 0
+    first: list[tuple[int, str]] = field(default_factory=list)
+
+    def add(self, lost: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """Add rows, (k,) for each column whether they lack it; which of them lack something."""
+        each = np.array([*lost.values()])
+        of_any: NDArray[np.bool_] = np.any(each, axis=0)
+        for i in np.flatnonzero(of_any)[: NAMED - len(self.first)]:
+            self.first.append((self.rows + int(i), list(lost)[int(np.argmax(each[:, i]))]))
+        self.rows += len(of_any)
+        self.count += int(of_any.sum())
+        return of_any
+
+    def update(self, other: Losses) -> None:
+        """Take over those of another reading."""
+        self.rows, self.count, self.first = other.rows, other.count, other.first
 
 
 @dataclass(frozen=True)
@@ -305,6 +371,8 @@ class Log:
     chunk_size : int, rows held in memory at a time
     lively : bool, whether each channel must change; in a single position, one of a coarse sensor
         may be constant
+    beside : mapping of names to columns of other sensors, which lose the same rows
+    losses : Losses, of the last reading to the end
     """
 
     path: Path
@@ -316,6 +384,8 @@ class Log:
     frame: Frame
     chunk_size: int
     lively: bool = True
+    beside: Mapping[str, int] = field(default_factory=dict)
+    losses: Losses = field(default_factory=Losses, compare=False)
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -331,10 +401,10 @@ class Log:
         """
         if self.rate is not None:
             return 1.0 / self.rate
-        rows = next(self.chunks(), None)
-        if rows is None or len(rows.time) < 2:
-            raise InputError(f"{self.path}: too few samples")
-        return usual_step(np.diff(rows.time))
+        for rows in self.chunks():
+            if len(rows.time) > 1:
+                return usual_step(np.diff(rows.time))
+        raise InputError(f"{self.path}: too few samples")
 
     @cached_property
     def start(self) -> float:
@@ -342,7 +412,9 @@ class Log:
         if self.rate is not None:
             return np.nan
         places = [self.places[key] for key in ("time", "nanoseconds") if key in self.places]
-        first = next(self.source.read(places, 1), np.full((1, 2), np.nan))[0]
+        with closing(self.source.read(places, TYPICAL)) as chunks:
+            whole = (rows[np.isfinite(rows).all(axis=1)] for rows in chunks)
+            first = next((rows[0] for rows in whole if len(rows)), np.full(2, np.nan))
         return float(first[0] * self.time_factor + 1e-9 * first[1:].sum())
 
     def likely_unit(self) -> str:
@@ -362,53 +434,107 @@ class Log:
     def chunks(self) -> Iterator[Rows]:
         """Samples from the beginning to the end; times count from the first one.
 
+        Rows in which a reading is missing or absurd are left out.
+
         Raises
         ------
         InputError
-            At a value that is no finite number and where time does not increase; at the end if the
-            log is empty or a channel is constant.
+            Where time does not increase; at the end if the log is empty, a channel is constant, or
+            many rows are left out.
         """
-        keys = list(self.places)
-        axes = [keys.index(axis) for axis in AXES]
-        others = [keys.index(key) for key in self.conditions]
         row, last = 0, -np.inf
         lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
-        clock = self.places.get("time")
-        start = None
         # What is wrong in the middle of a file must not leave it open.
-        with closing(self.source.read(list(self.places.values()), self.chunk_size, clock)) as rows:
-            for raw in rows:
-                if clock is not None:
-                    raw[:, keys.index("time")] *= self.time_factor
-                if "nanoseconds" in keys:
-                    raw[:, keys.index("time")] += 1e-9 * raw[:, keys.index("nanoseconds")]
-                check_numbers(self.source, self.places, raw, row, self.conditions)
-                readings = raw[:, axes]
-                forces = self.frame.to_frd(self.conversion.to_si(readings))
-                if clock is not None:
-                    start = raw[0, keys.index("time")] if start is None else start
-                    time = raw[:, keys.index("time")] - start
-                    self._check_order(time, last, row)
-                    last = time[-1]
-                else:
-                    assert self.rate is not None
-                    time = np.arange(row, row + len(raw)) / self.rate
-                lowest = np.minimum(lowest, readings.min(axis=0))
-                highest = np.maximum(highest, readings.max(axis=0))
-                row += len(raw)
-                yield Rows(time, forces, raw[:, others])
+        with closing(self.all_rows()) as chunks:
+            for rows, lost in chunks:
+                row += len(lost)
+                if lost.any():
+                    rows = Rows(rows.time[~lost], rows.forces[~lost], rows.conditions[~lost])
+                if not len(rows.time):
+                    continue
+                if self.rate is None:
+                    self._check_order(rows.time, last, np.flatnonzero(~lost) + row - len(lost))
+                last = rows.time[-1]
+                lowest = np.minimum(lowest, rows.forces.min(axis=0))
+                highest = np.maximum(highest, rows.forces.max(axis=0))
+                yield rows
         if row < 2:
             raise InputError(f"{self.path}: too few samples ({row})")
-        for axis, constant in zip(AXES, lowest == highest, strict=True):
+        same = (lowest == highest)[np.argsort(self.frame.order)]
+        for axis, constant in zip(AXES, same, strict=True):
             if constant and self.lively:
                 name = self.source.names[self.places[axis]]
                 raise InputError(f"{self.path}: column {name} ({axis}) is constant")
 
-    def _check_order(self, time: Array, last: float, row: int) -> None:
+    def all_rows(self) -> Generator[tuple[Rows, NDArray[np.bool_]], None, None]:
+        """Rows from the beginning to the end, and which of them have a missing or absurd reading.
+
+        Raises
+        ------
+        InputError
+            At the end, if many have.
+        """
+        columns = {**self.places, **self.beside}
+        keys = list(columns)
+        others = [keys.index(key) for key in self.conditions]
+        sensors = [AXES, *zip(*[iter(self.beside)] * 3, strict=True)]
+        clock, start = self.places.get("time"), np.nan
+        limit = absurd_from(self.source, self.places, self.conversion)
+        losses = Losses()
+        with closing(self.source.read(list(columns.values()), self.chunk_size, clock)) as chunks:
+            for raw in chunks:
+                values = dict(zip(keys, raw.T, strict=True))
+                lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
+                for key in self.conditions:
+                    values[key][lost.pop(key)] = np.nan
+                for axes in sensors:
+                    readings = np.column_stack([values[key] for key in axes])
+                    forces = self.conversion.to_si(readings)
+                    for key, none in zip(axes, absurd(readings, forces, limit).T, strict=True):
+                        lost[key] |= none
+                    if axes is AXES:
+                        own = self.frame.to_frd(forces)
+                time = np.arange(losses.rows, losses.rows + len(raw)) / (self.rate or 1.0)
+                of_any = losses.add(lost)
+                if clock is not None:
+                    time = values["time"] * self.time_factor
+                    time += 1e-9 * values.get("nanoseconds", 0.0)
+                    if np.isnan(start) and not of_any.all():
+                        start = time[np.argmin(of_any)]
+                    time -= start
+                yield Rows(time, own, raw[:, others]), of_any
+        self.losses.update(losses)
+        if losses.count > MANY * losses.rows:
+            hint = "; give the rate (--rate) instead" if losses.first[0][1] == "time" else ""
+            raise InputError(
+                f"{self.path}: {self._lost(*losses.first[0])}, not a usable number{hint}; "
+                f"{losses.count} of {counted(losses.rows, 'row')} lack one, which are too many"
+            )
+
+    def warnings(self) -> list[str]:
+        """What could not be read, of a log that was read to the end."""
+        losses = self.losses
+        if not losses.count:
+            return [*self.source.warnings]
+        each = "; ".join(self._lost(*first) for first in losses.first)
+        more = "; …" if losses.count > len(losses.first) else ""
+        return [
+            *self.source.warnings,
+            f"{losses.count} of {counted(losses.rows, 'row')} left out, as a reading is missing or "
+            f"absurd: {each}{more}",
+        ]
+
+    def _lost(self, row: int, key: str) -> str:
+        """Say what is missing in a row."""
+        place = {**self.places, **self.beside}[key]
+        where, cell = self.source.look_up(row, place)
+        return f"{where}, column {self.source.names[place]} ({key}): {cell}"
+
+    def _check_order(self, time: Array, last: float, rows: NDArray[np.int_]) -> None:
         backward = np.diff(time, prepend=last) <= 0
         if backward.any():
-            i = int(np.argmax(backward))
-            where, cell = self.source.look_up(row + i, self.places["time"])
+            row = int(rows[np.argmax(backward)])
+            where, cell = self.source.look_up(row, self.places["time"])
             raise InputError(
                 f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
                 f"time does not increase ({cell}); give the rate if it does not count"

@@ -5,13 +5,12 @@ from __future__ import annotations
 import csv
 import gzip
 import re
-import warnings
 import zlib
 from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, cast
 
@@ -19,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.wording import one_line
+from accelstudy.basics.wording import counted, one_line
+from accelstudy.campaign.importing.clocks import is_stamp, nanoseconds
+from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
 from accelstudy.sensors.conversion import LARGEST
@@ -39,11 +40,12 @@ GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
-_COMMENTS = "#%"
+_LONGEST = 2**20  # characters of a line
+_COMMENTS = ("#", "%", "//", ";")
+_NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
+_SEPARATORS = {"tab": "\t", "blank": None}
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
 _BUFFER = 2**20  # bytes of a Parquet column
-_IS_DATE = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?")
-_OF_ROS = re.compile(r"(.*[._/])?linear[_.]acceleration[._/]x", re.IGNORECASE)
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
 
 
@@ -57,6 +59,8 @@ class Source(Protocol):
     named : bool, whether the file has names
     dates : set of int, places of columns of dates with times, which `read` gives in s
     layout : mapping, what the format says of the keys of `LogLayout`; empty for a plain table
+    notes : sequence of str, how the file was read, in lines for people
+    warnings : sequence of str, what of the file could not be read
     """
 
     path: Path
@@ -64,6 +68,12 @@ class Source(Protocol):
     named: bool
     dates: Set[int]
     layout: Mapping[str, Any]
+    warnings: Sequence[str]
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """How the file was read, in lines for people."""
+        ...
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
@@ -103,61 +113,61 @@ class TextSource:
     named : bool, whether there is a header
     delimiter : str, None for blanks
     decimal : str, mark between units and tenths
-    comment : str, with which lines begin that are no data
-    quoted : bool, whether numbers stand in quotation marks
+    comment : str, from which on the rest of a line is no data
     first : int, lines before the data
-    width : int, number of columns
-    dates, layout : see `Source`
+    width, least : int, cells of a row: at most, and usual if the last ones are empty
+    repeated : int, how often the header stands between the rows, as far as these were read
+    dates, layout, notes, warnings : see `Source`
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        with self._readable(), self._open() as file:
-            text = file.read(_PREVIEW)
-            more = bool(file.read(1))
+    warnings: Sequence[str] = ()
+
+    def __init__(self, path: Path, delimiter: str | None = None) -> None:
+        self.path, self.repeated = path, 0
+        self._encoding = "utf-8-sig"
+        with self._readable():
+            with self._open_binary() as start:
+                self._encoding = _encoding_of(start.read(4096))
+            with self._open() as file:
+                text = file.read(_PREVIEW)
+                more = bool(file.read(1))
         lines = text.split("\n")
         if more and len(lines) == 1:  # it would be read as a whole
             raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
         if more:
             lines.pop()  # it may be cut
-        rows = [line for line in lines if _is_row(line)]
-        scores = [sum(_count_numbers(row, layout) for row in rows) for layout in _LAYOUTS]
-        if not rows or max(scores) == 0:
-            raise InputError(f"{path}: no line of numbers at the beginning")
-        layout = _LAYOUTS[int(np.argmax(scores))]
-        self.delimiter: str | None = layout[0]
-        self.decimal = layout[1]
-        # Most lines are data; everything before the first such line is the header.
-        usual = _most_frequent(len(split_line(row, self.delimiter)) for row in rows)
-        alike = [row for row in rows if len(split_line(row, self.delimiter)) == usual]
-        # A line may hold text beside its numbers.
-        numbers = max(1, _most_frequent(_count_numbers(row, layout) for row in alike))
-        first = next(
-            (
-                i
-                for i, line in enumerate(lines)
-                if _is_row(line)
-                and _count_numbers(line, layout) >= numbers
-                and len(split_line(line, self.delimiter)) == usual
-            ),
-            None,
-        )
-        if first is None:
-            raise InputError(f"{path}: no line of numbers at the beginning")
-        self.first, self.width = first, usual
-        cells = split_line(lines[first], self.delimiter)
-        self.dates: Set[int] = {i for i, cell in enumerate(cells) if _IS_DATE.fullmatch(cell)}
-        self.quoted = any('"' in line for line in lines[first:])
-        self.comment = next((c for c in _COMMENTS for line in lines if line.lstrip()[:1] == c), "#")
-        header = self._header(lines[:first])
-        self.named = header is not None
-        self.names = header or [str(i) for i in range(usual)]
+        layouts = _LAYOUTS
+        if delimiter is not None:
+            given = _SEPARATORS.get(delimiter, delimiter)
+            layouts = ((given, "."), *(() if given == "," else ((given, ","),)))
+        tables = [_Table(lines, *layout) for layout in layouts]
+        table = max(tables, key=lambda table: table.score)
+        if not table.score:
+            advice = "" if delimiter is None else f" with --delimiter {delimiter!r}"
+            raise InputError(f"{path}: no line of numbers at the beginning{advice}")
+        self.delimiter, self.decimal = table.delimiter, table.decimal
+        self.first, self.width, self.least = table.first, table.width, table.least
+        self.dates: Set[int] = table.dates
+        self.comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
+        self.named = table.names is not None
+        self.names = table.names or [str(i) for i in range(self.width)]
+        self._notes, self._repeats = table.notes, table.header
         self.layout = layout_by_names(self.names)
+        self._comments = _comments(self.delimiter)
+        self._marks = ('"', *self._comments, *self._repeats)
+        # A cell in quotation marks that holds neither another mark nor the delimiter.
+        self._quoted = re.compile(f'"[^"\n{re.escape(self.delimiter or " ")}]*"')
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines about the text as a table; see `Source`."""
+        again = f"the header stands {counted(self.repeated, 'more time')} between the rows"
+        return [*self._notes, *([again] if self.repeated else [])]
 
     def read(
         self, places: Sequence[int], chunk_size: int, clock: int | None = None
     ) -> Generator[Array, None, None]:
-        """Rows of some columns; see `Source`."""
+        """Rows of some columns; see `Source`. A row with too many cells has no numbers."""
         import pandas as pd
 
         try:
@@ -165,44 +175,43 @@ class TextSource:
                 self._readable(),
                 self._open(self.first) as file,
                 pd.read_csv(
-                    file,
+                    cast(TextIO, _Lines(self, file)),
                     sep=self.delimiter or r"\s+",
                     decimal=self.decimal,
-                    header=None,
-                    names=range(self.width + 1),
+                    # With columns to use, a row may have more cells than the first line.
+                    usecols=sorted({*places, self.width}),
+                    header=0,
                     index_col=False,
                     comment=self.comment,
-                    quoting=csv.QUOTE_MINIMAL if self.quoted else csv.QUOTE_NONE,
                     skipinitialspace=True,
                     low_memory=False,
-                    on_bad_lines="error",
                     chunksize=chunk_size,
                 ) as reader,
             ):
-                yield from self._rows(_chunks(reader), places, clock)
+                yield from self._rows(reader, places, clock)
         except InputError:
             raise
         except pd.errors.EmptyDataError:
             return
-        except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-            if "inside string" in str(error):
-                raise InputError(f"{self.path}: a quotation mark opens and never closes") from None
-            raise InputError(f"{self.path}: {self._odd_line()}") from None
+        except pd.errors.ParserError as error:
+            raise InputError(f"{self.path}: no table: {one_line(error)}") from None
 
     def _rows(
         self, chunks: Iterable[pd.DataFrame], places: Sequence[int], clock: int | None
     ) -> Iterator[Array]:
         def columns() -> Iterator[list[NDArray[Any]]]:
             for chunk in chunks:
-                # A surplus cell ends up in the column after the last.
-                if chunk[self.width].notna().any():
-                    raise InputError(f"{self.path}: {self._odd_line()}")
-                yield [
-                    nanoseconds(chunk[place])
+                values = [
+                    nanoseconds(chunk[str(place)])
                     if place in self.dates
-                    else _numbers_of_text(chunk[place])
+                    else _numbers_of_text(chunk[str(place)], self.decimal)
                     for place in places
                 ]
+                # A surplus cell ends up in the column after the last.
+                surplus = chunk[str(self.width)].notna().to_numpy()
+                if surplus.any():
+                    values = [np.where(surplus, np.nan, column) for column in values]
+                yield values
 
         return rows_of(columns(), places, self.dates, clock)
 
@@ -212,6 +221,8 @@ class TextSource:
         if not number:
             return f"row {row + 1}", "unreadable"
         cells = split_line(line.split(self.comment)[0], self.delimiter)
+        if any(cells[self.width :]):
+            return f"line {number}", f"{len(cells)} columns instead of {self.width}"
         if place >= len(cells):
             return f"line {number}", "the line ends before it"
         return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
@@ -220,20 +231,52 @@ class TextSource:
         """Lines of data with their numbers, counted from 1."""
         with self._readable(), self._open() as file:
             for number, line in enumerate(file, 1):
-                if number > self.first and line.strip() and line.lstrip()[0] != self.comment:
-                    yield number, line.rstrip("\n")
+                if number > self.first and (row := self._row(line.rstrip("\n"))) is not None:
+                    yield number, row
+
+    def of_table(self, text: str) -> str:
+        """Lines of a text without those that are no rows."""
+        if not any(mark in text for mark in self._marks):
+            return text
+        lines = text.split("\n")
+        self.repeated += sum(line.strip() in self._repeats for line in lines)
+        if '"' in text and '"' not in self._quoted.sub("", text):
+            rows = [row for line in lines if (row := self._row(line, closed=True)) is not None]
+        else:
+            rows = [row for line in lines if (row := self._row(line)) is not None]
+        return "".join(f"{row}\n" for row in rows)
+
+    def _row(self, line: str, closed: bool = False) -> str | None:
+        """A line of the table, None for any other; a cell of a log has no end of a line.
+
+        So a quotation mark that is not `closed` in its line has no meaning.
+        """
+        content = line.strip(_blanks(self.delimiter))
+        if not content or content.startswith(self._comments) or line.strip() in self._repeats:
+            return None
+        if closed or '"' not in line:
+            return line
+        try:
+            reader = csv.reader([line, ""], delimiter=self.delimiter or " ", skipinitialspace=True)
+            closed = sum(1 for _ in reader) == 2
+        except csv.Error:
+            closed = False
+        return line if closed else line.replace('"', "")
+
+    def _open_binary(self) -> BinaryIO:
+        with self.path.open("rb") as start:
+            packed = start.read(len(GZIP)) == GZIP
+        return cast(BinaryIO, gzip.GzipFile(self.path)) if packed else self.path.open("rb")
 
     def _open(self, skipped: int = 0) -> TextIO:
         """Open the file and skip some lines; quotation marks in a header have no meaning."""
-        with self.path.open("rb") as start:
-            packed = start.read(len(GZIP)) == GZIP
-        if packed:
-            unpacked = cast(BinaryIO, gzip.GzipFile(self.path))
-            file: TextIO = TextIOWrapper(unpacked, encoding="utf-8-sig", errors="replace")
-        else:
-            file = self.path.open(encoding="utf-8-sig", errors="replace")
-        for _ in range(skipped):
-            file.readline()
+        file = TextIOWrapper(self._open_binary(), encoding=self._encoding, errors="replace")
+        try:
+            for _ in range(skipped):
+                file.readline()
+        except BaseException:
+            file.close()
+            raise
         return file
 
     @contextmanager
@@ -244,39 +287,145 @@ class TextSource:
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{self.path}: not a whole gzip file") from None
 
-    def _odd_line(self) -> str:
-        for number, line in self.rows():
-            cells = len(split_line(line, self.delimiter))
-            if cells > self.width:
-                return f"line {number}: {cells} columns instead of {self.width}"
-        return "some line has too many columns"
 
-    def _header(self, before: Sequence[str]) -> list[str] | None:
-        """Names from the last line before the data, which may be a comment."""
-        for line in reversed(before):
-            if line.strip():
-                names = split_line(line.strip().lstrip(_COMMENTS).strip(), self.delimiter)
-                names = [" ".join(name.strip("\"'").split()) for name in names]
-                return names if len(names) == self.width else None
-        return None
+class _Lines:
+    """The rows of a text as a file; before them a line with a cell more than they have."""
+
+    def __init__(self, source: TextSource, file: TextIO) -> None:
+        self._source, self._file = source, file
+        self._first = (source.delimiter or " ").join(map(str, range(source.width + 1))) + "\n"
+        source.repeated = 0
+
+    def __iter__(self) -> Iterator[str]:  # by which pandas knows a file
+        return iter(self.read, "")
+
+    def read(self, size: int = -1) -> str:
+        """Some whole lines; an empty text at the end."""
+        first, self._first = self._first, ""
+        while not first and (text := self._file.read(size)):
+            if not text.endswith("\n"):
+                text += (end := self._file.readline(_LONGEST))
+                if len(end) == _LONGEST:
+                    raise InputError(
+                        f"{self._source.path}: a line of more than {_LONGEST} characters; is it "
+                        "text?"
+                    )
+            first = self._source.of_table(text)
+        return first
 
 
-def _chunks(reader: Iterator[pd.DataFrame]) -> Iterator[pd.DataFrame]:
-    """Yield tables of a reader; raise the warning that pandas gives where it loses cells."""
-    import pandas as pd
+class _Table:
+    """Lines of a text as a table, if a delimiter and a decimal mark are the right ones.
 
-    while True:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            chunk = next(reader, None)
-        if chunk is None:
+    Attributes
+    ----------
+    delimiter, decimal : see `TextSource`
+    score : int, numbers in rows of the usual width, of which the right marks give most; 0 if the
+        lines are no table
+    first, width, least, dates, names, notes : see `TextSource`; no names where there are none
+    header : tuple of str, lines with names and units
+    """
+
+    def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
+        self.delimiter, self.decimal = delimiter, decimal
+        rows = [
+            (i, split_line(line, delimiter))
+            for i, line in enumerate(lines)
+            if line.strip() and not line.lstrip().startswith(_comments(delimiter))
+        ]
+        numbers = {i: sum(_is_number(cell, decimal) for cell in cells) for i, cells in rows}
+        rows = [(i, cells) for i, cells in rows if numbers[i]]
+        usual = _most_frequent(len(cells) for _, cells in rows) if rows else 0
+        alike = [(i, cells) for i, cells in rows if len(cells) == usual]
+        self.score = sum(numbers[i] for i, _ in alike)
+        if not self.score:
             return
-        yield chunk
+        # A line may hold text beside its numbers; everything before the first such line is the
+        # header, but for rows that lack some reading.
+        many = max(1, _most_frequent(numbers[i] for i, _ in alike))
+        full = next(place for place, (i, _) in enumerate(alike) if numbers[i] >= many)
+        before = takewhile(lambda row: self._lacks(row[1], alike[full][1]), alike[full - 1 :: -1])
+        self.first = min([alike[full][0], *(i for i, _ in before if full)])
+        self.width = self.least = usual
+        cells = [cells for i, cells in rows if i >= self.first]
+        self.header: tuple[str, ...] = ()
+        self.names: list[str] | None = None
+        self.notes: list[str] = []
+        self._read_header(lines[: self.first], cells)
+        firsts = (next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual))
+        self.dates = {i for i, cell in enumerate(firsts) if is_stamp(cell)}
+
+    def _lacks(self, cells: Sequence[str], full: Sequence[str]) -> bool:
+        """Whether a row is like a full one, but for some readings."""
+        return all(
+            cell.lower() in _NO_READING
+            or _is_number(cell, self.decimal)
+            or not _is_number(like, self.decimal)
+            for cell, like in zip(cells, full, strict=True)
+        )
+
+    def _read_header(self, before: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Names from the last line before the data, which may be a comment, and units below."""
+        units: list[str] = []
+        for number, line in reversed([*enumerate(before, 1)]):
+            text = line.strip(_blanks(self.delimiter)).lstrip("".join(_comments(self.delimiter)))
+            if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
+                continue
+            cells = split_line(text.strip(_blanks(self.delimiter)), self.delimiter)
+            cells = [" ".join(cell.strip("\"'").split()) for cell in cells]
+            if not units and any(cells) and all(is_unit(cell) for cell in cells if cell):
+                units, self.header = cells, (line.strip(),)
+                continue
+            self._take_names(cells, rows)
+            if self.names is None:
+                if len(cells) > 2:
+                    self.notes.append(
+                        f"line {number} has {len(cells)} names for {self.width} columns, so these "
+                        "have numbers, from 0"
+                    )
+                break
+            self.header += (line.strip(),)
+            if units:
+                units += [""] * (self.width - len(units))
+                self.names = [with_unit(*each) for each in zip(self.names, units, strict=False)]
+                self.notes.append(f"units: in line {number + 1}, below the names")
+            return
+        if units:
+            self._take_names(units, rows)
+
+    def _take_names(self, names: list[str], rows: Sequence[Sequence[str]]) -> None:
+        """Take names if there is one for each column."""
+        longest = max(map(len, rows))
+        while len(names) > longest and not names[-1]:
+            names = names[:-1]
+        if len(names) == self.width - 1 and not any(row[len(names) :][:1] != [""] for row in rows):
+            self.width = self.least = len(names)
+            self.notes.append("a delimiter at the end of each row is no column")
+        if self.width < len(names) == longest:
+            self.width = len(names)
+        if len(names) == self.width:
+            self.names = names
 
 
-def layout_by_names(names: Sequence[str]) -> Mapping[str, Any]:
-    """What the names of columns say: those of sensor_msgs/Imu stand for axes in flu (REP 103)."""
-    return {"frame": "flu"} if any(map(_OF_ROS.fullmatch, names)) else {}
+def _comments(delimiter: str | None) -> tuple[str, ...]:
+    """What begins a line that is no row."""
+    return tuple(mark for mark in _COMMENTS if mark != delimiter)
+
+
+def _blanks(delimiter: str | None) -> str | None:
+    """Characters around a line that are no cells; None for all blanks."""
+    return " \r\n" if delimiter == "\t" else None
+
+
+def _encoding_of(start: bytes) -> str:
+    """Encoding of a text: UTF-16, which has a mark or every second byte empty, or UTF-8."""
+    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    for encoding, place in (("utf-16-le", 1), ("utf-16-be", 0)):
+        half, other = start[place::2], start[1 - place :: 2]
+        if len(half) > 1 and half.count(0) > 0.7 * len(half) and other.count(0) < 0.3 * len(half):
+            return encoding
+    return "utf-8-sig"
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
@@ -290,15 +439,6 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
-def _is_row(line: str) -> bool:
-    return bool(line.strip()) and line.lstrip()[0] not in _COMMENTS
-
-
-def _count_numbers(line: str, layout: tuple[str | None, str]) -> int:
-    delimiter, decimal = layout
-    return sum(_is_number(cell, decimal) for cell in split_line(line, delimiter))
-
-
 def _is_number(cell: str, decimal: str) -> bool:
     if decimal == "," and "." in cell:
         return False
@@ -309,33 +449,24 @@ def _is_number(cell: str, decimal: str) -> bool:
     return "_" not in cell  # a number to Python, not to anyone else
 
 
-def _most_frequent(counts: Iterator[int]) -> int:
+def _most_frequent(counts: Iterable[int]) -> int:
     """Most frequent of some numbers, the largest of equally frequent ones."""
     return max(Counter(counts).items(), key=lambda item: item[::-1])[0]
 
 
-def _numbers_of_text(column: pd.Series) -> NDArray[Any]:
+def _numbers_of_text(column: pd.Series, decimal: str) -> NDArray[Any]:
     """Numbers of a column, NaN where there is none; whole numbers stay integers."""
     import pandas as pd
 
     if pd.api.types.is_bool_dtype(column):
         return np.full(len(column), np.nan)
+    if decimal != "." and not pd.api.types.is_numeric_dtype(column):
+        # Beside a cell without a number, pandas leaves all of them as they are.
+        column = column.astype("str").str.replace(decimal, ".", regex=False)
     numbers = pd.to_numeric(column, errors="coerce")
     if numbers.dtype.kind in "iu":
         return numbers.to_numpy()
     return numbers.to_numpy(dtype=float, na_value=np.nan)
-
-
-def nanoseconds(column: pd.Series) -> NDArray[Any]:
-    """Dates with times as ns since 1970, NaN where there is none.
-
-    One without a zone is in UTC, so that all of a column go together.
-    """
-    import pandas as pd
-
-    dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
-    numbers = dates.dt.as_unit("ns").astype("int64").to_numpy()
-    return np.where(dates.isna(), np.nan, numbers) if dates.isna().any() else numbers
 
 
 def rows_of(
@@ -345,16 +476,15 @@ def rows_of(
     clock: int | None,
 ) -> Generator[Array, None, None]:
     """Columns of each chunk as rows of `Source.read`; dates in ns become s."""
-    origins: list[Any] = []
+    zero: Any = None
     for columns in chunks:
         if not len(columns[0]):
             continue
-        origins = origins or [
-            column[0] if place == clock else None
-            for column, place in zip(columns, places, strict=True)
-        ]
-        each = zip(columns, origins, places, strict=True)
-        yield beside([since(c, zero) * (1e-9 if i in dates else 1) for c, zero, i in each])
+        if zero is None and clock is not None:
+            times = columns[places.index(clock)]
+            zero = next(iter(times[np.isfinite(times)]), None)
+        each = [(c, zero if i == clock else None, i) for c, i in zip(columns, places, strict=True)]
+        yield beside([since(c, start) * (1e-9 if i in dates else 1) for c, start, i in each])
 
 
 class ArraySource:
@@ -362,11 +492,12 @@ class ArraySource:
 
     Attributes
     ----------
-    path, names, named, dates, layout : see `Source`
+    path, names, named, dates, layout, notes, warnings : see `Source`
     values : (n, c) array
     """
 
     dates: Set[int] = frozenset()
+    notes: Sequence[str] = ()
 
     def __init__(
         self,
@@ -374,8 +505,10 @@ class ArraySource:
         values: NDArray[Any],
         names: Sequence[str] = (),
         layout: Mapping[str, Any] | None = None,
+        warnings: Sequence[str] = (),
     ) -> None:
         self.path, self.values, self.layout = path, values, layout or {}
+        self.warnings = warnings
         self.named = bool(names)
         self.names = list(names) or [str(i) for i in range(values.shape[1])]
 
@@ -435,6 +568,9 @@ def open_parquet(path: Path) -> AbstractContextManager[pq.ParquetFile]:
 class ParquetSource:
     """Columns of a Parquet file."""
 
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+
     def __init__(self, path: Path) -> None:
         import pyarrow as pa
 
@@ -449,8 +585,7 @@ class ParquetSource:
         self.dates: Set[int] = {
             i
             for i, kind in enumerate(schema.types)
-            if pa.types.is_timestamp(kind)
-            or (first and _IS_DATE.fullmatch(str(first.column(i)[0])))
+            if pa.types.is_timestamp(kind) or (first and is_stamp(str(first.column(i)[0])))
         }
 
     def read(

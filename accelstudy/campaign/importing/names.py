@@ -1,0 +1,132 @@
+"""What the names of columns say: which column is which, and in which unit it is.
+
+Loggers write a unit in brackets ("Acc X [g]"), as an ending ("time_ms") or in a row of its own,
+which `TextSource` puts in brackets behind the names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+_OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
+_KNOWN = {
+    "fx": rf"f_?x|a_?x|acc?_?x|acc?el_?x|acceler(ation|ometer)x|{_OF_ROS}acceleration_x|x_?axis|x",
+    "fy": rf"f_?y|a_?y|acc?_?y|acc?el_?y|acceler(ation|ometer)y|{_OF_ROS}acceleration_y|y_?axis|y",
+    "fz": rf"f_?z|a_?z|acc?_?z|acc?el_?z|acceler(ation|ometer)z|{_OF_ROS}acceleration_z|z_?axis|z",
+    "time": r"time|timestamp|seconds",
+    "temperature": r"_?(field_)?(temp|temperature)",
+    "vibration": r"vibration|vibration_mps2",
+    "n_samples": r"n|n_samples|count",
+    "sd_fx": r"sd_?f?x|s_?x|sd_a_?x",
+    "sd_fy": r"sd_?f?y|s_?y|sd_a_?y",
+    "sd_fz": r"sd_?f?z|s_?z|sd_a_?z",
+    "roll": r"roll|roll_robot(_gon)?",
+    "pitch": r"pitch|pitch_robot(_gon)?",
+    "yaw": r"yaw|yaw_robot(_gon)?",
+}
+_LESS_USUAL = {
+    "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
+    "temperature": r".*(?<![a-z])temp(erature)?s?(?![a-z]).*",
+}
+"""Names that count where no column has a usual one."""
+_FORCES = {"m/s^2", "g", "mg", "counts"}
+_UNITS_OF: Mapping[str, Collection[str]] = {
+    **dict.fromkeys(("fx", "fy", "fz", "sd_fx", "sd_fy", "sd_fz", "vibration"), _FORCES),
+    "time": {"s", "ms", "us", "ns"},
+    "temperature": {"degC"},
+}
+_SPELLINGS = {
+    "m/s^2": "m/s^2 m/s2 m/s/s m/sec^2 ms^-2 ms-2 mps2 mps^2 ms2",
+    "g": "g g0 gn gs",
+    "mg": "mg milli-g millig",
+    "counts": "counts count lsb raw adc digits digit",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs millis millisecond milliseconds",
+    "us": "us usec usecs micros microsecond microseconds",
+    "ns": "ns nsec nsecs nanosecond nanoseconds",
+    "degC": "c degc deg_c celsius",
+    "other": "k degk kelvin f degf deg_f fahrenheit deg degs deg/s dps mdps rad rad/s gon t ut mt "
+    "nt gauss mgauss ugauss pa hpa kpa mbar bar v mv % %rh rh m mm km m/s km/h hz khz min h hours",
+    "": "- 1 none n/a",
+}
+_UNITS = {spelling: unit for unit, words in _SPELLINGS.items() for spelling in words.split()}
+_IN_BRACKETS = re.compile(r"(.*?)[\s_]*[(\[{<]([^()\[\]{}<>]*)[)\]}>]")
+_AS_ENDING = re.compile(r"(.*[^\W_])[\s_]+([^\W_]+([_/^-]\w+)?)")
+_PLAIN = str.maketrans({"²": "^2", "µ": "u", "μ": "u", "⁻": "-", "·": "", "*": "", ".": ""})
+
+
+def unit_of(text: str) -> str | None:
+    """Unit by any usual spelling: "m/s^2", "g", …; "other" if unused here, None if it is none."""
+    spelled = text.strip().lower().translate(_PLAIN).replace(" ", "").replace("°", "deg")
+    return _UNITS.get(spelled.replace("℃", "degc"))
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell below a name may be its unit, with or without brackets."""
+    return unit_of(text.strip().strip("()[]{}<>")) is not None
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Name with the unit from a row of units."""
+    unit = unit.strip().strip("()[]{}<>")
+    return f"{name} [{unit}]" if unit_of(unit) and name else name
+
+
+def without_unit(name: str) -> str:
+    """Name without a unit in brackets."""
+    match = _IN_BRACKETS.fullmatch(name.strip())
+    return match[1].strip() if match else name.strip()
+
+
+def unit_in(name: str, key: str) -> str | None:
+    """Unit that the name of the column of a key says; None if it says none of this quantity."""
+    parts = (pattern.fullmatch(name.strip()) for pattern in (_IN_BRACKETS, _AS_ENDING))
+    units = (unit_of(part[2]) for part in parts if part)
+    return next((unit for unit in units if unit in _UNITS_OF.get(key, ())), None)
+
+
+def places_by_name(names: Sequence[str], key: str) -> list[int]:
+    """Places of the columns that may be the one of a key: one, if the names tell it."""
+    usual = [re.compile(_KNOWN.get(key, re.escape(key)))]
+    if key in _LESS_USUAL:
+        usual.append(re.compile(_LESS_USUAL[key]))
+    found: list[int] = []
+    for pattern in usual:
+        found = [i for i, name in enumerate(names) if _is_of(name, key, pattern.fullmatch)]
+        if len(found) == 1:
+            break
+    return found
+
+
+def thermometers(names: Sequence[str]) -> list[int]:
+    """Places of all columns whose names speak of a temperature, in whatever unit."""
+    speaks = re.compile(_LESS_USUAL["temperature"]).fullmatch
+    each = enumerate(names)
+    return [i for i, name in each if speaks(_plain(name)) or unit_in(name, "temperature")]
+
+
+def _is_of(name: str, key: str, matches: Callable[[str], Any]) -> bool:
+    bracket, own = _IN_BRACKETS.fullmatch(name.strip()), _UNITS_OF.get(key, ())
+    unit = unit_of(bracket[2]) if bracket else ""
+    if unit not in ("", *own) and (unit or key != "time"):  # "Time (UTC)"
+        return False
+    if key == "temperature" and unit_in(name, key) and re.match(r"t[^a-z]", _plain(name)):
+        return True
+    plain = _plain(without_unit(name))
+    ending = _AS_ENDING.fullmatch(plain)
+    known = ending is not None and unit_of(ending[2]) in own
+    return bool(matches(plain) or (ending and known and matches(ending[1])))
+
+
+def _plain(name: str) -> str:
+    """Name in small letters, its words apart: "Acc X" and "accX" as "acc_x"."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z][a-z]{2})", "_", name.strip())
+    return re.sub(r"[\s.\-/_]+", "_", words).lower()
+
+
+def layout_by_names(names: Sequence[str]) -> Mapping[str, Any]:
+    """What the names of columns say: those of sensor_msgs/Imu stand for axes in flu (REP 103)."""
+    of_ros = re.compile(r"(.*[._/])?linear[_.]acceleration[._/]x", re.IGNORECASE)
+    return {"frame": "flu"} if any(map(of_ros.fullmatch, names)) else {}
