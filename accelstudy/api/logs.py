@@ -62,7 +62,7 @@ def read_log(
     ----------
     log : path or DataFrame
         Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS, a ULog of
-        PX4, or a table in memory.
+        PX4, or a table in memory, of which an index of dates is the time.
     rate : float, Hz, optional
         Samples per second, where there is no column of time.
     columns : mapping, optional
@@ -70,7 +70,8 @@ def read_log(
         number from 0.
     layout
         Other keys of the settings of ``accelstudy import`` that say how a log is read: ``time``,
-        ``time_unit``, ``unit``, ``scale``, ``offset``, ``frame``, ``variable``.
+        ``time_unit``, ``unit``, ``scale``, ``offset``, ``frame``, ``variable``,
+        ``delimiter``.
 
     Returns
     -------
@@ -86,11 +87,13 @@ def read_log(
         columns = dict(columns)
     given = {"rate_hz": rate, "columns": columns, **layout}
     given = {key: value for key, value in given.items() if value is not None}
-    checked(LogLayout, given, "read_log")
+    layout_of = checked(LogLayout, given, "read_log")
     if not isinstance(log, pd.DataFrame):
         path = path_of("log", log, "a path or a DataFrame")
-        open_source(path, given.get("variable"))
+        open_source(path, given.get("variable"), layout_of.delimiter)
         return Log(path, given)
+    if "rate_hz" not in given and "time" not in given:
+        log, given = _with_time(log, given)
     folder = Path(mkdtemp(prefix=IN_MEMORY))
     table = Log(folder / "DataFrame.parquet", given)
     finalize(table, rmtree, folder, ignore_errors=True)
@@ -102,6 +105,15 @@ def read_log(
             f"log: the DataFrame cannot be a log, which has numbers: {reason}"
         ) from None
     return table
+
+
+def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Take the times of an index of dates or durations, as a last column."""
+    index, name = log.index, str(log.index.name or "time")
+    if not isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex) or name in map(str, log.columns):
+        return log, given
+    dated = isinstance(index, pd.DatetimeIndex)
+    return log.assign(**{name: index if dated else index.total_seconds()}), {**given, "time": name}
 
 
 def log_of(log: Any) -> Log:

@@ -359,7 +359,7 @@ def test_one_file_per_position(tmp_path, turned, clock):
     assert files_of(sorted(folder.iterdir())) == files == files_of([folder / "pos*.csv"])
     ((campaign, report),) = import_sensors(files, ImportSettings(**options)).values()
     assert campaign.positions.tolist() == [1, 2, 4, 5]
-    assert "5, with the longest hold of each as one position" in report.notes[0]
+    assert "5, with the longest hold of each as one position" in report.notes[1]
     assert (campaign.time is not None) == (clock == "one")
     assert campaign.name == "positions"
     assert not any("gap" in text for text in report.warnings)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
-from io import StringIO
+from io import BufferedReader, FileIO, StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import warn
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing.sources import ArraySource, chosen_of
 from accelstudy.files.reading import readable
@@ -33,6 +32,7 @@ BAG_OF_FOLDER = "metadata.yaml"
 _IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 _BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
 _SENSOR = "sensor_accel"
+_LONGEST_GAP = 3600.0  # s
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
@@ -65,12 +65,20 @@ def open_bag(path: Path, topic: str | None = None) -> ArraySource:
             imu = [c for c in reader.connections if c.topic == name]
             frame = next((each.header.frame_id for _, each in _messages(reader, imu)), "")
             rows = _rows(reader, imu, 4, lambda each: _vector(each.linear_acceleration))
+            expected = sum(connection.msgcount for connection in imu)
             heat = _thermometer(reader, name)
             measured = _rows(reader, heat, 2, lambda each: (each.temperature,))
     except InputError:
         raise
     except Exception as error:  # a damaged file fails in many ways
         raise InputError(f"{path}: not a whole bag ({one_line(error)})") from None
+    warnings = []
+    if len(rows) < expected:
+        end = rows[-1, 0] - rows[0, 0] if len(rows) else 0.0
+        warnings.append(
+            f"the bag ends early or is damaged: {len(rows)} of {expected} messages of {name} are "
+            f"there, up to {end:.1f} s"
+        )
     columns = dict(_BAG_COLUMNS)
     if len(measured):
         rows = np.column_stack([rows, np.interp(rows[:, 0], *measured.T)])
@@ -82,7 +90,7 @@ def open_bag(path: Path, topic: str | None = None) -> ArraySource:
         "time_unit": "s",
         "frame": "frd" if frame.endswith("_ned") else "flu",
     }
-    return ArraySource(path, rows, ["time", *columns.values()], layout)
+    return ArraySource(path, rows, ["time", *columns.values()], layout, warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
@@ -101,9 +109,18 @@ def _rows(
     values: Callable[[Any], tuple[float, ...]],
 ) -> Array:
     """Times, s, and values of messages, (n, width); no rows of a topic that is not there."""
-    messages = _messages(reader, connections) if connections else ()
-    rows = ((time, *values(message)) for time, message in messages)
-    return np.fromiter(rows, np.dtype((float, width)))
+
+    def whole() -> Iterator[tuple[float, ...]]:
+        count = 0
+        try:
+            for time, message in _messages(reader, connections) if connections else ():
+                yield time, *values(message)
+                count += 1
+        except Exception:  # where a bag is damaged; it has messages up to there
+            if not count:
+                raise
+
+    return np.fromiter(whole(), np.dtype((float, width)))
 
 
 def _vector(vector: Any) -> tuple[float, float, float]:
@@ -133,14 +150,13 @@ def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
     with _needed_for(path, "a flight log of PX4", "pyulog", "px4"):
         from pyulog import ULog
     try:
-        with readable(path), redirect_stdout(StringIO()):  # it prints what it thinks of a file
-            log = ULog(str(path), [_SENSOR])
+        # It prints what it thinks of a file.
+        with readable(path), _ToTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
+            log = ULog(file, [_SENSOR])
     except InputError:
         raise
     except Exception as error:  # a damaged file fails in many ways
         raise InputError(f"{path}: not a whole flight log ({one_line(error)})") from None
-    if log.file_corruption:
-        warn(f"{path}: parts of the flight log are damaged and left out")
     sensors = {str(each.multi_id): each.data for each in log.data_list}
     values = sensors[chosen_of(path, f"instance of {_SENSOR}", sensors, instance)]
     # Microseconds since the start of the controller; older logs have only the time of the message.
@@ -155,8 +171,38 @@ def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
         "time_unit": "s",
         "frame": "frd",
     }
-    rows = np.column_stack([1e-6 * time, *(values[field] for field in fields.values())])
-    return ArraySource(path, rows, ["time", *columns.values()], layout)
+    with np.errstate(invalid="ignore"):  # of damaged numbers
+        rows = np.column_stack([1e-6 * time, *(values[field] for field in fields.values())])
+    warnings = []
+    if log.file_corruption or file.cut:
+        steps = np.diff(rows[:, 0])
+        odd = np.flatnonzero(~((steps > 0) & (steps < _LONGEST_GAP)))
+        rows = rows[: odd[0] + 1] if len(odd) else rows
+        gaps = np.flatnonzero(steps > 5 * np.median(steps)) if len(steps) else odd
+        whole = rows[min([len(rows) - 1, *gaps]), 0] - rows[0, 0]
+        warnings.append(
+            f"the flight log ends early or is damaged: its samples are whole up to {whole:.1f} s, "
+            f"and end at {rows[-1, 0] - rows[0, 0]:.1f} s"
+        )
+    return ArraySource(path, rows, ["time", *columns.values()], layout, warnings)
+
+
+class _ToTheEnd(BufferedReader):
+    """A file that knows whether its end cut off what was read.
+
+    Attributes
+    ----------
+    cut : bool
+    """
+
+    cut = False
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Read so many bytes, as a header of 3 bytes and what belongs to it are read."""
+        content = super().read(size) or b""
+        # Between two messages it may end.
+        self.cut |= size is not None and len(content) < size and not (size == 3 and not content)
+        return content
 
 
 @contextmanager

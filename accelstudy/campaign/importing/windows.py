@@ -142,7 +142,7 @@ def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     frozen = np.zeros(len(squares), dtype=bool)
     # Axis by axis, as what a processor keeps at hand is small.
     for force in forces.T:
-        # Running sums of large numbers lose digits.
+        # Squares of large numbers lose digits.
         offsets = force - force.mean()
         mean = _window_sums(offsets, width)
         mean /= width
@@ -161,10 +161,17 @@ def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     return np.sqrt(squares, out=squares), frozen
 
 
-def _window_sums(values: NDArray[Any], width: int) -> NDArray[Any]:
-    sums = np.cumsum(values)
-    result = sums[width - 1 :].copy()
-    result[1:] -= sums[:-width]
+def _window_sums(values: NDArray[Any], width: int) -> Array:
+    """Sums of `width` neighbours, each of its own values: a large one costs others no digits.
+
+    A window is the end of one part of so many values and the beginning of the next part.
+    """
+    parts = np.zeros((-(-len(values) // width), width))
+    parts.ravel()[: len(values)] = values
+    ends = np.cumsum(parts[:, ::-1], axis=1)[:, ::-1].ravel()
+    result: Array = np.cumsum(parts, axis=1).ravel()[width - 1 : len(values)]
+    beyond = np.arange(len(result)) % width > 0
+    result[beyond] += ends[: len(result)][beyond]
     return result
 
 
