@@ -87,10 +87,10 @@ def read_log(
         columns = dict(columns)
     given = {"rate_hz": rate, "columns": columns, **layout}
     given = {key: value for key, value in given.items() if value is not None}
-    layout_of = checked(LogLayout, given, "read_log")
+    known = checked(LogLayout, given, "read_log")
     if not isinstance(log, pd.DataFrame):
         path = path_of("log", log, "a path or a DataFrame")
-        open_source(path, given.get("variable"), layout_of.delimiter)
+        open_source(path, given.get("variable"), known.delimiter)
         return Log(path, given)
     if "rate_hz" not in given and "time" not in given:
         log, given = _with_time(log, given)
@@ -112,8 +112,8 @@ def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, 
     index, name = log.index, str(log.index.name or "time")
     if not isinstance(index, pd.DatetimeIndex | pd.TimedeltaIndex) or name in map(str, log.columns):
         return log, given
-    dated = isinstance(index, pd.DatetimeIndex)
-    return log.assign(**{name: index if dated else index.total_seconds()}), {**given, "time": name}
+    times = index.total_seconds() if isinstance(index, pd.TimedeltaIndex) else index
+    return log.assign(**{name: times}), {**given, "time": name}
 
 
 def log_of(log: Any) -> Log:

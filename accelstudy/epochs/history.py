@@ -205,7 +205,7 @@ def history_of(
         raise InputError("--date: all are the same; a rate needs two dates or more")
     given = [applicable(one) for one in calibrations]
     common = in_common(given)
-    order = np.argsort(np.array(dates, dtype="datetime64[us]"), kind="stable")
+    order = sorted(range(len(dates)), key=dates.__getitem__)
     ordered = Common(
         common.model, common.values[order], common.covariances[order], common.dof[order]
     )

@@ -117,7 +117,7 @@ def test_means_as_columns(tmp_path):
     ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
     ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
     ({"rate_hz": True}, "rate_hz: must be a number, not true"),
-    ({"unit": "ft"}, r"settings: unit: must be 'm/s\^2', 'g' or 'counts', not 'ft'"),
+    ({"unit": "ft"}, r"settings: unit: must be 'm/s\^2', 'g', 'mg' or 'counts', not 'ft'"),
     ({"columns": {"fx": 1.5}}, "columns.fx"),
     ({"gravity": {"value": 1}}, "gravity.value: unknown key"),
 ])  # fmt: skip

@@ -76,4 +76,4 @@ def test_an_exact_form_keeps_its_name(name, course):
     """Its form fits better than a course that wanders, whatever nobody recorded."""
     found = diagnose(session(course, size=20.0, n=48), NINE)
     assert (found.verdict, found.found[0].name) == ("named", name)
-    assert any("temperature was not recorded" in line for line in verdict_lines(found))
+    assert any("campaign has no temperature" in line for line in verdict_lines(found))

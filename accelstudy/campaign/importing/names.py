@@ -28,7 +28,7 @@ _KNOWN = {
 }
 _LESS_USUAL = {
     "time": r"t|(.*_)?secs?|(date|sample|sensor|log)_?time|date|elapsed(_time)?",
-    "temperature": r".*(?<![a-z])temp(erature)?s?(?![a-z]).*",
+    "temperature": r".*(?<![a-z])temp(erature)?s?c?(?![a-z]).*",
 }
 """Names that count where no column has a usual one."""
 _FORCES = {"m/s^2", "g", "mg", "counts"}
