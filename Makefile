@@ -2,7 +2,7 @@ PYTHON ?= python3
 CORES ?= 2
 CONFIG ?= config/config.yaml
 CAMPAIGNS ?= config/campaigns.yaml
-HIDDEN ?= config/hidden-effects.yaml
+HIDDEN ?= studies/hidden/config/hidden-effects.yaml
 FOLDER ?= resources/public
 
 SHELL := bash
@@ -65,7 +65,7 @@ test-breaks: $(READY) ## break a copy of the package on purpose, and see that te
 
 smoke: $(READY) ## run the whole workflow on a small configuration
 	snakemake --cores $(CORES) --configfile config/smoke.yaml
-	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN) config/hidden-smoke.yaml
+	snakemake --cores $(CORES) --snakefile studies/hidden/hidden.smk --configfile $(HIDDEN) studies/hidden/config/hidden-smoke.yaml
 	python tests/helpers/pictures.py check
 
 reproduce: $(READY) ## reproduce the paper
@@ -92,11 +92,11 @@ plan-example: $(READY) ## plan calibrations for a tilt accuracy: schemes, positi
 	snakemake --cores $(CORES) --configfile results/plan-example/plan/cases/readme/study.yaml
 
 hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
-	snakemake --cores $(CORES) --snakefile workflow/hidden.smk --configfile $(HIDDEN)
+	snakemake --cores $(CORES) --snakefile studies/hidden/hidden.smk --configfile $(HIDDEN)
 
 # Of the study as it stands in config/, whatever HIDDEN is.
 hidden-docs: $(READY) ## study hidden effects, and take score and figures into docs
-	$(MAKE) hidden-effects HIDDEN=config/hidden-effects.yaml
+	$(MAKE) hidden-effects HIDDEN=studies/hidden/config/hidden-effects.yaml
 	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
 	for name in alarms naming methods sets calibration confusion outside places limits; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
@@ -104,7 +104,7 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 
 # Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs
 real-noise: $(READY) ## put known effects into public logs, find them again, and take the score into docs
-	snakemake --cores $(CORES) --snakefile workflow/real_noise.smk --config public_folder=$(FOLDER)
+	snakemake --cores $(CORES) --snakefile studies/hidden/real_noise.smk --config public_folder=$(FOLDER)
 	cp results/real-noise/score.md docs/guides/real-noise-score.md
 
 pictures: reproduce ## make the pictures of reports, studies and tutorials in docs anew
@@ -130,7 +130,7 @@ lint: $(READY) ## check style and types
 	ruff check
 	ruff format --check
 	mypy
-	snakefmt --check Snakefile workflow accelstudy/study/template
+	snakefmt --check Snakefile workflow studies accelstudy/study/template
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
 	uv lock --upgrade --default-index https://pypi.org/simple
@@ -139,7 +139,7 @@ lock: $(READY) ## lock the newest versions that pyproject.toml allows
 
 clean: ## remove the environment and all caches, but no results
 	rm -rf $(ENV) .cache .coverage* .*_cache .hypothesis
-	find accelstudy tests -name __pycache__ -prune -exec rm -r {} +
+	find accelstudy studies tests -name __pycache__ -prune -exec rm -r {} +
 
 # The stamp comes last: an environment without it is unfinished and made anew. The old one goes
 # first: while it is there, it is what `python3` names. uv is fast, but pip is what a machine with

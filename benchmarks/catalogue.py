@@ -16,8 +16,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import effect_names, effects_without
-from accelstudy.hidden.physics.generate import Case, generate
 from accelstudy.sensors.models import get_model
+from studies.hidden.physics.generate import Case, generate
 
 DESIGNS = ("spread-24", "yaw-50", "two-warm-36")
 NONCENTRALITY = 25.0

@@ -18,9 +18,11 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
-from accelstudy.hidden.cells import distinct_pairs
-from accelstudy.hidden.judging import all_true, same_effects
-from accelstudy.hidden.physics import (
+from accelstudy.lots.lot import weigh_lot
+from accelstudy.sensors.models import get_model
+from studies.hidden.cells import distinct_pairs
+from studies.hidden.judging import all_true, same_effects
+from studies.hidden.physics import (
     APPROACHES,
     DESIGNS,
     NOISES,
@@ -28,9 +30,7 @@ from accelstudy.hidden.physics import (
     visible_outside,
     visible_unforeseen,
 )
-from accelstudy.hidden.physics.lots import LotCase, generate_lot, lot_oracle
-from accelstudy.lots.lot import weigh_lot
-from accelstudy.sensors.models import get_model
+from studies.hidden.physics.lots import LotCase, generate_lot, lot_oracle
 from timing import table
 
 MODEL = "bias-scale-nonorthogonality"

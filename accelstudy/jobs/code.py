@@ -12,13 +12,13 @@ import accelstudy
 from accelstudy.basics import plugins
 
 _FOR_TYPES = re.compile(r"^if \(?\s*TYPE_CHECKING\s*\)?:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
-_FROM = re.compile(r"^[ \t]*from (accelstudy[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-_NAMED = re.compile(r"^[ \t]*import (accelstudy[\w.]*)|\"(accelstudy\.[\w.]+)\"", re.MULTILINE)
+_FROM = re.compile(r"^[ \t]*from (\w[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+_NAMED = re.compile(r"^[ \t]*import (\w[\w.]*)|\"(accelstudy\.[\w.]+)\"", re.MULTILINE)
 _ALL_BESIDE = "import_modules(__name__, __path__)"
 _DATA = (".j2", ".yaml")
 
 
-def code_hash(script: str | Path) -> str:
+def code_hash(script: str | Path, *beside: str) -> str:
     """Hash of the package's files on which a script of the workflow depends.
 
     Snakemake notices that a script has changed, but not that a package has. With this hash as a
@@ -27,10 +27,11 @@ def code_hash(script: str | Path) -> str:
     Parameters
     ----------
     script : path of a Python file
+    beside : packages in the folder of this one whose files count, too
     """
-    root = Path(accelstudy.__file__).parent
+    root = Path(accelstudy.__file__).parents[1]
     digest = hashlib.sha256()
-    files = sorted(code_files(script))
+    files = sorted(code_files(script, *beside))
     for path in files:
         digest.update(f"{path.relative_to(root).as_posix()} {_read_now(path)[0]}".encode())
     if any(_read_now(path)[2] for path in files):
@@ -38,8 +39,8 @@ def code_hash(script: str | Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def code_files(script: str | Path) -> set[Path]:
-    """Files of the package on which a script depends.
+def code_files(script: str | Path, *beside: str) -> set[Path]:
+    """Files of the package, and of packages beside it, on which a script depends.
 
     Imports are found by reading the files, those within functions included and those for type
     checkers excluded. A registry depends on all modules of its folder, and a module on the
@@ -49,22 +50,23 @@ def code_files(script: str | Path) -> set[Path]:
     for the graph of the package, and sees no registry, quoted name, template or script: a workflow
     would start no sooner, and need one more compiled package. Tests compare the two.
     """
-    root = Path(accelstudy.__file__).parent
+    root, packages = Path(accelstudy.__file__).parents[1], {"accelstudy", *beside}
     files: set[Path] = set()
     waiting = [Path(script)]
     while waiting:
-        new = {*_imported(root, waiting.pop())} - files
+        new = {*_imported(root, packages, waiting.pop())} - files
         files |= new
         waiting += new
     folders = {path.parent for path in files}
     return files.union(*([p for p in each.iterdir() if p.suffix in _DATA] for each in folders))
 
 
-def _imported(root: Path, path: Path) -> Iterator[Path]:
-    """Files of the package that a file imports."""
+def _imported(root: Path, packages: set[str], path: Path) -> Iterator[Path]:
+    """Files of some packages that a file imports."""
     _, modules, all_beside = _read_now(path)
     for module in modules:
-        yield from _files(root, module)
+        if module.partition(".")[0] in packages:
+            yield from _files(root, module)
     if all_beside:
         yield from path.parent.glob("*.py")
 
@@ -93,8 +95,9 @@ def _read(path: Path, modified: int) -> tuple[str, tuple[str, ...], bool]:
 @cache
 def _files(root: Path, module: str) -> tuple[Path, ...]:
     """Files that an import of a module runs: its own, and those of the packages above it."""
-    path, files = root, []
-    for part in module.split(".")[1:]:
+    package, *parts = module.split(".")
+    path, files = root / package, []
+    for part in parts:
         path /= part
         files += [file for file in (path.with_suffix(".py"), path / "__init__.py") if file.exists()]
     return tuple(files)

@@ -5,12 +5,12 @@ from schemas import blocks
 
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
-from accelstudy.hidden.config import HiddenConfig
-from accelstudy.hidden.real_noise import RealNoiseConfig
 from accelstudy.planning.config import Example, PlanConfig
 from accelstudy.proposal.config import DesignsConfig
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
+from studies.hidden.config import HiddenConfig
+from studies.hidden.real_noise import RealNoiseConfig
 
 SECTIONS = {
     "plan": PlanConfig,

@@ -9,17 +9,17 @@ from places import ROOT
 
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
-from accelstudy.hidden.baselines import METHODS
-from accelstudy.hidden.campaigns import TABLES
-from accelstudy.hidden.cells import Case, Cell
-from accelstudy.hidden.config import SETS, parse_hidden
-from accelstudy.hidden.diagnosing import run_chunk
-from accelstudy.hidden.figures import figures
-from accelstudy.hidden.page import sample_table
-from accelstudy.hidden.scoring import joined, sample
+from studies.hidden.baselines import METHODS
+from studies.hidden.campaigns import TABLES
+from studies.hidden.cells import Case, Cell
+from studies.hidden.config import SETS, parse_hidden
+from studies.hidden.diagnosing import run_chunk
+from studies.hidden.figures import figures
+from studies.hidden.page import sample_table
+from studies.hidden.scoring import joined, sample
 
 DOCS = ROOT / "docs"
-CONFIG = parse_hidden(read_layer(ROOT / "config/hidden-effects.yaml"))
+CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml"))
 RENEWED = "`make hidden-docs`, which takes an hour, makes the score anew"
 
 

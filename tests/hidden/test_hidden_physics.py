@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import accelstudy.hidden.physics as physics
+import studies.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.hidden.physics import (
+from accelstudy.sensors.models import get_model
+from studies.hidden.physics import (
     APPROACHES,
     NOISES,
     OUTSIDE,
@@ -27,8 +28,8 @@ from accelstudy.hidden.physics import (
     visible_outside,
     visible_unforeseen,
 )
-from accelstudy.hidden.physics.atlas import atlas
-from accelstudy.hidden.physics.designs import (
+from studies.hidden.physics.atlas import atlas
+from studies.hidden.physics.designs import (
     DESIGNS,
     GRAVITY,
     Course,
@@ -37,11 +38,10 @@ from accelstudy.hidden.physics.designs import (
     rotated,
     session,
 )
-from accelstudy.hidden.physics.effects import EFFECTS, Rig
-from accelstudy.hidden.physics.measuring import Cause, Noise, Sensor, observe
-from accelstudy.hidden.physics.oracle import oracle
-from accelstudy.hidden.physics.places import NEEDS, OF_ROBOT, TARGETS
-from accelstudy.sensors.models import get_model
+from studies.hidden.physics.effects import EFFECTS, Rig
+from studies.hidden.physics.measuring import Cause, Noise, Sensor, observe
+from studies.hidden.physics.oracle import oracle
+from studies.hidden.physics.places import NEEDS, OF_ROBOT, TARGETS
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -68,7 +68,7 @@ def imports(folder):
 def test_the_generator_knows_nothing_of_what_it_judges():
     allowed = (
         "accelstudy.campaign.session", "accelstudy.campaign.format", "accelstudy.basics.errors",
-        "accelstudy.basics.units", "accelstudy.hidden.physics",
+        "accelstudy.basics.units", "studies.hidden.physics",
     )  # fmt: skip
     own = Path(physics.__file__).parent
     assert [one for one in imports(own) if not one[1].startswith(allowed)] == []

@@ -13,16 +13,16 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
-from accelstudy.hidden.campaigns import SCHEMA
-from accelstudy.hidden.diagnosing import _fit
-from accelstudy.hidden.figures import figures
-from accelstudy.hidden.judging import all_true, judge, same_effects, share_of
-from accelstudy.hidden.page import score_page
-from accelstudy.hidden.physics import Case, generate
-from accelstudy.hidden.physics.designs import session
-from accelstudy.hidden.scoring import family_name, score_tables
-from accelstudy.hidden.targets import LEARNABLE, Target, _middle, further, targets
 from accelstudy.sensors.models import get_model
+from studies.hidden.campaigns import SCHEMA
+from studies.hidden.diagnosing import _fit
+from studies.hidden.figures import figures
+from studies.hidden.judging import all_true, judge, same_effects, share_of
+from studies.hidden.page import score_page
+from studies.hidden.physics import Case, generate
+from studies.hidden.physics.designs import session
+from studies.hidden.scoring import family_name, score_tables
+from studies.hidden.targets import LEARNABLE, Target, _middle, further, targets
 
 DRIFT, WARM, SQUARE, MOUNTED = (
     ["bias_drift"], ["warm_up"], ["quadratic_scale"],

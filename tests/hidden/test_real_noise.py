@@ -15,9 +15,9 @@ from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
-from accelstudy.hidden.physics.effects import EFFECTS
-from accelstudy.hidden.real_logs import BUMPED, PUT, Donor, Put, put
-from accelstudy.hidden.real_noise import (
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.real_logs import BUMPED, PUT, Donor, Put, put
+from studies.hidden.real_noise import (
     Case,
     RealNoiseConfig,
     answered,
@@ -27,10 +27,10 @@ from accelstudy.hidden.real_noise import (
     said_of,
     table_of,
 )
-from accelstudy.hidden.real_page import real_page
+from studies.hidden.real_page import real_page
 
 G, SIZE, COUNT, SIGMA = 9.80665, 20, 26, 0.01
-CONFIG = parse_real_noise(read_layer(ROOT / "config/real-noise.yaml"))
+CONFIG = parse_real_noise(read_layer(ROOT / "studies/hidden/config/real-noise.yaml"))
 OURS = RealNoiseConfig(
     study="test",
     seed=3,
@@ -206,7 +206,7 @@ def test_a_function_learned_in_a_real_log_is_told_as_learned(log):
     ({"logs": {"mine": {"note": "?"}}}, "unknown public data 'mine'"),
 ])  # fmt: skip
 def test_a_wrong_configuration_is_refused_in_a_line(change, says):
-    content = read_layer(ROOT / "config/real-noise.yaml")
+    content = read_layer(ROOT / "studies/hidden/config/real-noise.yaml")
     with pytest.raises(InputError) as error:
         parse_real_noise({**content, **change}, "config")
     assert says in str(error.value)
@@ -221,7 +221,7 @@ def test_where_the_logs_are_changes_no_number():
 @needs_data
 def test_two_cases_of_a_real_log(tmp_path):
     """In the noise of an MPU-9150: a warm-up that is plain gets its name, and nothing gets none."""
-    content = read_layer(ROOT / "config/real-noise.yaml")
+    content = read_layer(ROOT / "studies/hidden/config/real-noise.yaml")
     logs = {"mpu9150-2": content["logs"]["mpu9150-2"]}
     config = parse_real_noise(
         {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
@@ -257,7 +257,7 @@ def test_the_score_is_that_of_the_study():
 
 
 def test_the_workflow_makes_each_log_and_the_score(tmp_path):
-    words = ["--snakefile", ROOT / "workflow/real_noise.smk", "--dry-run", "--configfile"]
-    text = snakemake(tmp_path, *words, ROOT / "config/real-noise.yaml").stdout
+    words = ["--snakefile", ROOT / "studies/hidden/real_noise.smk", "--dry-run", "--configfile"]
+    text = snakemake(tmp_path, *words, ROOT / "studies/hidden/config/real-noise.yaml").stdout
     assert f"real_noise_log          {len(CONFIG.logs)}" in text
     assert "real_noise_score        1" in text

@@ -39,6 +39,16 @@ def test_the_table_for_contributors_has_all_rooms_in_the_order_of_imports(graph)
     assert upwards == set()
 
 
+def test_studies_import_the_package_and_nothing_of_it_imports_them():
+    both = grimp.build_graph(PACKAGE, "studies", cache_dir=None)
+    used = {
+        (importer.split(".")[0], imported.split(".")[0])
+        for importer in both.modules
+        for imported in both.find_modules_directly_imported_by(importer)
+    }
+    assert used == {(PACKAGE, PACKAGE), ("studies", "studies"), ("studies", PACKAGE)}
+
+
 def test_a_small_file_with_one_user_belongs_to_its_user(graph):
     fragments = [module for module in sorted(graph.modules) if is_fragment(module, graph)]
     assert fragments == [], f"less than {SMALL} lines of code, and one module of the room uses them"

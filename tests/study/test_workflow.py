@@ -287,15 +287,15 @@ def test_truncated_estimates(finished):
 
 
 @pytest.mark.parametrize(("snakefile", "config"), [
-    ("Snakefile", "config"),
-    ("workflow/campaigns.smk", "campaigns"),
-    ("workflow/diagnose.smk", "diagnose-example"),
-    ("workflow/hidden.smk", "hidden-effects"),
-    ("workflow/plan.smk", "plan-example"),
-    ("workflow/real_noise.smk", "real-noise"),
+    ("Snakefile", "config/config"),
+    ("workflow/campaigns.smk", "config/campaigns"),
+    ("workflow/diagnose.smk", "config/diagnose-example"),
+    ("workflow/plan.smk", "config/plan-example"),
+    ("studies/hidden/hidden.smk", "studies/hidden/config/hidden-effects"),
+    ("studies/hidden/real_noise.smk", "studies/hidden/config/real-noise"),
 ])  # fmt: skip
 def test_lint(snakefile, config, tmp_path):
-    given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"config/{config}.yaml"]
+    given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"{config}.yaml"]
     result = snakemake(tmp_path, "--lint", *given)
     assert result.returncode == 0, result.stdout
     assert "Congratulations" in result.stdout

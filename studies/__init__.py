@@ -1,0 +1,1 @@
+"""Studies that test the package, and are no part of it."""

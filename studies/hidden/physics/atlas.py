@@ -1,0 +1,230 @@
+"""What a calibration can see of a session, and the shapes that effects leave in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.hidden.physics.designs import GRAVITY, Session, session
+from studies.hidden.physics.effects import EFFECTS, Effect
+from studies.hidden.physics.measuring import Cause, Sensor, level_force, observe
+
+Array = NDArray[np.float64]
+
+STEP = 1e-5
+"""rad, of numerical derivatives by the angles."""
+TRIANGLE = tuple((i, j) for i in range(3) for j in range(i, 3))
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Misclosures of a session that is calibrated with the true parameters of a sensor.
+
+    Attributes
+    ----------
+    sensor : Sensor
+    robot : bool, whether the readings of the encoders are used; else the norm of gravity is
+    root : (n, c, c) array, inverse of a lower root of the covariance matrix of the misclosures
+    directions : (n, 3) array, unit vectors along the specific force
+    absorbed : (m, 9) array, orthonormal, what the nine parameters of a calibration absorb
+    """
+
+    sensor: Sensor
+    robot: bool
+    root: Array
+    directions: Array
+    absorbed: Array
+
+    @classmethod
+    def of(cls, session: Session, approach: str, sensor: Sensor) -> Conditions:
+        """Conditions of a session without any effect, at the truth."""
+        robot = approach == "robot"
+        output, joints = (part[0] for part in observe(session, sensor, ()))
+        correction = sensor.correction
+        calibrated = (output - sensor.bias) @ correction.T
+        directions = calibrated / GRAVITY
+        noise = session.sigma**2 * correction @ correction.T
+        if robot:
+            turned = np.stack([STEP * np.eye(2), -STEP * np.eye(2)])
+            ahead, back = level_force(joints[:, None, :] + turned[:, None])
+            by_angles = (ahead - back) / (2 * STEP)
+            angles = session.sigma_angle**2 * np.swapaxes(by_angles, 1, 2) @ by_angles
+            root = np.linalg.inv(np.linalg.cholesky(noise + angles))
+        else:
+            variance = np.sum((directions @ noise) * directions, axis=1)
+            root = 1 / np.sqrt(variance)[:, None, None]
+        # A calibrated force is an upper triangular matrix times the output less its bias.
+        columns = np.zeros((len(output), 3, 9))
+        for column, (i, j) in enumerate(TRIANGLE):
+            columns[:, i, column] = output[:, j] - sensor.bias[j]
+        columns[:, :, 6:] = correction
+        at_truth = cls(sensor, robot, root, directions, np.zeros((0, 9)))
+        rows = at_truth._white(columns.transpose(2, 0, 1)).T
+        return cls(sensor, robot, root, directions, np.linalg.qr(rows)[0])
+
+    def misclosures(self, output: Array, reading: Array) -> Array:
+        """Misclosures (B, m) of unit weight of outputs (B, n, 3) and readings (B, n, 2)."""
+        calibrated = (output - self.sensor.bias) @ self.sensor.correction.T
+        if self.robot:
+            return self._white(calibrated - level_force(reading))
+        norms = np.sqrt(np.sum(calibrated**2, axis=-1)) - GRAVITY
+        return np.asarray(norms * self.root[:, 0, 0])
+
+    def changed(self, forces: Array) -> Array:
+        """Misclosures (B, m) that small changes (B, n, 3) of the outputs make."""
+        return self._white(forces @ self.sensor.correction.T)
+
+    def seen(self, output: Array, reading: Array) -> Array:
+        """Misclosures (B, m) less what the parameters absorb."""
+        return self.left(self.misclosures(output, reading))
+
+    def left(self, misclosures: Array) -> Array:
+        """What the parameters leave of misclosures (B, m)."""
+        return np.asarray(misclosures - (misclosures @ self.absorbed) @ self.absorbed.T)
+
+    def _white(self, forces: Array) -> Array:
+        """Conditions (B, m) of unit weight of changes of forces (B, n, 3)."""
+        if not self.robot:
+            return np.asarray(np.sum(forces * self.directions, axis=-1) * self.root[:, 0, 0])
+        white = np.matmul(self.root, forces[..., None])[..., 0]
+        return np.asarray(white.reshape(len(forces), -1))
+
+
+VISIBLE = 3e-3
+"""Share of an effect that must be left, or it cannot be seen."""
+ALIKE = 0.9999
+"""Canonical cosine from which on two effects are the same."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What an effect with its settings leaves in the misclosures of an ideal sensor.
+
+    Attributes
+    ----------
+    effect : Effect
+    settings : mapping of str to float
+    directions : (k, d) array, orthonormal combinations of its parameters that can be seen
+    basis : (m, d) array, orthonormal
+    """
+
+    effect: Effect
+    settings: Mapping[str, float]
+    directions: Array
+    basis: Array
+
+    @classmethod
+    def of(
+        cls, effect: Effect, settings: Mapping[str, float], left: Array, size: float
+    ) -> Shape | None:
+        """Shape of what each parameter leaves (k, m); None if that is too little of its size."""
+        u, values, vt = np.linalg.svd(left.T, full_matrices=False)
+        rank = int(np.sum(values > VISIBLE * size))
+        return cls(effect, settings, vt[:rank].T, u[:, :rank]) if rank else None
+
+    @property
+    def dim(self) -> int:
+        """Number of dimensions in which it can be seen."""
+        return self.basis.shape[1]
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """All shapes that a design can see by one approach.
+
+    Attributes
+    ----------
+    session : Session
+    conditions : Conditions, of an ideal sensor
+    """
+
+    session: Session
+    conditions: Conditions
+
+    def shape(self, effect: Effect, settings: Mapping[str, float]) -> Shape | None:
+        """Shape of an effect with any settings; None if it cannot be seen."""
+        steps = effect.typical * np.eye(effect.k)
+        cause = Cause(effect, dict(settings), np.concatenate([steps, -steps]))
+        output, reading = observe(self.session, self.conditions.sensor, (cause,))
+        change = self.conditions.seen(output, reading)
+        left = (change[: effect.k] - change[effect.k :]) / 2
+        raw_force = output[: effect.k] - output[effect.k :]
+        raw_angle = reading[: effect.k] - reading[effect.k :]
+        size = np.sqrt(
+            np.sum((raw_force / self.session.sigma) ** 2)
+            + np.sum((raw_angle * 9.8 / self.session.sigma) ** 2)
+        ) / (2 * np.sqrt(effect.k))
+        return Shape.of(effect, settings, left, float(size))
+
+    @cached_property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Shapes of all effects, in settings that cover all their values."""
+        candidates = (
+            self.shape(effect, settings)
+            for effect in EFFECTS.values()
+            if effect.shows(self.session)
+            for settings in effect.grid(self.session)
+        )
+        return tuple(shape for shape in candidates if shape is not None)
+
+    @cached_property
+    def visible(self) -> tuple[str, ...]:
+        """Names of the effects that can be seen."""
+        return tuple(dict.fromkeys(shape.effect.name for shape in self.shapes))
+
+    @cached_property
+    def together(self) -> Array:
+        """Bases of all shapes side by side, (m, k)."""
+        return np.concatenate([shape.basis for shape in self.shapes], axis=1)
+
+    @cached_property
+    def starts(self) -> NDArray[np.int_]:
+        """First column of each shape in `together`."""
+        return np.cumsum([0, *(shape.dim for shape in self.shapes)])[:-1]
+
+    @cached_property
+    def dims(self) -> NDArray[np.int_]:
+        """Dimensions of all shapes."""
+        return np.array([shape.dim for shape in self.shapes])
+
+    def parts(self, z: Array) -> Array:
+        """Squares of what misclosures (..., m) have in each shape, (..., s)."""
+        return np.asarray(np.add.reduceat((z @ self.together) ** 2, self.starts, axis=-1))
+
+    def same_as(self, shape: Shape) -> tuple[str, ...]:
+        """Names of the effects with a shape that cannot be told from the given one."""
+        squares = np.add.reduceat(np.sum((shape.basis.T @ self.together) ** 2, axis=0), self.starts)
+        # The squares of d cosines, each at most 1, have a sum of almost d.
+        near = (self.dims == shape.dim) & (squares > shape.dim - 1 + ALIKE**2)
+        names = {shape.effect.name}
+        for i in np.flatnonzero(near):
+            cosines = np.linalg.svd(shape.basis.T @ self.shapes[i].basis, compute_uv=False)
+            if cosines[-1] > ALIKE:
+                names.add(self.shapes[i].effect.name)
+        return tuple(name for name in EFFECTS if name in names)
+
+
+@cache
+def atlas(design: str, approach: str) -> Atlas:
+    """The atlas of a design by an approach."""
+    ideal = session(design)
+    return Atlas(ideal, Conditions.of(ideal, approach, Sensor()))
+
+
+def visible_effects(design: str, approach: str) -> tuple[str, ...]:
+    """Names of the effects that a design can see by an approach."""
+    return atlas(design, approach).visible
+
+
+def invisible_effects(design: str, approach: str) -> tuple[str, ...]:
+    """Names of the effects that a design has, but cannot see."""
+    of_design = atlas(design, approach)
+    return tuple(
+        name
+        for name, effect in EFFECTS.items()
+        if effect.shows(of_design.session) and name not in of_design.visible
+    )

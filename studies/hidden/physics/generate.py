@@ -1,0 +1,339 @@
+"""Campaigns with hidden effects, and the truth about them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.session import Campaign
+from studies.hidden.physics.atlas import Atlas, Conditions, Shape
+from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.effects import EFFECTS, Effect
+from studies.hidden.physics.gross import GROSS
+from studies.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
+from studies.hidden.physics.oracle import Oracle, oracle
+from studies.hidden.physics.outside import OUTSIDE
+from studies.hidden.physics.places import Outside, Place
+from studies.hidden.physics.unforeseen import UNFORESEEN
+
+SETS = ("null", "noise", "one", "two", "removed", "outside", "unforeseen", "gross", "invisible")
+NOWHERE: Mapping[str, Outside] = {**OUTSIDE, **UNFORESEEN}
+"""Effects that are not in the catalogue, by name."""
+
+
+def place_of(kind: str) -> Place | None:
+    """Coordinate and target of an effect that is not in the catalogue, if it has a place."""
+    return NOWHERE[kind].place if kind in NOWHERE else None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kind of campaign.
+
+    Attributes
+    ----------
+    set : str, of `SETS`
+    design : str
+    approach : str, "gravity" or "robot"
+    sigma_known : bool, whether the campaign states its sigma
+    effect : tuple of str, what is hidden
+    lam : tuple of float, the noncentralities that they shall have; empty for effects that cannot be
+        seen, which have usual sizes
+    noise : str, kind of wrong noise; None where it is right
+    gross : str, gross error; None for none
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    effect: tuple[str, ...] = ()
+    lam: tuple[float, ...] = ()
+    noise: str | None = None
+    gross: str | None = None
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect in a campaign: with which settings and parameters, and how much of it shows."""
+
+    name: str
+    settings: dict[str, float]
+    parameters: tuple[float, ...]
+    lam: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """All that is true of a campaign.
+
+    Attributes
+    ----------
+    set, design, approach, sigma_known : as in the case
+    seed : tuple of int, entropy and spawn key
+    effects : tuple of HiddenEffect
+    classes : tuple of tuple of str, for each effect the names that mean the same in this campaign
+    noise : dict with kind, name (in the catalogue) and settings
+    gross : dict with name (empty for none) and settings
+    sensor : dict with the parameters of the sensor
+    oracle : dict with detected, best, told and alternatives
+    left : tuple of float, of an effect outside the catalogue: how much of its noncentrality the
+        best effect of the catalogue leaves, and the best two
+    place : tuple of str, coordinate and target of an effect outside the catalogue; None where it
+        has none, or where the campaign does not record its coordinate
+    """
+
+    set: str
+    design: str
+    approach: str
+    sigma_known: bool
+    seed: tuple[int, ...]
+    effects: tuple[HiddenEffect, ...]
+    classes: tuple[tuple[str, ...], ...]
+    noise: dict[str, Any]
+    gross: dict[str, Any]
+    sensor: dict[str, Any]
+    oracle: dict[str, Any]
+    left: tuple[float, ...] = ()
+    place: Place | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values."""
+        return plain(asdict(self))
+
+
+def plain(value: Any) -> Any:
+    """Turn tuples into lists, all the way down."""
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items()}
+    return [plain(part) for part in value] if isinstance(value, (list, tuple)) else value
+
+
+Array = NDArray[np.float64]
+
+
+ARRIVAL = 5e-4
+"""rad, sd of the joints about the attitudes of the design."""
+
+
+Known = tuple[Cause, tuple[str, ...]]
+"""An effect, and the names that mean the same."""
+
+
+def generate(
+    case: Case, seed: np.random.SeedSequence, given: Mapping[str, Known] | None = None
+) -> tuple[Campaign, Truth]:
+    """Simulate a campaign.
+
+    Parameters
+    ----------
+    case : Case
+    seed : numpy.random.SeedSequence, from which all that is random follows
+    given : mapping of effects of the case to what they are; the others are drawn
+
+    Raises
+    ------
+    InputError
+        If the design cannot see an effect that shall have a size.
+    """
+    rng = np.random.default_rng(seed)
+    knowing = oracle(case.design, case.approach)
+    of_design = knowing.atlas
+    # No joint comes to rest exactly where it was sent.
+    arrived = of_design.session.joints + ARRIVAL * rng.standard_normal(
+        of_design.session.joints.shape
+    )
+    session = replace(of_design.session, joints=arrived)
+    sensor = Sensor.drawn(rng)
+    conditions = Conditions.of(session, case.approach, sensor)
+    causes, hidden, classes = [], [], []
+    for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
+        of_lot = None if given is None else given.get(name)
+        cause, same = of_lot or drawn(name, lam, session, conditions, knowing, rng)
+        classes.append(same)
+        causes.append(cause)
+        parameters = tuple(cause.parameters[0].tolist())
+        hidden.append(HiddenEffect(name, cause.settings, parameters, lam))
+    output, encoders = (part[0] for part in observe(session, sensor, causes))
+    noise = Noise.drawn(case.noise, session, rng)
+    forces = noise.read(output, session, rng)
+    reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
+    campaign = _campaign(case, session, forces, reading)
+    campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
+    gross: dict[str, Any] = {"name": "", "settings": {}}
+    if case.gross is not None:
+        campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
+        gross["name"] = case.gross
+    verdict = knowing.judge(left_of(of_design, sensor, forces, reading), case.lam)
+    left: tuple[float, ...] = ()
+    place = None
+    if case.effect and (strange := NOWHERE.get(case.effect[0])):
+        left = knowing.left(left_of(of_design, sensor, output, encoders))
+        place = strange.place if strange.has_place(case.approach == "robot") else None
+    truth = Truth(
+        set=case.set,
+        design=case.design,
+        approach=case.approach,
+        sigma_known=case.sigma_known,
+        seed=_numbers(seed),
+        effects=tuple(hidden),
+        classes=tuple(classes),
+        noise={
+            "kind": noise.kind,
+            "name": None if noise.kind is None else NOISES[noise.kind],
+            "settings": noise.settings,
+        },
+        gross=gross,
+        sensor={
+            "bias": sensor.bias.tolist(),
+            "scale": sensor.scale.tolist(),
+            "lean": sensor.lean.tolist(),
+        },
+        oracle={
+            "detected": verdict.detected,
+            "best": plain(verdict.best),
+            "told": plain(verdict.told),
+            "alternatives": verdict.alternatives,
+        },
+        left=left,
+        place=place,
+    )
+    return campaign, truth
+
+
+def left_of(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+    """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
+    corrected = (output - sensor.bias) @ sensor.correction.T
+    return of_design.conditions.seen(corrected[None], reading[None])[0]
+
+
+def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
+    """The campaign as it was recorded, without the samples within the holds."""
+    robot = case.approach == "robot"
+    return Campaign(
+        name=f"hidden {case.design}",
+        positions=np.arange(1, session.n + 1),
+        forces=forces,
+        gravity=GRAVITY,
+        sigma_force=session.sigma if case.sigma_known else None,
+        angles=reading if robot else None,
+        sigma_angle=session.sigma_angle if robot else None,
+        yaw=session.yaw if robot else None,
+        time=session.time,
+        temperature=session.temperature,
+        vibration=session.vibration,
+        full_range=session.full_range,
+    )
+
+
+def _with_samples(
+    campaign: Campaign,
+    session: Session,
+    sensor: Sensor,
+    causes: list[Cause],
+    noise: Noise,
+    rng: np.random.Generator,
+) -> Campaign:
+    """Add the statistics of the samples within the holds, where they were kept."""
+    if not session.n_samples:
+        return campaign
+    sd = noise.sds(session, rng)
+    n_samples = np.full(session.n, session.n_samples)
+    campaign = replace(campaign, sd=sd, n_samples=n_samples)
+    if not session.slopes:
+        return campaign
+    # Least-squares slope of n equally spaced samples with independent errors.
+    root = np.sqrt(12 / session.n_samples) / session.length
+    slope = root * noise.samples_sd(session) * rng.standard_normal(sd.shape)
+    if any(cause.effect.in_time for cause in causes):
+        half = session.length / 4
+        ahead, back = (observe(session.later(by), sensor, causes)[0][0] for by in (half, -half))
+        slope += (ahead - back) / (2 * half)
+    return replace(campaign, slope=slope, sd_slope=root * sd)
+
+
+def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:
+    """Entropy and spawn key of a seed."""
+    entropy = seed.entropy
+    words = () if entropy is None else (entropy,) if isinstance(entropy, int) else tuple(entropy)
+    return (*(int(word) for word in words), *(int(key) for key in seed.spawn_key))
+
+
+DRAWS = 200
+"""Draws of an effect until one is as it should be."""
+
+
+def drawn(
+    name: str,
+    lam: float,
+    session: Session,
+    conditions: Conditions,
+    knowing: Oracle,
+    rng: np.random.Generator,
+) -> tuple[Cause, tuple[str, ...]]:
+    """Draw an effect, and say what means the same.
+
+    Parameters
+    ----------
+    name : str, of an effect of the catalogue or outside it
+    lam : float, its noncentrality; 0 for an effect of usual size, however little of it shows
+    session : Session, in which the joints stand where they really do
+    conditions : Conditions, of this session with the sensor that has the effect
+    knowing : Oracle, of the design
+
+    Returns
+    -------
+    cause : Cause
+    same : tuple of str, names of the catalogue
+
+    Raises
+    ------
+    InputError
+        If the design cannot see the effect.
+    """
+    of_design = knowing.atlas
+    effect = EFFECTS.get(name) or NOWHERE[name]
+    if not lam:
+        return _of_usual_size(effect, session, rng), (name,)
+    if effect.shows(of_design.session):
+        for _ in range(DRAWS):
+            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
+            if shape is None:
+                continue
+            cause, change = _scaled(shape, lam, session, conditions, rng)
+            if name in EFFECTS or knowing.is_outside(change):
+                return cause, of_design.same_as(shape)
+    approach = "robot" if conditions.robot else "gravity"
+    raise InputError(
+        f"{of_design.session.name}, {approach}: cannot see {name} as such; "
+        f"it sees {', '.join(of_design.visible)}"
+    )
+
+
+def _of_usual_size(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
+    parameters = effect.typical * rng.standard_normal((1, effect.k))
+    return Cause(effect, effect.draw(session, rng), parameters)
+
+
+def _scaled(
+    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
+) -> tuple[Cause, Array]:
+    """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
+    parameters = rng.standard_normal(shape.effect.k)
+    if shape.effect.loses:
+        parameters = abs(parameters)
+    # Directions that cannot be seen have no size.
+    parameters = shape.directions @ (shape.directions.T @ parameters)
+    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
+    without = conditions.misclosures(*observe(session, conditions.sensor, ()))
+    for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
+        with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))
+        change = conditions.left(with_it - without)[0]
+        factor = np.sqrt(lam / float(change @ change))
+        cause = replace(cause, parameters=cause.parameters * factor)
+    return cause, change * factor

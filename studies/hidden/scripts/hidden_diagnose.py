@@ -1,0 +1,12 @@
+from accelstudy.jobs.job import job
+from studies.hidden.cells import planned
+from studies.hidden.config import parse_hidden
+from studies.hidden.diagnosing import run_chunk
+
+with job(snakemake) as provenance:
+    run_chunk(
+        parse_hidden(snakemake.config),
+        planned(snakemake.input[0], int(snakemake.wildcards.chunk)),
+        dict(snakemake.output.items()),
+        provenance,
+    )
