@@ -27,7 +27,7 @@ from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from studies.hidden.campaigns import Row, made, rows_table, tried
+from studies.hidden.campaigns import SCHEMA, Made, Row, made_of, rows_table, simulated, tried
 from studies.hidden.cells import Cell
 from studies.hidden.config import HiddenConfig
 
@@ -56,21 +56,21 @@ def run_baselines(
     """
     model, rows = get_model(config.model), []
 
-    def answer(campaign: Campaign) -> list[Row]:
+    def answer(made: Made) -> list[Row]:
         return [
             {"method": method, "detected": detected, "found": json.dumps(names), "error": ""}
-            for method, (detected, names) in answers(campaign, model)
+            for method, (detected, names) in answers(made.campaign, model)
         ]
 
     for cell, k in campaigns:
         if cell.one_in(config.baselines_every, k):
-            campaign, truth = made(cell, k, config.seed)
+            made, truth = made_of(cell, k, simulated(config.seed))
             with effects_without(cell.removed):
-                answered, error = tried(answer, campaign, f"{cell.name} {k}")
+                answered, error = tried(answer, made, f"{cell.name} {k}")
             nothing = {"detected": False, "found": "[]", "error": error or truth["failed"]}
             answered = answered or [{"method": method, **nothing} for method in METHODS]
             rows += [{"cell": cell.name, "campaign": k, **row} for row in answered]
-    write_table(output, rows_table("baselines", rows), provenance)
+    write_table(output, rows_table(rows, SCHEMA["baselines"]), provenance)
 
 
 @dataclass(frozen=True)

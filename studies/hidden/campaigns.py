@@ -1,30 +1,26 @@
-"""The campaigns of the study, made with the row of their truth, and the tables of the study."""
+"""The campaigns of both studies, made with the rows of their truths; the tables of the jobs."""
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
+from typing import Any, NamedTuple, TypeVar
 
 import pandas as pd
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from studies.hidden.cells import Cell
-from studies.hidden.physics import Truth, generate
+from studies.hidden.physics.generate import Truth, generate
 
 Row = dict[str, Any]
 
 KEY = ["cell", "campaign"]
 """Columns by which truths and answers belong together."""
-
-TABLES = ("campaigns", "targets", "shares", "confusion", "calibration", "baselines", "limits")
-"""Tables of a score."""
-
 _TEXT, _NUMBER, _FLAG = "string", "float64", "boolean"
 _KEYS = {"cell": _TEXT, "campaign": "int64"}
-
 SCHEMA: dict[str, dict[str, str]] = {
     "truths": {
         **_KEYS,
@@ -53,20 +49,62 @@ SCHEMA: dict[str, dict[str, str]] = {
 """Columns of the tables of a chunk, and their types; lists and mappings are JSON."""
 
 
-def rows_table(name: str, rows: list[Row]) -> pd.DataFrame:
-    """Table of the study, with its columns and their types, of rows."""
-    return pd.DataFrame(rows, columns=[*SCHEMA[name]]).astype(SCHEMA[name])
+class Made(NamedTuple):
+    """A campaign and its truth, with further columns of its row and of that of its diagnosis."""
+
+    campaign: Campaign
+    truth: Truth
+    columns: Row = {}  # noqa: RUF012, nobody changes it
+    of_answer: Callable[[Any], Row] = lambda verdict: {}
 
 
-def made(cell: Cell, k: int, seed: int) -> tuple[Campaign | None, Row]:
-    """Make a campaign and the row of its truth; None if it could not be made."""
-    campaign_and_truth, error = tried(
-        lambda seed_of_campaign: generate(cell.case, seed_of_campaign),
-        cell.seed(seed, k),
-        f"{cell.name} {k}: not made",
-    )
-    campaign, truth = campaign_and_truth or (None, None)
-    return campaign, _truth(cell, truth, error)
+C = TypeVar("C", bound=Cell)
+Make = Callable[[C, int], Made]
+"""Makes a campaign of a cell by its number."""
+
+
+def rows_table(rows: Iterable[Row], schema: Mapping[str, str]) -> pd.DataFrame:
+    """Table of rows, with columns of given types."""
+    return pd.DataFrame(rows, columns=[*schema]).astype(dict(schema))
+
+
+def simulated(seed: int) -> Make[Cell]:
+    """Make campaigns by the physics of the study."""
+    return lambda cell, k: Made(*generate(cell.case, cell.seed(seed, k)))
+
+
+def made_of(cell: C, k: int, make: Make[C]) -> tuple[Made | None, Row]:
+    """Make a campaign, and the row of its truth; None if it could not be made."""
+    made: Made | None
+    made, error = tried(lambda number: make(cell, number), k, f"{cell.name} {k}: not made")
+    truth = made.truth if made else Truth()
+    oracle = truth.oracle
+    # No name is right for what a session cannot show or the catalogue lacks.
+    nameless = cell.case.set in ("invisible", "outside", "unforeseen")
+    known = [[name for name in one if name not in cell.removed] for one in truth.classes]
+    row = {
+        "set": cell.case.set,
+        "what": cell.what,
+        "size": cell.size,
+        "design": cell.case.design,
+        "approach": cell.case.approach,
+        "sigma": cell.sigma,
+        "classes": json.dumps([] if nameless else [one for one in known if one]),
+        "effects": json.dumps([asdict(one) for one in truth.effects]),
+        "noise": json.dumps(truth.noise),
+        "gross": json.dumps(truth.gross if made else {}),
+        "gross_name": truth.gross["name"],
+        "oracle_detected": None if oracle is None else oracle.detected,
+        "oracle_best": json.dumps([] if oracle is None else oracle.best),
+        "oracle_told": json.dumps([] if oracle is None else oracle.told),
+        "oracle_alternatives": None if oracle is None else oracle.alternatives,
+        "left": json.dumps(truth.left),
+        "true_place": json.dumps(truth.place),
+        "sensor": json.dumps(truth.sensor),
+        "seed": json.dumps(truth.seed if made else None),
+        "failed": error,
+    }
+    return made, row | (made.columns if made else {})
 
 
 def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
@@ -85,36 +123,21 @@ def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
         return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
-def _truth(cell: Cell, truth: Truth | None, error: str) -> Row:
-    """Row of the table of truths; of a campaign that could not be made what was wanted."""
-    case = cell.case
-    content = {} if truth is None else truth.to_dict()
-    oracle = content.get("oracle") or {}
-    gross = content.get("gross") or {}
-    # No name is right for what a session cannot show or the catalogue lacks.
-    classes = (
-        [] if case.set in ("invisible", "outside", "unforeseen") else content.get("classes", [])
-    )
-    left = [[name for name in one if name not in cell.removed] for one in classes]
-    return {
-        "set": case.set,
-        "what": cell.what,
-        "size": cell.size,
-        "design": case.design,
-        "approach": case.approach,
-        "sigma": "given" if case.sigma_known else "not given",
-        "classes": json.dumps([one for one in left if one]),
-        "effects": json.dumps(content.get("effects", [])),
-        "noise": json.dumps(content.get("noise")),
-        "gross": json.dumps(gross),
-        "gross_name": gross.get("name", ""),
-        "oracle_detected": oracle.get("detected"),
-        "oracle_best": json.dumps(oracle.get("best", [])),
-        "oracle_told": json.dumps(oracle.get("told", [])),
-        "oracle_alternatives": oracle.get("alternatives"),
-        "left": json.dumps(content.get("left", [])),
-        "true_place": json.dumps(content.get("place")),
-        "sensor": json.dumps(content.get("sensor")),
-        "seed": json.dumps(content.get("seed")),
-        "failed": error,
-    }
+def joined(truths: pd.DataFrame, outcomes: pd.DataFrame) -> pd.DataFrame:
+    """Truths and outcomes side by side, one row for each campaign.
+
+    Raises
+    ------
+    InputError
+        If a campaign has a truth and no outcome, or the other way round.
+    """
+    table = truths.merge(outcomes, on=KEY, how="outer", validate="1:1", indicator=True)
+    alone = table[table["_merge"] != "both"]
+    if len(alone):
+        first = alone.iloc[0]
+        lacks = "outcome" if first["_merge"] == "left_only" else "truth"
+        raise InputError(
+            f"{first['cell']}, campaign {first['campaign']}: has no {lacks}; {len(alone)} in all; "
+            "run the study again"
+        )
+    return table.drop(columns="_merge")

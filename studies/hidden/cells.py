@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import combinations
 from math import ceil, nan
 from pathlib import Path
 from typing import Any
@@ -17,17 +17,9 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.outputs import whole_file
-from studies.hidden.config import HiddenConfig
-from studies.hidden.physics import (
-    NOISES,
-    Case,
-    invisible_effects,
-    visible_effects,
-    visible_gross,
-    visible_outside,
-    visible_unforeseen,
-)
+from studies.hidden.config import KINDS, HiddenConfig
 from studies.hidden.physics.atlas import atlas
+from studies.hidden.physics.generate import Case
 
 CHUNK = 800
 """Campaigns in one job: minutes of work, so that starting Python does not matter."""
@@ -35,16 +27,10 @@ CHUNK = 800
 
 @dataclass(frozen=True)
 class Cell:
-    """Campaigns of one case.
-
-    Attributes
-    ----------
-    case : Case
-    count : int, number of campaigns
-    """
+    """Campaigns of one case, so many."""
 
     case: Case
-    count: int
+    count: int = 1
 
     @property
     def what(self) -> str:
@@ -57,12 +43,17 @@ class Cell:
         return self.case.lam[0] if self.case.lam else nan
 
     @property
+    def sigma(self) -> str:
+        """Whether the campaigns state their sigma, in words."""
+        return "given" if self.case.sigma_known else "not given"
+
+    @property
     def name(self) -> str:
         """Name, unique within a study."""
-        sigma = "sigma given" if self.case.sigma_known else "sigma not given"
         what = "" if not self.what else f"{self.what}/"
         size = "" if not self.case.lam else f"{self.size:g}/"
-        return f"{self.case.set}/{what}{size}{self.case.design}/{self.case.approach}/{sigma}"
+        session = f"{self.case.design}/{self.case.approach}/sigma {self.sigma}"
+        return f"{self.case.set}/{what}{size}{session}"
 
     @property
     def removed(self) -> tuple[str, ...]:
@@ -116,74 +107,14 @@ def study_cells(config: HiddenConfig) -> list[Cell]:
     return sorted(cells, key=session)
 
 
-def write_plan(config: HiddenConfig, path: str | Path) -> None:
-    """Write the campaigns of each chunk, so that the jobs need not plan the study again."""
-    plan = [
-        [{"case": asdict(cell.case), "campaigns": [part.start, part.stop]} for cell, part in chunk]
-        for chunk in chunks(study_cells(config), number_of_chunks(config))
-    ]
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(plan), encoding="utf-8")
-
-
-def planned(path: str | Path, chunk: int) -> Iterator[tuple[Cell, int]]:
-    """Cells and numbers of the campaigns of a chunk, as `write_plan` wrote them."""
-    for part in json.loads(Path(path).read_text(encoding="utf-8"))[chunk]:
-        content: dict[str, Any] = {
-            k: tuple(v) if isinstance(v, list) else v for k, v in part["case"].items()
-        }
-        numbers = range(*part["campaigns"])
-        for k in numbers:
-            yield Cell(Case(**content), len(numbers)), k
-
-
-def chunks(cells: Iterable[Cell], number: int) -> list[list[tuple[Cell, range]]]:
-    """Divide the campaigns of cells into a number of chunks, as equal as they can be, in order."""
-    cells = list(cells)
-    ends = np.linspace(0, sum(cell.count for cell in cells), number + 1).round().astype(int)
-    result: list[list[tuple[Cell, range]]] = [[] for _ in range(number)]
-    first = 0
-    for cell in cells:
-        for chunk, (start, end) in zip(result, pairwise(ends.tolist()), strict=True):
-            part = range(max(start - first, 0), min(end - first, cell.count))
-            if part:
-                chunk.append((cell, part))
-        first += cell.count
-    return result
-
-
-def number_of_chunks(config: HiddenConfig) -> int:
-    """Number of jobs into which the campaigns of a study are divided."""
-    return ceil(config.campaigns / CHUNK)
-
-
-def limit_cells(config: HiddenConfig) -> list[Cell]:
-    """A campaign without any effect of each design and approach."""
-    places = dict.fromkeys((design, approach) for design, approach, _ in config.places)
-    return [Cell(Case("null", *place, sigma_known=True), 1) for place in places]
-
-
-SEEN: Mapping[str, Callable[[str, str], Collection[str]]] = {
-    "noise": lambda design, approach: tuple(NOISES),
-    "one": visible_effects,
-    "removed": visible_effects,
-    "outside": visible_outside,
-    "unforeseen": visible_unforeseen,
-    "gross": visible_gross,
-    "invisible": invisible_effects,
-}
-"""Kinds of each set that make sense in a design by an approach."""
-
-
 def _kinds(config: HiddenConfig) -> Iterator[tuple[list[Case], int]]:
     """Each kind and size: the cases among which its campaigns are spread, and how many they are."""
     places = config.places
     if config.nothing is not None:
         yield [Case("null", *place) for place in places], config.nothing.campaigns
-    for name, seen in SEEN.items():
-        block = getattr(config, name)
-        for kind in config.kinds(name) if block else ():
-            able = [place for place in places if kind in seen(*place[:2])]
+    for name, block in config.blocks():
+        for kind in config.kinds(name):
+            able = [place for place in places if kind in KINDS[name][1](*place[:2])]
             if not able and block.kinds != ["all"]:
                 raise InputError(f"{name}.kinds: no session of the study can show {kind}")
             hidden: dict[str, Any] = (
@@ -192,16 +123,10 @@ def _kinds(config: HiddenConfig) -> Iterator[tuple[list[Case], int]]:
             for size in getattr(block, "sizes", [None]):
                 lam = () if size is None else (size,)
                 yield [Case(name, *p, lam=lam, **hidden) for p in able], block.campaigns
-    if config.two is not None:
-        for size in config.two.sizes:
-            yield (
-                [
-                    Case("two", *place, effect=pair, lam=(size, size))
-                    for place in places
-                    for pair in distinct_pairs(*place[:2])
-                ],
-                config.two.campaigns,
-            )
+    for size in config.two.sizes if config.two else ():
+        pairs = [(place, pair) for place in places for pair in distinct_pairs(*place[:2])]
+        cases = [Case("two", *place, effect=pair, lam=(size, size)) for place, pair in pairs]
+        yield cases, config.two.campaigns if config.two else 0
 
 
 @cache
@@ -216,9 +141,45 @@ def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
 
 def _spread(cases: Sequence[Case], count: int) -> Iterator[Cell]:
     """Spread campaigns over cases; which cases get one more is as good as random."""
-    if not cases:
-        return
-    each, more = divmod(count, len(cases))
+    each, more = divmod(count, max(len(cases), 1))
     for i, case in enumerate(sorted(cases, key=_digest)):
         if number := each + (i < more):
             yield Cell(case, number)
+
+
+def number_of_chunks(config: HiddenConfig) -> int:
+    """Number of jobs into which the campaigns of a study are divided."""
+    return ceil(config.campaigns / CHUNK)
+
+
+def write_plan(config: HiddenConfig, path: str | Path) -> None:
+    """Write the campaigns of each chunk, so that the jobs need not plan the study again."""
+    with whole_file(path) as temporary:
+        plan = chunks(study_cells(config), number_of_chunks(config))
+        temporary.write_text(json.dumps(plan), encoding="utf-8")
+
+
+def chunks(cells: Sequence[Cell], number: int) -> list[list[tuple[dict[str, Any], int, int]]]:
+    """Campaigns of cells in a number of chunks, as equal as they can be: case, first, one past."""
+    ends = np.cumsum([cell.count for cell in cells])
+    bounds = np.linspace(0, ends[-1], number + 1).round().astype(int)
+    result = []
+    for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        parts = []
+        for cell, end in zip(cells, ends.tolist(), strict=True):
+            before = end - cell.count
+            first, last = max(start - before, 0), min(stop - before, cell.count)
+            if first < last:
+                parts.append((asdict(cell.case), first, last))
+        result.append(parts)
+    return result
+
+
+def planned(path: str | Path, chunk: int) -> Iterator[tuple[Cell, int]]:
+    """Cells and numbers of the campaigns of a chunk, as `write_plan` wrote them."""
+    for case, first, stop in json.loads(Path(path).read_text(encoding="utf-8"))[chunk]:
+        content: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in case.items()
+        }
+        for k in range(first, stop):
+            yield Cell(Case(**content), stop - first), k

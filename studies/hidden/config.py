@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -22,19 +22,36 @@ from accelstudy.files.validation import (
     checked,
 )
 from accelstudy.sensors.models import get_model
-from studies.hidden.physics import (
-    APPROACHES,
-    DESIGNS,
-    EFFECTS,
-    GROSS,
-    NOISES,
-    OUTSIDE,
-    UNFORESEEN,
-)
+from studies.hidden.physics.atlas import invisible_effects, visible_effects
+from studies.hidden.physics.designs import APPROACHES, DESIGNS
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.gross import GROSS, visible_gross
+from studies.hidden.physics.measuring import NOISES
+from studies.hidden.physics.oracle import visible_outside, visible_unforeseen
+from studies.hidden.physics.outside import OUTSIDE
+from studies.hidden.physics.unforeseen import UNFORESEEN
 
 Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]
 Every = Annotated[int, Field(ge=1)]
+
+CAMPAIGNS = Range(1, 1_000_000)
+"""Campaigns of a study; the most take days of computing."""
+
+_EFFECTS = tuple(name for name in EFFECTS if name in effect_names())
+Seen = Callable[[str, str], Collection[str]]
+KINDS: Mapping[str, tuple[Sequence[str], Seen]] = {
+    "noise": (tuple(NOISES), lambda design, approach: NOISES),
+    "one": (_EFFECTS, visible_effects),
+    "removed": (_EFFECTS, visible_effects),
+    "outside": (tuple(OUTSIDE), visible_outside),
+    "unforeseen": (tuple(UNFORESEEN), visible_unforeseen),
+    "gross": (tuple(GROSS), visible_gross),
+    "invisible": (_EFFECTS, invisible_effects),
+}
+"""Kinds that each set may have, and those that make sense in a design by an approach."""
+SETS = ("nothing", "two", *KINDS)
+"""Blocks of campaigns."""
 
 
 class Nothing(Block):
@@ -65,28 +82,23 @@ class Pairs(Block):
     campaigns: Replicates = Field(description="of each size, each with two effects at random")
 
 
-_EFFECTS = tuple(name for name in EFFECTS if name in effect_names())
-KNOWN: Mapping[str, Sequence[str]] = {
-    "noise": tuple(NOISES),
-    "one": _EFFECTS,
-    "removed": _EFFECTS,
-    "outside": tuple(OUTSIDE),
-    "unforeseen": tuple(UNFORESEEN),
-    "gross": tuple(GROSS),
-    "invisible": _EFFECTS,
-}
-"""Kinds that each set may have."""
-SETS = ("nothing", "two", *KNOWN)
-"""Blocks of campaigns."""
-
-
-class HiddenConfig(Block):
-    """A study of hidden effects; results go to ``results/<study>``."""
+class Study(Block):
+    """What both studies have."""
 
     study: PathName = Field(description="name; results go to results/<study>/")
-    seed: Seed = Field(description="of all campaigns")
+    seed: Seed = Field(description="of all that is random")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
     diagnosis_seed: Seed = Field(1, description="of each diagnosis, as the option --seed")
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that the numbers depend on, defaults included."""
+        return config_hash(self.model_dump(mode="json", exclude={"public_folder"}))
+
+
+class HiddenConfig(Study):
+    """A study of hidden effects; results go to ``results/<study>``."""
+
     designs: Names = Field(["all"], description="sessions that are simulated, or all")
     approaches: Names = Field(["all"], description="gravity, robot, or all")
     sigma: OneOrMore[Literal["given", "not given"]] = Field(
@@ -118,10 +130,8 @@ class HiddenConfig(Block):
                 raise InputError(f"model: {error}") from None
             _known("designs", "design", self.designs, DESIGNS)
             _known("approaches", "approach", self.approaches, APPROACHES)
-            for name, kinds in KNOWN.items():
-                block = getattr(self, name)
-                if block is not None:
-                    _known(f"{name}.kinds", "kind", block.kinds, kinds)
+            for name, block in self.blocks():
+                _known(f"{name}.kinds", "kind", block.kinds, KINDS[name][0])
             if not self.campaigns:
                 raise InputError(f"no campaigns; give at least one of {', '.join(SETS)}")
             CAMPAIGNS.check_key("campaigns in all", self.campaigns)
@@ -129,10 +139,15 @@ class HiddenConfig(Block):
             raise ValueError(str(error)) from None
         return self
 
+    def blocks(self) -> Iterator[tuple[str, Kinds | Sized]]:
+        """Sets of one thing each that are given, and their blocks."""
+        blocks = ((name, getattr(self, name)) for name in KINDS)
+        return ((name, block) for name, block in blocks if block is not None)
+
     def kinds(self, set_: str) -> list[str]:
         """Kinds of a set, spelled out."""
         chosen = getattr(self, set_).kinds
-        return [*KNOWN[set_]] if chosen == ["all"] else [*chosen]
+        return [*KINDS[set_][0]] if chosen == ["all"] else [*chosen]
 
     @property
     def places(self) -> list[tuple[str, str, bool]]:
@@ -149,27 +164,14 @@ class HiddenConfig(Block):
     @property
     def campaigns(self) -> int:
         """Number of campaigns, at most: fewer where no session can show a kind."""
-        return sum(self._counts())
-
-    def _counts(self) -> Iterator[int]:
-        if self.nothing is not None:
-            yield self.nothing.campaigns
-        if self.two is not None:
-            yield self.two.campaigns * len(self.two.sizes)
-        for name in KNOWN:
-            block: Kinds | Sized | None = getattr(self, name)
-            if block is not None:
-                sizes = len(block.sizes) if isinstance(block, Sized) else 1
-                yield block.campaigns * len(self.kinds(name)) * sizes
-
-    @property
-    def fingerprint(self) -> str:
-        """Hash of the whole configuration, defaults included."""
-        return config_hash(self.model_dump(mode="json"))
-
-
-CAMPAIGNS = Range(1, 1_000_000)
-"""Campaigns of a study; the most take days of computing."""
+        return (
+            (self.nothing.campaigns if self.nothing else 0)
+            + (self.two.campaigns * len(self.two.sizes) if self.two else 0)
+            + sum(
+                block.campaigns * len(self.kinds(name)) * len(getattr(block, "sizes", [None]))
+                for name, block in self.blocks()
+            )
+        )
 
 
 def parse_hidden(content: Mapping[str, Any], source: str = "config") -> HiddenConfig:

@@ -1,9 +1,9 @@
-"""One job of the study: campaigns are made and diagnosed, and truths and answers written apart."""
+"""The jobs that diagnose: truths and answers are written as rows of tables."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -11,16 +11,24 @@ from typing import Any
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution, column_basis
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import judge
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.sensors.models import get_model
-from studies.hidden.campaigns import Row, made, rows_table, tried
+from studies.hidden.campaigns import (
+    SCHEMA,
+    C,
+    Made,
+    Make,
+    Row,
+    made_of,
+    rows_table,
+    simulated,
+    tried,
+)
 from studies.hidden.cells import Cell
 from studies.hidden.config import HiddenConfig
-from studies.hidden.judging import LEARNED
 
 
 def run_chunk(
@@ -31,39 +39,65 @@ def run_chunk(
 ) -> None:
     """Diagnose the campaigns of a chunk.
 
-    The diagnosis gets the campaign and nothing else. One that fails is a row with its error. The
-    times stand apart, as they differ in every run.
-
     Parameters
     ----------
     config : HiddenConfig
     campaigns : of (Cell, number of the campaign)
-    outputs : paths of the tables truths, outcomes and seconds
+    outputs : paths of the tables truths, outcomes and seconds; the times stand apart, as they
+        differ in every run
     provenance : see `accelstudy.files.tables.origin`
     """
-    model = get_model(config.model)
-    rows: dict[str, list[Row]] = {name: [] for name in outputs}
+    rows = [*diagnosed(campaigns, simulated(config.seed), config.model, config.diagnosis_seed)]
+    for i, name in enumerate(("truths", "outcomes", "seconds")):
+        table = rows_table((row[i] for row in rows), SCHEMA[name])
+        write_table(outputs[name], table, provenance)
 
-    def answer(campaign: Campaign) -> Row:
-        return outcome(judge(campaign, model, seed=config.diagnosis_seed))
 
+def diagnosed(
+    campaigns: Iterable[tuple[C, int]], make: Make[C], model: str, seed: int
+) -> Iterator[tuple[Row, Row, Row]]:
+    """Rows of truth, outcome and time of campaigns.
+
+    The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
+
+    Parameters
+    ----------
+    campaigns : of (Cell, number of the campaign)
+    make : makes a campaign
+    model : name of the model that is diagnosed
+    seed : of each diagnosis
+    """
+    sensor_model = get_model(model)
     for cell, k in campaigns:
-        campaign, truth = made(cell, k, config.seed)
+        made, truth = made_of(cell, k, make)
         start = process_time()
+
+        def answer(made: Made) -> Row:
+            verdict = judge(made.campaign, sensor_model, seed=seed)
+            return outcome(verdict) | made.of_answer(verdict)
+
         with effects_without(cell.removed):
-            answered, error = tried(answer, campaign, f"{cell.name} {k}")
+            answered, error = tried(answer, made, f"{cell.name} {k}")
         key = {"cell": cell.name, "campaign": k}
-        rows["truths"].append({**key, **truth})
-        rows["outcomes"].append({**key, **(answered or {}), "error": error or truth["failed"]})
-        rows["seconds"].append({**key, "seconds": process_time() - start})
-    for name, path in outputs.items():
-        write_table(path, rows_table(name, rows[name]), provenance)
+        yield (
+            {**key, **truth},
+            {**key, **(answered or {}), "error": error or truth["failed"]},
+            {**key, "seconds": process_time() - start},
+        )
 
 
 def outcome(d: Verdict) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
-    learned = d.verdict == LEARNED
+    fits = (d.base, d.final.solution) if d.verdict == "learned" else ()
+    explanations = [
+        {
+            "names": list(one.names),
+            "classes": [list(names) for names in one.classes],
+            "posterior": _rounded(one.posterior),
+        }
+        for one in d.credible_set
+    ]
     return {
         "verdict": d.verdict,
         "found": json.dumps([one.name for one in d.effects]),
@@ -71,18 +105,9 @@ def outcome(d: Verdict) -> Row:
         "found_classes": json.dumps([list(one.equivalence_class) for one in d.effects]),
         "positions": json.dumps([one.position for one in d.effects]),
         "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
-        "credible_set": json.dumps(
-            [
-                {
-                    "names": list(one.names),
-                    "classes": [list(names) for names in one.classes],
-                    "posterior": _rounded(one.posterior),
-                }
-                for one in d.credible_set
-            ]
-        ),
+        "credible_set": json.dumps(explanations),
         "place": json.dumps(d.place),
-        "fits": json.dumps([_fit(one) for one in (d.base, d.final.solution)] if learned else []),
+        "fits": json.dumps([fit_squares(one) for one in fits]),
         "confirmed": bool(d.gap.confirmed),
         "statement": d.gap.statement or "",
         "held_out_z": np.nan if held is None else float(held.z),
@@ -95,7 +120,7 @@ def outcome(d: Verdict) -> Row:
     }
 
 
-def _fit(solution: Solution) -> dict[str, Any]:
+def fit_squares(solution: Solution) -> dict[str, Any]:
     """Sums of squares of the residuals of a fit, by kind, and what white noise leaves of them.
 
     With H = U Uᵀ of the conditions, U an orthonormal basis of the columns of Ã, residuals of unit
@@ -106,11 +131,8 @@ def _fit(solution: Solution) -> dict[str, Any]:
     basis = column_basis(solution.design)[:rows]
     noise = rows - 2 * np.sum(basis**2) + np.sum((basis.T @ basis) ** 2)
     squares = np.sum(solution.residuals**2, axis=0)
-    return {
-        "force": _rounded(float(np.sum(squares[:3]))),
-        "angle": _rounded(float(np.sum(squares[3:]))),
-        "noise": _rounded(float(noise)),
-    }
+    values = {"force": np.sum(squares[:3]), "angle": np.sum(squares[3:]), "noise": noise}
+    return {name: _rounded(float(value)) for name, value in values.items()}
 
 
 def _rounded(probability: float | None) -> float | None:

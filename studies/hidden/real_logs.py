@@ -11,12 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import optimize
+from scipy import optimize, special
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import import_log, log_of
@@ -26,23 +25,24 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
 from studies.hidden.physics.designs import ANGLE_SIGMA, GRAVITY, Course, Session, joints_of
-from studies.hidden.physics.effects import EFFECTS, Effect
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Settings
 from studies.hidden.physics.measuring import Sensor
 
 Array = NDArray[np.float64]
 
 BUMPED = "outlier_position"
-PUT: Mapping[str, Effect] = {
-    **EFFECTS,
-    BUMPED: Effect(
+PUT: Mapping[str, Kind] = {
+    **{name: kind for name, kind in EFFECTS.items() if kind.target in OUTPUTS},
+    BUMPED: Kind(
         BUMPED,
-        3,
+        "output",
         2e-2,
-        sensor=lambda f, p, s, session: p * (np.arange(session.n) == s["row"])[:, None],
-        draw=lambda session, rng: {"row": float(rng.integers(session.n))},
+        lambda p, f, s, x: p * (np.arange(x.n) == s["row"])[:, None],
+        settings=Settings(lambda x, rng: {"row": float(rng.integers(x.n))}),
     ),
 }
-"""What can be put into a log."""
+"""What can be put into a log: effects of the sensor, and a bumped hold."""
 BY_HOLD = ("hysteresis", "settling", BUMPED)
 """Effects that act from hold to hold, or in one; a single reading does not tell them."""
 
@@ -154,30 +154,28 @@ class Donor:
         )
         return float(np.sqrt(np.sum(left**2) / self.redundancy))
 
-    def unit(self, effect: Effect, settings: Mapping[str, float], course: Course | None) -> Array:
-        """What each parameter of an effect adds to the readings, (k, N, 3)."""
-        assert effect.sensor is not None
-        felt, time, by_hold = self.felt, self.time, effect.name in BY_HOLD
+    def unit(self, kind: Kind, settings: dict[str, float], course: Course | None) -> Array:
+        """What each parameter of a kind adds to the readings, (k, N, 3)."""
+        felt, time, by_hold = self.felt, self.time, kind.name in BY_HOLD
         if by_hold:
             felt, time = self.means(felt, self.spans), time[self.spans[:, 0]]
         session = Session(
             self.name, np.zeros((len(time), 2)), time, 1.0, 1.0, time=time, course=course
         )
-        one = np.eye(effect.k)[:, None, :]
-        added = effect.sensor(felt[None], one, settings, session)
+        added = Cause(kind, settings, np.eye(kind.k)).change(felt[None], session)
         return added[:, self.hold_of] if by_hold else added
 
     def write(
         self,
         path: Path,
-        puts: Sequence[Put],
+        puts: Sequence[Cause],
         course: Course | None,
         columns: Mapping[str, Array],
     ) -> ImportSettings:
         """Write the log with effects in its readings, and columns; returns how it is imported."""
         given, added = self.settings, np.zeros(self.forces.shape)
         for one in puts:
-            added += np.tensordot(one.parameters, self.unit(one.effect, one.settings, course), 1)
+            added += np.tensordot(one.parameters[0], self.unit(one.kind, one.settings, course), 1)
         conversion = conversion_of(given.unit, given.scale, given.offset)
         raw = conversion.from_si(given.axes.from_frd(self.forces + added))
         if given.unit == "counts":
@@ -205,28 +203,9 @@ def spans_of(campaign: Campaign, report: ImportReport) -> NDArray[np.int_]:
     return np.array([[segment.start, segment.end] for segment in used])
 
 
-@dataclass(frozen=True)
-class Put:
-    """An effect that was put into a log.
-
-    Attributes
-    ----------
-    effect : Effect
-    settings : dict of str to float
-    parameters : (k,) array
-    """
-
-    effect: Effect
-    settings: dict[str, float]
-    parameters: Array
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain values."""
-        parameters = self.parameters.tolist()
-        return {"name": self.effect.name, "settings": self.settings, "parameters": parameters}
-
-
-def put(name: str, size: float, log: Donor, course: Course | None, rng: np.random.Generator) -> Put:
+def put(
+    name: str, size: float, log: Donor, course: Course | None, rng: np.random.Generator
+) -> Cause:
     """Draw an effect that has a noncentrality in a log.
 
     Raises
@@ -234,33 +213,32 @@ def put(name: str, size: float, log: Donor, course: Course | None, rng: np.rando
     InputError
         If the log cannot show it.
     """
-    effect, atlas = PUT[name], log.atlas(log.spans, course, log.sigma)
-    settings = effect.draw(atlas.session, rng)
+    kind, atlas = PUT[name], log.atlas(log.spans, course, log.sigma)
+    settings = kind.settings.draw(atlas.session, rng)
     if "t" in settings:  # between two holds: what jumps within one is another effect
         between = (log.time[log.spans[:-1, 1] - 1] + log.time[log.spans[1:, 0]]) / 2
         settings["t"] = float(between[np.argmin(abs(between - settings["t"]))])
-    left, shape = seen(log, log.spans, atlas, effect, settings)
+    left, shape = seen(log, log.spans, atlas, kind, settings)
     if shape is None:
         raise InputError(f"{log.name}: cannot show {name}")
-    drawn = rng.standard_normal(effect.k)
-    drawn = abs(drawn) if effect.loses else drawn
-    # Directions that cannot be seen have no size.
-    parameters = shape.directions @ (shape.directions.T @ drawn)
-    return Put(effect, settings, parameters * np.sqrt(size / np.sum((parameters @ left) ** 2)))
+    parameters = shape.drawn(rng)
+    return Cause(
+        kind, settings, parameters[None] * np.sqrt(size / np.sum((parameters @ left) ** 2))
+    )
 
 
 def seen(
     log: Donor,
     spans: NDArray[np.int_],
     atlas: Atlas,
-    effect: Effect,
-    settings: Mapping[str, float],
+    kind: Kind,
+    settings: dict[str, float],
 ) -> tuple[Array, Shape | None]:
-    """What each parameter of an effect leaves in holds, (k, m), of unit weight, and its shape."""
-    holds = log.means(log.unit(effect, settings, atlas.session.course), spans)
+    """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape."""
+    holds = log.means(log.unit(kind, settings, atlas.session.course), spans)
     left = atlas.conditions.left(atlas.conditions.changed(holds))
-    size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(effect.k)
-    return left, Shape.of(effect, settings, left, size)
+    size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
+    return left, Shape.of(kind, settings, left, size)
 
 
 @dataclass(frozen=True)
@@ -269,37 +247,51 @@ class Shown:
 
     Attributes
     ----------
-    put : Put
+    cause : Cause
     spans : (n, 2) int array, of the holds
     atlas : Atlas, of the holds
     shape : Shape
     whole : (m,) array, residuals of a calibration
-    z : (m,) array, the same without what the other effects take up
-    basis : (m, d) array, orthonormal, what the form can take up of `z`
-    true : (m,) array, what the effect left in `z`
-    redundancy : int, of `z`
+    beside : (m, d) array, orthonormal, what the other effects take up
+    left : (k, m) array, what each parameter leaves
+    redundancy : int
     """
 
-    put: Put
+    cause: Cause
     spans: NDArray[np.int_]
     atlas: Atlas
     shape: Shape
     whole: Array
-    z: Array
-    basis: Array
-    true: Array
+    beside: Array
+    left: Array
     redundancy: int
 
-    def left_by(self, log: Donor, settings: Mapping[str, float]) -> Array:
-        """What each parameter would leave with other settings, (k, m)."""
-        return seen(log, self.spans, self.atlas, self.put.effect, settings)[0]
+    def without(self, rows: Array) -> Array:
+        """Residuals (..., m) without what the other effects take up."""
+        return np.asarray(rows - (rows @ self.beside) @ self.beside.T)
+
+    @property
+    def true(self) -> Array:
+        """What the effect left in the residuals, (m,), beside the others."""
+        return self.without(self.cause.parameters[0] @ self.left)
+
+    def f_test(self) -> tuple[float, float, float]:
+        """p-value, size over true size, and its sigma, by an F test that knows the form."""
+        z, true = self.without(self.whole), self.true
+        basis = np.linalg.qr(self.without(self.shape.basis.T).T)[0]
+        gain, d = float(np.sum((z @ basis) ** 2)), basis.shape[1]
+        dof = self.redundancy - d
+        variance = (float(z @ z) - gain) / dof
+        p = float(special.fdtrc(d, dof, gain / d / variance))
+        size = float(true @ true)
+        return p, float(z @ true) / size, float(np.sqrt(variance / size))
 
 
 def shown(
     log: Donor,
     spans: NDArray[np.int_],
     course: Course | None,
-    puts: Sequence[Put],
+    causes: Sequence[Cause],
     forces: Array,
 ) -> list[Shown]:
     """What effects show in the holds of a log that was imported with them.
@@ -309,36 +301,17 @@ def shown(
     InputError
         If the holds cannot show one.
     """
-    if not puts:
+    if not causes:
         return []
     atlas = log.atlas(spans, course, log.sigma)
     whole = atlas.conditions.seen(forces[None], np.zeros((1, len(spans), 2)))[0]
-    lefts, shapes = [], []
-    for one in puts:
-        left, shape = seen(log, spans, atlas, one.effect, one.settings)
-        if shape is None:
-            raise InputError(f"{log.name}: its holds no longer show {one.effect.name}")
-        lefts.append(left)
-        shapes.append(shape)
+    found = [seen(log, spans, atlas, one.kind, one.settings) for one in causes]
     result = []
-    for i, (one, left) in enumerate(zip(puts, lefts, strict=True)):
-        others = [shape.basis for k, shape in enumerate(shapes) if k != i]
+    for i, (cause, (left, shape)) in enumerate(zip(causes, found, strict=True)):
+        if shape is None:
+            raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
+        others = [other.basis for k, (_, other) in enumerate(found) if other and k != i]
         beside = np.concatenate([np.zeros((len(whole), 0)), *others], axis=1)
-
-        def without(rows: Array, beside: Array = beside) -> Array:
-            return np.asarray(rows - (rows @ beside) @ beside.T)
-
-        result.append(
-            Shown(
-                put=one,
-                spans=spans,
-                atlas=atlas,
-                shape=shapes[i],
-                whole=whole,
-                z=without(whole),
-                basis=np.linalg.qr(without(shapes[i].basis.T).T)[0],
-                true=without(one.parameters @ left),
-                redundancy=log.redundancy + len(spans) - len(log.spans) - beside.shape[1],
-            )
-        )
+        redundancy = log.redundancy + len(spans) - len(log.spans) - beside.shape[1]
+        result.append(Shown(cause, spans, atlas, shape, whole, beside, left, redundancy))
     return result

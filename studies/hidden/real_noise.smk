@@ -1,7 +1,7 @@
 # Put known effects into the readings of public logs, diagnose them, and score the diagnoses:
 # snakemake --cores 2 --snakefile studies/hidden/real_noise.smk
-from studies.hidden.real_noise import parse_real_noise
 from accelstudy.jobs.job import setup_digest
+from studies.hidden.real_noise import parse_real_noise
 
 
 configfile: "studies/hidden/config/real-noise.yaml"
@@ -16,9 +16,8 @@ config.update(STUDY.model_dump(mode="json"))
 # What a log's job uses of it; where the logs are does not matter.
 DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "public_folder"})
 SETUPS = {f"{RESULTS}/logs/{name}.parquet": setup_digest(DIAGNOSED) for name in STUDY.logs}
-OUTPUTS = [*SETUPS, f"{RESULTS}/campaigns.parquet"]
 
-look_at_earlier(OUTPUTS, SETUPS, STUDY.seed)
+look_at_earlier([*SETUPS, f"{RESULTS}/campaigns.parquet"], SETUPS, STUDY.seed)
 
 
 wildcard_constraints:
@@ -36,11 +35,8 @@ rule real_noise_log:
         f"{RESULTS}/logs/{{log}}.parquet",
     log:
         f"{RESULTS}/logs/{{log}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/{{log}}.tsv"
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    threads: 1
     resources:
         mem_mb=megabytes(2000),
     params:
@@ -54,17 +50,14 @@ rule real_noise_log:
 
 rule real_noise_score:
     input:
-        expand(f"{RESULTS}/logs/{{log}}.parquet", log=STUDY.logs),
+        [*SETUPS],
     output:
         campaigns=f"{RESULTS}/campaigns.parquet",
         page=f"{RESULTS}/score.md",
     log:
         f"{RESULTS}/logs/score.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/score.tsv"
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    threads: 1
     resources:
         mem_mb=megabytes(2000),
     params:

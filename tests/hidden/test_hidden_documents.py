@@ -10,13 +10,13 @@ from places import ROOT
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
 from studies.hidden.baselines import METHODS
-from studies.hidden.campaigns import TABLES
-from studies.hidden.cells import Case, Cell
+from studies.hidden.campaigns import joined
+from studies.hidden.cells import Cell
 from studies.hidden.config import SETS, parse_hidden
 from studies.hidden.diagnosing import run_chunk
-from studies.hidden.figures import figures
-from studies.hidden.page import sample_table
-from studies.hidden.scoring import joined, sample
+from studies.hidden.physics.generate import Case
+from studies.hidden.scoring.figures import figures
+from studies.hidden.scoring.page import TABLES, markdown, sample_table
 
 DOCS = ROOT / "docs"
 CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml"))
@@ -86,7 +86,7 @@ def test_the_score_is_that_of_the_code(tmp_path):
     campaigns = [(cell_of(row["cell"]), int(row["campaign"])) for row in told]
     run_chunk(CONFIG, campaigns, outputs, {"config_hash": CONFIG.fingerprint, "seed": CONFIG.seed})
     answers = joined(read_table(outputs["truths"]), read_table(outputs["outcomes"]))
-    now = rows_of(sample_table(sample(answers)))
+    now = rows_of(markdown(sample_table(answers)))
     changed = [
         f"{old}\n  now {new}" for old, new in zip(told, now, strict=True) if not alike(old, new)
     ]

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import studies.hidden.physics as physics
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
@@ -15,21 +14,10 @@ from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.models import get_model
-from studies.hidden.physics import (
-    APPROACHES,
-    NOISES,
-    OUTSIDE,
-    UNFORESEEN,
-    Case,
-    generate,
-    invisible_effects,
-    visible_effects,
-    visible_gross,
-    visible_outside,
-    visible_unforeseen,
-)
-from studies.hidden.physics.atlas import atlas
+from studies.hidden import physics
+from studies.hidden.physics.atlas import atlas, invisible_effects, visible_effects
 from studies.hidden.physics.designs import (
+    APPROACHES,
     DESIGNS,
     GRAVITY,
     Course,
@@ -38,10 +26,14 @@ from studies.hidden.physics.designs import (
     rotated,
     session,
 )
-from studies.hidden.physics.effects import EFFECTS, Rig
-from studies.hidden.physics.measuring import Cause, Noise, Sensor, observe
-from studies.hidden.physics.oracle import oracle
-from studies.hidden.physics.places import NEEDS, OF_ROBOT, TARGETS
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.generate import Case, generate
+from studies.hidden.physics.gross import visible_gross
+from studies.hidden.physics.kinds import COORDINATES, FACTORS, OF_ROBOT, OUTPUTS, Cause
+from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
+from studies.hidden.physics.oracle import oracle, visible_outside, visible_unforeseen
+from studies.hidden.physics.outside import OUTSIDE
+from studies.hidden.physics.unforeseen import UNFORESEEN
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -174,7 +166,7 @@ def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     # Only here does the temperature change linearly from hold to hold, as one must guess of a lag.
     design = "abba-48" if name == "thermal_bias" else "long-60"
     own, effect = atlas(design, approach), EFFECTS[name]
-    settings = effect.draw(own.session, np.random.default_rng(12))
+    settings = effect.settings.draw(own.session, np.random.default_rng(12))
     if name == "thermal_bias":
         assert settings["tau"] > 0
     shape = own.shape(effect, settings)
@@ -239,8 +231,8 @@ def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none
     assert len(UNFORESEEN) >= 12
     assert not {*OUTSIDE} & {*UNFORESEEN}
     assert not {*OUTSIDE, *UNFORESEEN} & {*EFFECTS, *effect_names()}
-    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {*NEEDS}
-    assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {*TARGETS}
+    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {*COORDINATES}
+    assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {*FACTORS}
     for kinds in (OUTSIDE, UNFORESEEN):
         assert sum(kind.place is None for kind in kinds.values()) >= 5
     shown = {
@@ -286,19 +278,14 @@ def with_the_same(coordinate, own, forces, rng):
 
 def of_target(kind, settings, own, forces):
     """What a kind with parameters of 1 changes in its target, (n, k)."""
-    p = np.ones((1, 1, kind.k))
-    if kind.sensor:
-        assert kind.place[1] in ("bias", "scale")
-        added = kind.sensor(forces, p, settings, own)[0]
-        return added / forces[0] if kind.place[1] == "scale" else added
-    rig, still = Rig(), Rig()
-    kind.rig(rig, p, settings, own)
-    changed = {name: np.asarray(value) for name, value in vars(rig).items()
-               if not np.array_equal(value, getattr(still, name))}  # fmt: skip
+    changed = Cause(kind, settings, np.ones((1, kind.k))).change(forces, own)
     # To turn the flange is to misread the joints.
-    (name,) = changed
-    assert {"reading": "reading", "deflection": "reading", "tilt": "tilt"}[name] == kind.place[1]
-    return np.broadcast_to(changed[name], (1, own.n, changed[name].shape[-1]))[0]
+    targets = {"output": ("bias", "scale"), "tilt": ("tilt",),
+               "reading": ("reading",), "deflection": ("reading",)}  # fmt: skip
+    assert kind.place[1] in targets[kind.target]
+    if kind.place[1] == "scale":
+        return changed[0] / forces[0]
+    return np.broadcast_to(changed, (1, own.n, changed.shape[-1]))[0]
 
 
 @pytest.mark.parametrize("name", PLACED)
@@ -306,7 +293,7 @@ def test_a_place_is_what_the_physics_depends_on_and_what_it_changes(name):
     """With its coordinate as it was, and all else another, it does the same; else it does not."""
     kind, rng = PLACED[name], np.random.default_rng(18)
     own, forces = holds(rng)
-    settings = kind.draw(own, rng)
+    settings = kind.settings.draw(own, rng)
     assert kind.shows(own)
     changed = of_target(kind, settings, own, forces)
     assert np.max(np.ptp(changed, axis=0)) > 0.1
@@ -322,10 +309,11 @@ def test_a_place_is_what_the_physics_depends_on_and_what_it_changes(name):
 def test_a_force_acts_in_its_hold_the_one_before_it_or_the_one_after(name):
     kind, rng = PLACED[name], np.random.default_rng(19)
     own, forces = holds(rng)
-    settings, moved = kind.draw(own, rng), forces.copy()
+    settings, moved = kind.settings.draw(own, rng), forces.copy()
     moved[0, 20] = -moved[0, 20, ::-1]
-    p = np.ones((1, 1, 3))
-    apart = kind.sensor(moved, p, settings, own) - kind.sensor(forces, p, settings, own)
+    assert kind.target in OUTPUTS
+    cause = Cause(kind, settings, np.ones((1, 3)))
+    apart = cause.change(moved, own) - cause.change(forces, own)
     where = {*np.flatnonzero(np.any(apart[0] != 0, axis=-1))}
     scaled = {20} if kind.place[1] == "scale" else set()
     assert where <= {"force": {20}, "previous": {21} | scaled, "next": {19, 20}}[kind.place[0]]
@@ -419,11 +407,11 @@ def test_the_oracle_keeps_its_level_and_knows_what_is_large():
     for i, name in enumerate(knowing.atlas.visible):
         case = Case("one", "snub-24", "robot", False, (name,), (2000.0,))
         truth = generate(case, seeded(15, i))[1]
-        (told,) = truth.oracle["told"]
+        (told,) = truth.oracle.told
         right.append(bool({*told} & {*truth.classes[0]}))
-        assert truth.oracle["alternatives"] <= 2
-        assert truth.oracle["detected"]
-        assert truth.oracle["best"] == truth.oracle["told"]
+        assert truth.oracle.alternatives <= 2
+        assert truth.oracle.detected
+        assert truth.oracle.best == truth.oracle.told
     assert np.mean(right) > 0.85
 
 
@@ -442,9 +430,9 @@ def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
 def test_the_oracle_tells_two_effects():
     names = ("hysteresis", "encoder_offset")
     case = Case("two", "yaw-50", "robot", True, names, (300.0, 300.0))
-    truth = generate(case, seeded(17))[1].to_dict()
-    assert [set(one) for one in truth["oracle"]["best"]] == [{"hysteresis"}, {"encoder_offset"}]
-    assert [effect["lam"] for effect in truth["effects"]] == [300.0, 300.0]
+    truth = generate(case, seeded(17))[1]
+    assert [set(one) for one in truth.oracle.best] == [{"hysteresis"}, {"encoder_offset"}]
+    assert [effect.lam for effect in truth.effects] == [300.0, 300.0]
 
 
 def test_a_sensor_clips_what_it_would_read():

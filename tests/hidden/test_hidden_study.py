@@ -19,9 +19,9 @@ from studies.hidden import campaigns, diagnosing
 from studies.hidden.baselines import METHODS, run_baselines
 from studies.hidden.campaigns import KEY
 from studies.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
-from studies.hidden.config import KNOWN, parse_hidden
+from studies.hidden.config import KINDS, parse_hidden
 from studies.hidden.diagnosing import run_chunk
-from studies.hidden.physics import Case
+from studies.hidden.physics.generate import Case
 
 TINY = {
     "study": "tiny",
@@ -99,7 +99,7 @@ def test_the_full_study():
     assert set(counts.values()) == {30}
     assert {size for _, size in counts} == {6, 10.5, 16, 25, 40, 60, 100, 400}
     # Those that have a formula of their own for this study; gravity_error is invisible everywhere.
-    visible = {*KNOWN["one"]} - {"gravity_error"}
+    visible = {*KINDS["one"][0]} - {"gravity_error"}
     assert len(visible) >= 23
     assert {what for what, _ in counts} >= visible
     assert len({cell.name for cell in cells}) == len(cells)
@@ -141,10 +141,15 @@ def test_chunks_hold_each_campaign_once():
     whole = {(cell.name, k) for cell in cells for k in range(cell.count)}
     for number in (1, 2, 7):
         parts = chunks(cells, number)
-        got = [(cell.name, k) for part in parts for cell, numbers in part for k in numbers]
+        got = [
+            (Cell(Case(**case)).name, k)
+            for part in parts
+            for case, first, stop in part
+            for k in range(first, stop)
+        ]
         assert len(got) == len(whole)
         assert set(got) == whole
-        sizes = [sum(len(numbers) for _, numbers in part) for part in parts]
+        sizes = [sum(stop - first for _, first, stop in part) for part in parts]
         assert max(sizes) - min(sizes) <= 1
 
 
@@ -260,7 +265,8 @@ def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
     monkeypatch.setattr(accelstudy, "__file__", str(tmp_path / "accelstudy" / "__init__.py"))
     for name, expected in {
         "accelstudy/diagnosis/pipeline.py": {"hidden_diagnose"},
-        "studies/hidden/targets.py": {"hidden_score"},
+        "studies/hidden/scoring/targets.yaml": {"hidden_score"},
+        "studies/hidden/scoring/judging.py": {"hidden_score"},
         "studies/hidden/baselines.py": {"hidden_baselines"},
         "studies/hidden/physics/measuring.py": {*stages},
         "accelstudy/effects/bias_drift.py": {*stages},

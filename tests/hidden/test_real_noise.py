@@ -16,21 +16,22 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_table
 from studies.hidden.physics.effects import EFFECTS
-from studies.hidden.real_logs import BUMPED, PUT, Donor, Put, put
+from studies.hidden.physics.generate import Case
+from studies.hidden.physics.kinds import Cause
+from studies.hidden.real_logs import BUMPED, PUT, Donor, put
 from studies.hidden.real_noise import (
-    Case,
+    LogCell,
     RealNoiseConfig,
-    answered,
-    cases_of,
+    log_cells,
+    log_table,
     parse_real_noise,
     run_log,
-    said_of,
-    table_of,
 )
-from studies.hidden.real_page import real_page
+from studies.hidden.scoring.logs import judge_logs, real_page, said_of
 
 G, SIZE, COUNT, SIGMA = 9.80665, 20, 26, 0.01
 CONFIG = parse_real_noise(read_layer(ROOT / "studies/hidden/config/real-noise.yaml"))
+SQUARE = LogCell(Case("one", "log", "gravity", False, ("quadratic_scale",), (300.0,)))
 OURS = RealNoiseConfig(
     study="test",
     seed=3,
@@ -65,7 +66,7 @@ def test_the_sensor_of_a_log_is_found(log):
 def test_an_effect_is_put_into_each_reading(log, tmp_path):
     """k f² / g, at the force that the sensor felt then."""
     k = np.array([1e-3, -2e-3, 5e-4])
-    one = Put(EFFECTS["quadratic_scale"], {}, k)
+    one = Cause(EFFECTS["quadratic_scale"], {}, k[None])
     log.write(tmp_path / "log.parquet", [one], None, {})
     written = pd.read_parquet(tmp_path / "log.parquet")[["fx", "fy", "fz"]].to_numpy()
     felt = (log.forces - log.sensor.bias) / (1 + log.sensor.scale)
@@ -81,9 +82,9 @@ def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
 
 def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
     """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
-    case = Case("log", ("quadratic_scale",), 300)
-    row = answered(OURS, log, case)
-    one = put("quadratic_scale", 300, log, None, case.rng(OURS.seed))
+    (row,) = log_table(OURS, log, [(SQUARE, 0)]).to_dict("records")
+    rng = np.random.default_rng(SQUARE.seed(OURS.seed, 0))
+    one = put("quadratic_scale", 300, log, None, rng)
     settings = log.write(tmp_path / "log.parquet", [one], None, {})
     means = import_log(tmp_path / "log.parquet", settings)[0].forces
 
@@ -106,12 +107,12 @@ def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
     assert before / log.sigma**2 == pytest.approx(COUNT - 9 + 300, rel=0.3)
     assert abs(row["known_ratio"] - 1) < 4 * row["known_sigma"]
     sigma = np.sqrt(np.diag(np.linalg.inv(full.jac.T @ full.jac)) * after / (COUNT - 12))[9:]
-    assert (abs(full.x[9:] - one.parameters) < 4 * sigma).all()
+    assert (abs(full.x[9:] - one.parameters[0]) < 4 * sigma).all()
 
 
 @pytest.fixture(scope="module")
 def table(log):
-    return table_of([answered(OURS, log, case) for case in cases_of(OURS, log)], [])
+    return judge_logs(log_table(OURS, log, log_cells(OURS, log)), {})
 
 
 def test_plain_effects_in_white_noise_are_found(table):
@@ -183,18 +184,17 @@ def test_what_an_answer_says(expected, given):
 
 
 def test_what_a_log_has_by_itself_is_neither_right_nor_wrong(log):
-    row = answered(OURS, log, Case("log", ("quadratic_scale",), 300))
-    row |= {"verdict": "named", "found": '["quadratic_scale"]', "positions": "[null]"}
-    row["classes"] = '[["bias_drift"]]'
-    assert table_of([row], [])["said"].item() == "other name"
-    assert table_of([row], ["quadratic_scale", "scale_asymmetry"])["said"].item() == "nothing"
+    answer = {"verdict": "named", "found": '["quadratic_scale"]', "positions": "[null]"}
+    row = log_table(OURS, log, [(SQUARE, 0)]).assign(**answer, classes='[["bias_drift"]]')
+    assert judge_logs(row, {})["said"].item() == "other name"
+    own = {"log": ["quadratic_scale", "scale_asymmetry"]}
+    assert judge_logs(row, own)["said"].item() == "nothing"
 
 
 def test_a_function_learned_in_a_real_log_is_told_as_learned(log):
-    row = answered(OURS, log, Case("log", ("quadratic_scale",), 300))
-    row |= {"verdict": "learned", "found": '["learned"]', "positions": "[null]"}
-    row["fits"] = '[{"force": 9, "angle": 0, "noise": 5}, {"force": 5, "angle": 0, "noise": 5}]'
-    judged = table_of([row], [])
+    fits = '[{"force": 9, "angle": 0, "noise": 5}, {"force": 5, "angle": 0, "noise": 5}]'
+    answer = {"verdict": "learned", "found": '["learned"]', "positions": "[null]", "fits": fits}
+    judged = judge_logs(log_table(OURS, log, [(SQUARE, 0)]).assign(**answer), {})
     assert judged["said"].item() == "learned"
     # Its true noise is not known.
     assert judged["explained"].isna().all()
@@ -229,7 +229,7 @@ def test_two_cases_of_a_real_log(tmp_path):
     )  # fmt: skip
     output = tmp_path / "log.parquet"
     run_log(config, "mpu9150-2", output, {"config_hash": config.fingerprint, "seed": config.seed})
-    nothing, warm = read_table(output).to_dict("records")
+    nothing, warm = judge_logs(read_table(output), {}).to_dict("records")
     assert nothing["said"] == "nothing"
     assert warm["said"] == "right name"
     assert warm["p_known"] < 1e-6
@@ -242,8 +242,8 @@ def test_what_is_beside_a_large_effect_has_an_answer():
     name = "mpu9150-2"
     path, settings = public_file(name, DATA), import_settings(name)
     log = Donor.opened(name, path, settings, CONFIG.interval_s)
-    pair = ("thermal_bias", "cubic_scale")
-    row = answered(CONFIG, log, Case(name, pair, 400, recorded=True, number=4))
+    case = Case("two", name, "gravity", False, ("thermal_bias", "cubic_scale"), (400.0, 400.0))
+    (row,) = log_table(CONFIG, log, [(LogCell(case, recorded=True), 4)]).to_dict("records")
     assert row["error"] == ""
     assert "thermal_bias" in json.loads(row["found"])
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.hidden.physics.designs import GRAVITY, Session, session
-from studies.hidden.physics.effects import EFFECTS, Effect
-from studies.hidden.physics.measuring import Cause, Sensor, level_force, observe
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.kinds import Cause, Kind
+from studies.hidden.physics.measuring import Sensor, level_force, observe
 
 Array = NDArray[np.float64]
 
@@ -112,19 +113,26 @@ class Shape:
     basis : (m, d) array, orthonormal
     """
 
-    effect: Effect
+    effect: Kind
     settings: Mapping[str, float]
     directions: Array
     basis: Array
 
     @classmethod
     def of(
-        cls, effect: Effect, settings: Mapping[str, float], left: Array, size: float
+        cls, effect: Kind, settings: Mapping[str, float], left: Array, size: float
     ) -> Shape | None:
         """Shape of what each parameter leaves (k, m); None if that is too little of its size."""
         u, values, vt = np.linalg.svd(left.T, full_matrices=False)
         rank = int(np.sum(values > VISIBLE * size))
         return cls(effect, settings, vt[:rank].T, u[:, :rank]) if rank else None
+
+    def drawn(self, rng: np.random.Generator) -> Array:
+        """Parameters (k,) at random, without what cannot be seen and so has no size."""
+        parameters = rng.standard_normal(self.effect.k)
+        if self.effect.target == "clipping":  # which only takes away
+            parameters = abs(parameters)
+        return np.asarray(self.directions @ (self.directions.T @ parameters))
 
     @property
     def dim(self) -> int:
@@ -145,7 +153,7 @@ class Atlas:
     session: Session
     conditions: Conditions
 
-    def shape(self, effect: Effect, settings: Mapping[str, float]) -> Shape | None:
+    def shape(self, effect: Kind, settings: Mapping[str, float]) -> Shape | None:
         """Shape of an effect with any settings; None if it cannot be seen."""
         steps = effect.typical * np.eye(effect.k)
         cause = Cause(effect, dict(settings), np.concatenate([steps, -steps]))
@@ -167,7 +175,7 @@ class Atlas:
             self.shape(effect, settings)
             for effect in EFFECTS.values()
             if effect.shows(self.session)
-            for settings in effect.grid(self.session)
+            for settings in effect.settings.grid(self.session)
         )
         return tuple(shape for shape in candidates if shape is not None)
 

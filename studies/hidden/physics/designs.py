@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import permutations, product
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.units import MGON
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 GRAVITY = 9.80665
 """m/s², at the place of all sessions."""
+REFERENCE = 20.0
+"""°C, at which bias and scale have their stated values."""
 
 
 @dataclass(frozen=True)
@@ -133,11 +137,48 @@ class Session:
         """From the first hold to the last, as the clock has it."""
         return float(self.clock[-1] - self.clock[0])
 
+    @property
+    def part(self) -> Array:
+        """Time of the holds as a part of the length of the session."""
+        return self.clock / self.duration
+
+    @property
+    def shaking(self) -> Array:
+        """Vibration of the holds over its mean."""
+        vibration = _needed(self.vibration)
+        return vibration / vibration.mean()
+
+    @property
+    def rate(self) -> Array:
+        """Rate of the temperature of the holds, K per 10 min."""
+        return _needed(self.warming) * 600
+
+    @property
+    def part_of_range(self) -> Array:
+        """Temperature of the holds as a part of the range of the session, 0 to 1."""
+        values = _needed(self.course).values
+        return (_needed(self.temperature) - values.min()) / np.ptp(values)
+
+    @property
+    def since_start(self) -> Array:
+        """Temperature of the holds less that at the start, over the range of the session."""
+        values = _needed(self.course).values
+        return (_needed(self.temperature) - values[0]) / np.ptp(values)
+
+    def warmth(self, tau: float = 0.0) -> Array:
+        """Temperature above `REFERENCE` of a body with a lag of `tau` seconds, (n, 1), K."""
+        return _needed(self.course).lagged(_needed(self.time), tau)[:, None] - REFERENCE
+
     def later(self, seconds: float) -> Session:
         """The same holds some seconds later."""
-        if self.time is None:
-            raise ValueError(f"{self.name}: has no time")
-        return replace(self, time=self.time + seconds)
+        return replace(self, time=_needed(self.time) + seconds)
+
+
+def _needed(value: T | None) -> T:
+    """Return what a session has to have for a kind of physics."""
+    if value is None:
+        raise ValueError("the session does not have what a kind of physics needs")
+    return value
 
 
 ANGLE_SIGMA = 3.2 * MGON

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,16 +13,16 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
 from studies.hidden.physics.designs import GRAVITY, Session
-from studies.hidden.physics.effects import EFFECTS, Effect
+from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.gross import GROSS
-from studies.hidden.physics.measuring import NOISES, Cause, Noise, Sensor, observe
-from studies.hidden.physics.oracle import Oracle, oracle
+from studies.hidden.physics.kinds import Cause, Kind, Place
+from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
+from studies.hidden.physics.oracle import Oracle, Verdict, oracle
 from studies.hidden.physics.outside import OUTSIDE
-from studies.hidden.physics.places import Outside, Place
 from studies.hidden.physics.unforeseen import UNFORESEEN
 
 SETS = ("null", "noise", "one", "two", "removed", "outside", "unforeseen", "gross", "invisible")
-NOWHERE: Mapping[str, Outside] = {**OUTSIDE, **UNFORESEEN}
+NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
 """Effects that are not in the catalogue, by name."""
 
 
@@ -70,57 +70,37 @@ class HiddenEffect:
 
 @dataclass(frozen=True)
 class Truth:
-    """All that is true of a campaign.
+    """What is true of a campaign, beside its case.
 
     Attributes
     ----------
-    set, design, approach, sigma_known : as in the case
-    seed : tuple of int, entropy and spawn key
     effects : tuple of HiddenEffect
-    classes : tuple of tuple of str, for each effect the names that mean the same in this campaign
+    classes : for each effect the names that mean the same in this campaign
+    oracle : Verdict, what the oracle says; None where it is not asked
     noise : dict with kind, name (in the catalogue) and settings
     gross : dict with name (empty for none) and settings
     sensor : dict with the parameters of the sensor
-    oracle : dict with detected, best, told and alternatives
-    left : tuple of float, of an effect outside the catalogue: how much of its noncentrality the
-        best effect of the catalogue leaves, and the best two
-    place : tuple of str, coordinate and target of an effect outside the catalogue; None where it
-        has none, or where the campaign does not record its coordinate
+    left : of an effect outside the catalogue: how much of its noncentrality the best effect of the
+        catalogue leaves, and the best two
+    place : coordinate and target of an effect outside the catalogue; None where it has none, or
+        where the campaign does not record its coordinate
+    seed : entropy and spawn key
     """
 
-    set: str
-    design: str
-    approach: str
-    sigma_known: bool
-    seed: tuple[int, ...]
-    effects: tuple[HiddenEffect, ...]
-    classes: tuple[tuple[str, ...], ...]
-    noise: dict[str, Any]
-    gross: dict[str, Any]
-    sensor: dict[str, Any]
-    oracle: dict[str, Any]
+    effects: tuple[HiddenEffect, ...] = ()
+    classes: tuple[tuple[str, ...], ...] = ()
+    oracle: Verdict | None = None
+    noise: dict[str, Any] | None = None
+    gross: dict[str, Any] = field(default_factory=lambda: {"name": "", "settings": {}})
+    sensor: dict[str, list[float]] | None = None
     left: tuple[float, ...] = ()
     place: Place | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain values."""
-        return plain(asdict(self))
-
-
-def plain(value: Any) -> Any:
-    """Turn tuples into lists, all the way down."""
-    if isinstance(value, dict):
-        return {key: plain(part) for key, part in value.items()}
-    return [plain(part) for part in value] if isinstance(value, (list, tuple)) else value
+    seed: tuple[int, ...] = ()
 
 
 Array = NDArray[np.float64]
-
-
 ARRIVAL = 5e-4
 """rad, sd of the joints about the attitudes of the design."""
-
-
 Known = tuple[Cause, tuple[str, ...]]
 """An effect, and the names that mean the same."""
 
@@ -143,65 +123,45 @@ def generate(
     """
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
-    of_design = knowing.atlas
+    planned = knowing.atlas.session
     # No joint comes to rest exactly where it was sent.
-    arrived = of_design.session.joints + ARRIVAL * rng.standard_normal(
-        of_design.session.joints.shape
-    )
-    session = replace(of_design.session, joints=arrived)
+    arrived = planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape)
+    session = replace(planned, joints=arrived)
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
-    causes, hidden, classes = [], [], []
-    for name, lam in zip(case.effect, case.lam or [0.0] * len(case.effect), strict=True):
+    known: list[Known] = []
+    sizes = case.lam or (0.0,) * len(case.effect)
+    for name, lam in zip(case.effect, sizes, strict=True):
         of_lot = None if given is None else given.get(name)
-        cause, same = of_lot or drawn(name, lam, session, conditions, knowing, rng)
-        classes.append(same)
-        causes.append(cause)
-        parameters = tuple(cause.parameters[0].tolist())
-        hidden.append(HiddenEffect(name, cause.settings, parameters, lam))
+        known.append(of_lot or drawn(name, lam, session, conditions, knowing, rng))
+    causes = [cause for cause, _ in known]
     output, encoders = (part[0] for part in observe(session, sensor, causes))
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
     campaign = _campaign(case, session, forces, reading)
     campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
-    gross: dict[str, Any] = {"name": "", "settings": {}}
+    settings: dict[str, float] = {}
     if case.gross is not None:
-        campaign, gross["settings"] = GROSS[case.gross](campaign, session, conditions, rng)
-        gross["name"] = case.gross
-    verdict = knowing.judge(left_of(of_design, sensor, forces, reading), case.lam)
-    left: tuple[float, ...] = ()
-    place = None
-    if case.effect and (strange := NOWHERE.get(case.effect[0])):
-        left = knowing.left(left_of(of_design, sensor, output, encoders))
-        place = strange.place if strange.has_place(case.approach == "robot") else None
+        campaign, settings = GROSS[case.gross](campaign, session, conditions, rng)
+    strange = NOWHERE.get(case.effect[0]) if case.effect else None
     truth = Truth(
-        set=case.set,
-        design=case.design,
-        approach=case.approach,
-        sigma_known=case.sigma_known,
-        seed=_numbers(seed),
-        effects=tuple(hidden),
-        classes=tuple(classes),
+        effects=tuple(
+            HiddenEffect(name, cause.settings, tuple(cause.parameters[0].tolist()), lam)
+            for name, cause, lam in zip(case.effect, causes, sizes, strict=True)
+        ),
+        classes=tuple(same for _, same in known),
+        oracle=knowing.judge(left_of(knowing.atlas, sensor, forces, reading), case.lam),
         noise={
             "kind": noise.kind,
             "name": None if noise.kind is None else NOISES[noise.kind],
             "settings": noise.settings,
         },
-        gross=gross,
-        sensor={
-            "bias": sensor.bias.tolist(),
-            "scale": sensor.scale.tolist(),
-            "lean": sensor.lean.tolist(),
-        },
-        oracle={
-            "detected": verdict.detected,
-            "best": plain(verdict.best),
-            "told": plain(verdict.told),
-            "alternatives": verdict.alternatives,
-        },
-        left=left,
-        place=place,
+        gross={"name": case.gross or "", "settings": settings},
+        sensor={name: value.tolist() for name, value in vars(sensor).items()},
+        left=knowing.left(left_of(knowing.atlas, sensor, output, encoders)) if strange else (),
+        place=strange.place if strange and strange.has_place(conditions.robot) else None,
+        seed=_numbers(seed),
     )
     return campaign, truth
 
@@ -250,7 +210,7 @@ def _with_samples(
     # Least-squares slope of n equally spaced samples with independent errors.
     root = np.sqrt(12 / session.n_samples) / session.length
     slope = root * noise.samples_sd(session) * rng.standard_normal(sd.shape)
-    if any(cause.effect.in_time for cause in causes):
+    if any(cause.kind.in_time for cause in causes):
         half = session.length / 4
         ahead, back = (observe(session.later(by), sensor, causes)[0][0] for by in (half, -half))
         slope += (ahead - back) / (2 * half)
@@ -302,7 +262,7 @@ def drawn(
         return _of_usual_size(effect, session, rng), (name,)
     if effect.shows(of_design.session):
         for _ in range(DRAWS):
-            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
+            shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
             if shape is None:
                 continue
             cause, change = _scaled(shape, lam, session, conditions, rng)
@@ -315,20 +275,16 @@ def drawn(
     )
 
 
-def _of_usual_size(effect: Effect, session: Session, rng: np.random.Generator) -> Cause:
+def _of_usual_size(effect: Kind, session: Session, rng: np.random.Generator) -> Cause:
     parameters = effect.typical * rng.standard_normal((1, effect.k))
-    return Cause(effect, effect.draw(session, rng), parameters)
+    return Cause(effect, effect.settings.draw(session, rng), parameters)
 
 
 def _scaled(
     shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Cause, Array]:
     """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
-    parameters = rng.standard_normal(shape.effect.k)
-    if shape.effect.loses:
-        parameters = abs(parameters)
-    # Directions that cannot be seen have no size.
-    parameters = shape.directions @ (shape.directions.T @ parameters)
+    parameters = shape.drawn(rng)
     cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
     without = conditions.misclosures(*observe(session, conditions.sensor, ()))
     for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters

@@ -95,7 +95,7 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
     shown = [
         left_of(
             knowing.atlas,
-            Sensor(**{name: np.array(values) for name, values in truth.sensor.items()}),
+            Sensor(**{name: np.array(values) for name, values in (truth.sensor or {}).items()}),
             campaign.forces,
             np.zeros((len(campaign.forces), 2)) if campaign.angles is None else campaign.angles,
         )

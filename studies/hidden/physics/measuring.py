@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.hidden.physics.designs import GRAVITY, Session, in_turned_frame, rotated
-from studies.hidden.physics.effects import Effect, Rig
+from studies.hidden.physics.kinds import OUTPUTS, RIG, Cause
 
 Array = NDArray[np.float64]
 
@@ -70,35 +70,25 @@ class Sensor:
         return cls(0.2 * grade * bias, 0.015 * grade * scale, 0.01 * grade * lean)
 
 
-@dataclass(frozen=True)
-class Cause:
-    """An effect with its settings and a batch of its parameters (B, k)."""
-
-    effect: Effect
-    settings: dict[str, float]
-    parameters: Array
-
-
 def observe(session: Session, sensor: Sensor, causes: Sequence[Cause]) -> tuple[Array, Array]:
     """Mean outputs (B, n, 3), m/s², and encoder readings (B, n, 2), rad, without noise."""
-    rig = Rig()
+    rig = dict(RIG)
     for cause in causes:
-        if cause.effect.rig is not None:
-            cause.effect.rig(rig, cause.parameters[:, None, :], cause.settings, session)
+        if cause.kind.target in rig:
+            rig[cause.kind.target] = rig[cause.kind.target] + cause.change(None, session)
     batch = max((len(cause.parameters) for cause in causes), default=1)
     down = np.broadcast_to([0.0, 0.0, -1.0], (batch, 1, 3))
-    base = rotated((GRAVITY + rig.gravity) * down, rig.tilt)
-    force = flange_force(session.joints + rig.deflection, session.yaw, base, rig.skew)
-    along = rotated(force, rig.mounting) @ sensor.axes.T
+    base = rotated((GRAVITY + rig["gravity"]) * down, np.asarray(rig["tilt"]))
+    force = flange_force(session.joints + rig["deflection"], session.yaw, base, rig["skew"])
+    along = rotated(force, np.asarray(rig["mounting"])) @ sensor.axes.T
     output = (1 + sensor.scale) * along + sensor.bias
     # What clips, clips what all else has made of the force.
-    for cause in sorted(causes, key=lambda cause: cause.effect.of_output):
-        if cause.effect.sensor is not None:
-            force = output if cause.effect.of_output else along
-            output = output + cause.effect.sensor(
-                force, cause.parameters[:, None, :], cause.settings, session
-            )
-    return output, session.joints + rig.reading + np.zeros((len(output), 1, 1))
+    for target in OUTPUTS:
+        for cause in causes:
+            if cause.kind.target == target:
+                force = output if target == "clipping" else along
+                output = output + cause.change(force, session)
+    return output, session.joints + rig["reading"] + np.zeros((len(output), 1, 1))
 
 
 NOISES = {

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, logsumexp, softmax
 
 from studies.hidden.physics.atlas import Atlas, Shape, atlas
+from studies.hidden.physics.kinds import Kind
 from studies.hidden.physics.outside import OUTSIDE
-from studies.hidden.physics.places import Outside
 from studies.hidden.physics.unforeseen import UNFORESEEN
 
 Array = NDArray[np.float64]
@@ -235,7 +235,7 @@ def visible_unforeseen(design: str, approach: str) -> tuple[str, ...]:
     return _not_imitated(oracle(design, approach), UNFORESEEN)
 
 
-def _not_imitated(knowing: Oracle, effects: Mapping[str, Outside]) -> tuple[str, ...]:
+def _not_imitated(knowing: Oracle, effects: Mapping[str, Kind]) -> tuple[str, ...]:
     of_design, visible = knowing.atlas, []
     for name, effect in effects.items():
         if not effect.shows(of_design.session):
@@ -243,7 +243,7 @@ def _not_imitated(knowing: Oracle, effects: Mapping[str, Outside]) -> tuple[str,
         # No kind changes what another one draws.
         rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
         for _ in range(DRAWS):
-            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
+            shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
             if shape is not None:
                 direction = rng.standard_normal(shape.dim)
                 outside += knowing.is_outside(shape.basis @ direction)

@@ -1,309 +1,197 @@
-"""Physics that was never in the catalogue of effects, as independent forward physics."""
+"""Physics that was never in the catalogue of effects, as independent forward physics.
+
+Most kinds are a function of one *coordinate* of the holds, such as the yaw, that changes one
+*target*, such as the bias. That is their true place. The others are a function of no coordinate, of
+two at once, or change something else: they have no place.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.hidden.physics.designs import GRAVITY, Session
-from studies.hidden.physics.effects import Rig, Settings, column, steps_of, warmth
-from studies.hidden.physics.measuring import flange_force
-from studies.hidden.physics.places import (
-    TARGETS,
-    Array,
-    Outside,
-    any_cycle,
-    any_phase,
-    any_seed,
+from studies.hidden.physics.kinds import (
+    PHASE,
+    SEED,
+    TURN,
+    Kind,
+    Settings,
     before,
     between,
-    cycle,
-    of_bias,
-    of_force,
-    of_hold,
-    part_of_range,
-    parted,
-    since_start,
-    vibration,
-    warming,
+    cycles,
+    factor,
+    steps_of,
+    table,
 )
+from studies.hidden.physics.measuring import flange_force
 
-# The force of the same axis, of the other axes, of the hold before and of the next.
+Array = NDArray[np.float64]
+Drawn = Mapping[str, float]
+TIMED, SHAKEN, WARM = ("time",), ("vibration",), ("course",)
 
 RIPPLES = 2.5
 """Periods of a ripple in 1 g; fewer would look like two smooth effects of the catalogue."""
 
 
-def _ripple(f: Array, s: Settings) -> Array:
-    return np.sin(2 * np.pi * RIPPLES * f / GRAVITY + s["phase"])
-
-
-def _rectified_leak(f: Array, s: Settings) -> Array:
-    # The spring of the next axis touches its stop, whatever the sign.
-    return np.maximum(abs(np.roll(f, -1, axis=-1)) / GRAVITY - s["free"], 0)
-
-
-def _transverse_gain(f: Array, s: Settings) -> Array:
-    # The next axis, pulled far, stiffens this one.
-    return (np.roll(f, -1, axis=-1) / GRAVITY) ** 4
-
-
-def _charging(f: Array, s: Settings) -> Array:
-    # Charge that the last position has left in the dielectric, whatever its sign.
-    return (before(f) / GRAVITY) ** 2
-
-
-def _tired_spring(f: Array, s: Settings) -> Array:
-    return abs(before(f)) / GRAVITY
-
-
-def _early_departure(f: Array, s: Settings) -> Array:
-    # The robot leaves before the mean of the hold is over.
+def _early_departure(f: Array, s: Drawn, x: Session) -> Array:
     ahead = np.zeros(f.shape)
     ahead[:, :-1] = f[:, 1:] - f[:, :-1]
     return ahead / GRAVITY
 
 
-# The attitude of the robot and its way.
-
-
-def _roll_cycle(session: Session, s: Settings) -> Array:
-    return np.sin(s["order"] * session.joints[:, 0] + s["phase"])
-
-
-def _head_load(session: Session, s: Settings) -> Array:
-    # The head is heavier on one side of the roll axis.
-    return np.sin(session.joints[:, 0] + s["phase"])
-
-
-def _yaw_cycle(session: Session, s: Settings) -> Array:
-    return np.sin(s["order"] * session.yaw + s["phase"])
-
-
-def _wound(session: Session, s: Settings) -> Array:
-    # A cable that is wound up either way has more resistance.
-    return (session.yaw / np.pi) ** 2
-
-
-def _long_way(session: Session, s: Settings) -> Array:
-    return (session.way / np.pi) ** s["power"]
-
-
-def _slack(session: Session, s: Settings) -> Array:
-    # A belt gives way until it is taut.
-    return -np.expm1(-session.way / s["taut"]) - 0.5
-
-
-def _third_harmonic(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    roll = 3 * session.joints[:, 0]
+def _third_harmonic(p: Array, f: Array, s: Drawn, x: Session) -> Array:
+    roll = 3 * x.joints[:, 0]
     error = p[..., 0] * np.sin(roll) + p[..., 1] * np.cos(roll)
-    rig.reading = rig.reading + np.stack([error, np.zeros(error.shape)], axis=-1)
+    return np.stack([error, np.zeros(error.shape)], axis=-1)
 
 
-def _cable(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    # The cable pulls harder the more it is wound; the encoders were zeroed at the mean pull.
-    wound = column(session.yaw)
-    pull = np.concatenate([wound, abs(wound)], axis=1)
-    rig.deflection = rig.deflection + p * (pull - pull.mean(axis=0))
+def _cable(p: Array, f: Array, s: Drawn, x: Session) -> Array:
+    pull = np.stack([x.yaw, abs(x.yaw)], axis=1)
+    return p * (pull - pull.mean(axis=0))
 
 
-# What the holds are exposed to.
+def cycle(f: Array, s: Drawn, x: Session) -> Array:
+    """Return some cycles over the session, zero at its start, (n,)."""
+    return np.sin(TURN * x.part * s["cycles"] + s["phase"]) - np.sin(s["phase"])
 
 
-def _rattle(session: Session, s: Settings) -> Array:
-    return np.exp(-(((vibration(session) - s["at"]) / s["width"]) ** 2) / 2)
-
-
-def _shaking(session: Session, s: Settings) -> Array:
-    return vibration(session) - 1
-
-
-def _loose(session: Session, s: Settings) -> Array:
-    # Nothing moves up to a vibration, which shakes a coupling loose.
-    return np.maximum(vibration(session) - s["holds"], 0)
-
-
-def _activity_dip(session: Session, s: Settings) -> Array:
-    # A quartz resonator loses activity at one temperature, where another mode crosses.
-    return 1 / (1 + ((part_of_range(session) - s["at"]) / s["width"]) ** 2)
-
-
-def _gain_curve(session: Session, s: Settings) -> Array:
-    return (2 * (part_of_range(session) - s["turn"])) ** 2
-
-
-def _warmer(session: Session, s: Settings) -> Array:
-    return since_start(session)
-
-
-def _warmer_square(session: Session, s: Settings) -> Array:
-    return since_start(session) * abs(since_start(session))
-
-
-def _shock(session: Session, s: Settings) -> Array:
-    return abs(warming(session))
-
-
-def _rate(session: Session, s: Settings) -> Array:
-    return warming(session)
-
-
-def _uneven(session: Session, s: Settings) -> Array:
-    # One side of the pillar warms first.
-    return np.tanh(warming(session) / s["most"])
-
-
-# Time.
-
-
-def _swing(session: Session, s: Settings) -> Array:
-    return np.sin(2 * np.pi * session.clock / s["period"] + s["phase"])
-
-
-def _any_swing(session: Session, rng: np.random.Generator) -> dict[str, float]:
-    period = session.duration * rng.uniform(0.25, 0.6)
-    return {"period": period, "phase": rng.uniform(0, 2 * np.pi)}
-
-
-def _scale_drift(session: Session, s: Settings) -> Array:
-    return parted(session)
-
-
-def _sinking(session: Session, s: Settings) -> Array:
-    return np.log1p(parted(session) / s["knee"])
-
-
-# No place: several coordinates at once, none, or another target.
-
-
-def _triple_product(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * np.prod(f, axis=-1, keepdims=True) / GRAVITY**2
-
-
-def _warm_square(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    return p * warmth(session) * f * f / GRAVITY
-
-
-def _tightening_cable(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # Each hour the cable gets tighter, and pulls at the housing as it is wound.
-    return p * (parted(session) * session.yaw / np.pi)[:, None] + np.zeros(f.shape)
-
-
-def _sticking(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # The remains of the step before the last one.
-    return p * before(np.sign(steps_of(f)))
-
-
-def _creep(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # A glue that yields: each hold before has a part in what it remembers.
+def _creep(p: Array, f: Array, s: Drawn, x: Session) -> Array:
     memory = np.zeros(f.shape)
-    for i in range(1, session.n):
+    for i in range(1, x.n):
         memory[:, i] = s["kept"] * memory[:, i - 1] + (1 - s["kept"]) * f[:, i - 1]
     return p * memory / GRAVITY
 
 
-def _shaken_mounting(rig: Rig, p: Array, s: Settings, session: Session) -> None:
-    # The mounting was adjusted at the mean vibration.
-    square = column(session.vibration) ** 2
-    rig.mounting = rig.mounting + p * (square - square.mean())
-
-
-def _telegraph(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # A trap in the oxide is full or empty; it changes between two holds in one of four cases.
-    rng = np.random.default_rng(int(s["seed"]))
-    changes = rng.random(session.n) < 0.25
+def _telegraph(p: Array, f: Array, s: Drawn, x: Session) -> Array:
+    changes = np.random.default_rng(int(s["seed"])).random(x.n) < 0.25
     return p * (np.cumsum(changes) % 2)[:, None] + np.zeros(f.shape)
 
 
-def _chirp(session: Session, s: Settings) -> Array:
-    # Two clocks of which one warms up beat faster and faster.
-    part = parted(session)
-    return np.sin(2 * np.pi * (s["first"] * part + s["more"] * part**2) + s["phase"])
+def _chirp(p: Array, f: Array, s: Drawn, x: Session) -> Array:
+    turns = s["first"] * x.part + s["more"] * x.part**2
+    return p * np.sin(TURN * turns + s["phase"])[:, None] + np.zeros(f.shape)
 
 
-def _any_chirp(session: Session, rng: np.random.Generator) -> dict[str, float]:
-    holds = session.n
-    return {
-        "first": rng.uniform(0.02, 0.08) * holds,
-        "more": rng.uniform(0.1, 0.2) * holds,
-        "phase": rng.uniform(0, 2 * np.pi),
-    }
-
-
-def _room_magnet(f: Array, p: Array, s: Settings, session: Session) -> Array:
-    # A magnetic field that dips into the ground.
+def _room_magnet(p: Array, f: Array, s: Drawn, x: Session) -> Array:
     north = np.array([np.cos(s["dip"]), 0.0, np.sin(s["dip"])])
-    return p * flange_force(session.joints, session.yaw, north) + np.zeros(f.shape)
+    return p * flange_force(x.joints, x.yaw, north) + np.zeros(f.shape)
 
 
-_BIAS, _SCALE, _TILT, _READING = TARGETS
+def _roll_cycle(f: Array, s: Drawn, x: Session) -> Array:
+    return np.sin(s["order"] * x.joints[:, 0] + s["phase"])
 
-OUTSIDE: dict[str, Outside] = {
-    kind.name: kind
-    for kind in (
-        of_force("ripple", ("force", _BIAS), _ripple, any_phase),
-        of_force("rectified_leak", ("force", _BIAS), _rectified_leak, between(free=(0.3, 0.7))),
-        of_force("transverse_gain", ("force", _SCALE), _transverse_gain),
-        of_force("dielectric_charging", ("previous", _BIAS), _charging),
-        of_force("tired_spring", ("previous", _SCALE), _tired_spring),
-        of_force("early_departure", ("next", _BIAS), _early_departure),
-        of_hold("ring_magnet", ("angle", _BIAS), _roll_cycle, any_cycle(2.0, 3.0)),
-        of_hold("joint_current", ("angle", _SCALE), _roll_cycle, any_cycle(2.0, 3.0)),
-        of_hold("heavy_head", ("angle", _TILT), _head_load, any_phase),
-        Outside("encoder_third_harmonic", 2, 2e-4, rig=_third_harmonic, place=("angle", _READING)),
-        of_hold("slip_ring", ("yaw", _BIAS), _yaw_cycle, any_cycle(1.0, 2.0)),
-        of_hold("wound_supply", ("yaw", _SCALE), _wound),
-        of_hold("bearing_wobble", ("yaw", _TILT), _yaw_cycle, any_cycle(2.0, 3.0)),
-        Outside("cable_drag", 2, 2e-4, rig=_cable, place=("yaw", _READING)),
-        of_hold("motor_heat", ("move", _BIAS), _long_way, between(power=(1.0, 2.0))),
-        of_hold("sagging_base", ("move", _TILT), _long_way, between(power=(0.7, 1.5))),
-        of_hold("slack_belt", ("move", _READING), _slack, between(taut=(1.0, 3.0))),
-        of_hold(
-            "rattle", ("vibration", _BIAS), _rattle, between(at=(0.6, 1.4), width=(0.15, 0.35))
-        ),
-        of_hold("shaken_gain", ("vibration", _SCALE), _shaking),
-        of_hold("soft_feet", ("vibration", _TILT), _shaking),
-        of_hold("loose_coupling", ("vibration", _READING), _loose, between(holds=(0.3, 1.0))),
-        of_hold(
-            "activity_dip",
-            ("temperature", _BIAS),
-            _activity_dip,
-            between(at=(0.2, 0.8), width=(0.06, 0.15)),
-        ),
-        of_hold("gain_curve", ("temperature", _SCALE), _gain_curve, between(turn=(0.3, 0.7))),
-        of_hold("warm_pillar", ("temperature", _TILT), _warmer),
-        of_hold("warm_encoder", ("temperature", _READING), _warmer_square),
-        of_hold("thermal_shock", ("dT/dt", _BIAS), _shock),
-        of_hold("gradient_gain", ("dT/dt", _SCALE), _rate),
-        of_hold("uneven_pillar", ("dT/dt", _TILT), _uneven, between(most=(0.5, 3.0))),
-        of_hold("swing", ("time", _BIAS), _swing, _any_swing),
-        of_hold("scale_drift", ("time", _SCALE), _scale_drift),
-        of_hold("sinking_tripod", ("time", _TILT), _sinking, between(knee=(0.02, 0.3))),
-        # The cabinet of the electronics is cooled and warms up in turn; zeroed at the start.
-        of_hold(
-            "cabinet_cycle",
-            ("time", _READING),
-            cycle,
-            between(cycles=(1.2, 3.0), phase=(0.0, 6.3)),
-        ),
-        Outside("triple_product", 3, 1e-3, sensor=_triple_product),
-        Outside("warm_square", 3, 3e-5, sensor=_warm_square, needs=("course",), in_time=True),
-        Outside(
-            "tightening_cable", 3, 5e-3, sensor=_tightening_cable, needs=("time",), in_time=True
-        ),
-        Outside("sticking", 3, 2e-3, sensor=_sticking),
-        Outside("creep", 3, 5e-3, sensor=_creep, draw=between(kept=(0.5, 0.85))),
-        Outside("shaken_mounting", 3, 1e-3, rig=_shaken_mounting, needs=("vibration",)),
-        Outside("telegraph_noise", 3, 5e-3, sensor=_telegraph, draw=any_seed),
-        Outside(
-            "chirp",
-            3,
-            5e-3,
-            sensor=of_bias(_chirp),
-            needs=("time",),
-            in_time=True,
-            draw=_any_chirp,
-        ),
-        Outside("room_magnet", 3, 5e-3, sensor=_room_magnet, draw=between(dip=(0.8, 1.3))),
-    )
-}
-"""Name -> effect."""
+
+def _yaw_cycle(f: Array, s: Drawn, x: Session) -> Array:
+    return np.sin(s["order"] * x.yaw + s["phase"])
+
+
+def _long_way(f: Array, s: Drawn, x: Session) -> Array:
+    return (x.way / np.pi) ** s["power"]
+
+
+def _shaking(f: Array, s: Drawn, x: Session) -> Array:
+    return x.shaking - 1
+
+
+SWING = Settings(
+    lambda x, rng: {"period": x.duration * rng.uniform(0.25, 0.6), "phase": rng.uniform(0, TURN)}
+)
+CHIRP = Settings(
+    lambda x, rng: {
+        "first": rng.uniform(0.02, 0.08) * x.n,
+        "more": rng.uniform(0.1, 0.2) * x.n,
+        "phase": rng.uniform(0, TURN),
+    }
+)
+
+OUTSIDE = table(
+    # The force of the same axis, of the next axis, of the hold before and of the next hold.
+    factor("ripple", "force", "bias",
+           lambda f, s, x: np.sin(TURN * RIPPLES * f / GRAVITY + s["phase"]), PHASE),
+    # The spring of the next axis touches its stop, whatever the sign.
+    factor("rectified_leak", "force", "bias",
+           lambda f, s, x: np.maximum(abs(np.roll(f, -1, axis=-1)) / GRAVITY - s["free"], 0),
+           between(free=(0.3, 0.7))),
+    # The next axis, pulled far, stiffens this one.
+    factor("transverse_gain", "force", "scale",
+           lambda f, s, x: (np.roll(f, -1, axis=-1) / GRAVITY) ** 4),
+    # Charge that the last position has left in the dielectric, whatever its sign.
+    factor("dielectric_charging", "previous", "bias",
+           lambda f, s, x: (before(f) / GRAVITY) ** 2),
+    factor("tired_spring", "previous", "scale", lambda f, s, x: abs(before(f)) / GRAVITY),
+    # The robot leaves before the mean of the hold is over.
+    factor("early_departure", "next", "bias", _early_departure),
+    # The attitude of the robot and its way.
+    factor("ring_magnet", "angle", "bias", _roll_cycle, cycles(2.0, 3.0)),
+    factor("joint_current", "angle", "scale", _roll_cycle, cycles(2.0, 3.0)),
+    # The head is heavier on one side of the roll axis.
+    factor("heavy_head", "angle", "tilt",
+           lambda f, s, x: np.sin(x.joints[:, 0] + s["phase"]), PHASE),
+    Kind("encoder_third_harmonic", "reading", 2e-4, _third_harmonic, place=("angle", "reading")),
+    factor("slip_ring", "yaw", "bias", _yaw_cycle, cycles(1.0, 2.0)),
+    # A cable that is wound up either way has more resistance.
+    factor("wound_supply", "yaw", "scale", lambda f, s, x: (x.yaw / np.pi) ** 2),
+    factor("bearing_wobble", "yaw", "tilt", _yaw_cycle, cycles(2.0, 3.0)),
+    # The cable pulls harder the more it is wound; the encoders were zeroed at the mean pull.
+    Kind("cable_drag", "deflection", 2e-4, _cable, place=("yaw", "reading")),
+    factor("motor_heat", "move", "bias", _long_way, between(power=(1.0, 2.0))),
+    factor("sagging_base", "move", "tilt", _long_way, between(power=(0.7, 1.5))),
+    # A belt gives way until it is taut.
+    factor("slack_belt", "move", "reading",
+           lambda f, s, x: -np.expm1(-x.way / s["taut"]) - 0.5, between(taut=(1.0, 3.0))),
+    # What the holds are exposed to.
+    factor("rattle", "vibration", "bias",
+           lambda f, s, x: np.exp(-(((x.shaking - s["at"]) / s["width"]) ** 2) / 2),
+           between(at=(0.6, 1.4), width=(0.15, 0.35))),
+    factor("shaken_gain", "vibration", "scale", _shaking),
+    factor("soft_feet", "vibration", "tilt", _shaking),
+    # Nothing moves up to a vibration, which shakes a coupling loose.
+    factor("loose_coupling", "vibration", "reading",
+           lambda f, s, x: np.maximum(x.shaking - s["holds"], 0), between(holds=(0.3, 1.0))),
+    # A quartz resonator loses activity at one temperature, where another mode crosses.
+    factor("activity_dip", "temperature", "bias",
+           lambda f, s, x: 1 / (1 + ((x.part_of_range - s["at"]) / s["width"]) ** 2),
+           between(at=(0.2, 0.8), width=(0.06, 0.15))),
+    factor("gain_curve", "temperature", "scale",
+           lambda f, s, x: (2 * (x.part_of_range - s["turn"])) ** 2, between(turn=(0.3, 0.7))),
+    factor("warm_pillar", "temperature", "tilt", lambda f, s, x: x.since_start),
+    factor("warm_encoder", "temperature", "reading",
+           lambda f, s, x: x.since_start * abs(x.since_start)),
+    factor("thermal_shock", "dT/dt", "bias", lambda f, s, x: abs(x.rate)),
+    factor("gradient_gain", "dT/dt", "scale", lambda f, s, x: x.rate),
+    # One side of the pillar warms first.
+    factor("uneven_pillar", "dT/dt", "tilt",
+           lambda f, s, x: np.tanh(x.rate / s["most"]), between(most=(0.5, 3.0))),
+    factor("swing", "time", "bias",
+           lambda f, s, x: np.sin(TURN * x.clock / s["period"] + s["phase"]), SWING),
+    factor("scale_drift", "time", "scale", lambda f, s, x: x.part),
+    factor("sinking_tripod", "time", "tilt",
+           lambda f, s, x: np.log1p(x.part / s["knee"]), between(knee=(0.02, 0.3))),
+    # The cabinet of the electronics is cooled and warms up in turn; zeroed at the start.
+    factor("cabinet_cycle", "time", "reading", cycle,
+           between(cycles=(1.2, 3.0), phase=(0.0, 6.3))),
+    # No place: several coordinates at once, a memory, chance, or another target.
+    Kind("triple_product", "output", 1e-3,
+         lambda p, f, s, x: p * np.prod(f, axis=-1, keepdims=True) / GRAVITY**2),
+    Kind("warm_square", "output", 3e-5, lambda p, f, s, x: p * x.warmth() * f * f / GRAVITY, WARM),
+    # Each hour the cable gets tighter, and pulls at the housing as it is wound.
+    Kind("tightening_cable", "output", 5e-3,
+         lambda p, f, s, x: p * (x.part * x.yaw / np.pi)[:, None] + np.zeros(f.shape), TIMED),
+    # The remains of the step before the last one.
+    Kind("sticking", "output", 2e-3, lambda p, f, s, x: p * before(np.sign(steps_of(f)))),
+    # A glue that yields: each hold before has a part in what it remembers.
+    Kind("creep", "output", 5e-3, _creep, settings=between(kept=(0.5, 0.85))),
+    # The mounting was adjusted at the mean vibration.
+    Kind("shaken_mounting", "mounting", 1e-3,
+         lambda p, f, s, x: p * (x.vibration**2 - np.mean(x.vibration**2))[:, None], SHAKEN),
+    # A trap in the oxide is full or empty; it changes between two holds in one of four cases.
+    Kind("telegraph_noise", "output", 5e-3, _telegraph, settings=SEED),
+    # Two clocks of which one warms up beat faster and faster.
+    Kind("chirp", "output", 5e-3, _chirp, TIMED, CHIRP),
+    # A magnetic field that dips into the ground.
+    Kind("room_magnet", "output", 5e-3, _room_magnet, settings=between(dip=(0.8, 1.3))),
+)  # fmt: skip
+"""Name -> kind."""

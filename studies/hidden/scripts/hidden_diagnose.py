@@ -4,9 +4,5 @@ from studies.hidden.config import parse_hidden
 from studies.hidden.diagnosing import run_chunk
 
 with job(snakemake) as provenance:
-    run_chunk(
-        parse_hidden(snakemake.config),
-        planned(snakemake.input[0], int(snakemake.wildcards.chunk)),
-        dict(snakemake.output.items()),
-        provenance,
-    )
+    campaigns = planned(snakemake.input[0], int(snakemake.wildcards.chunk))
+    run_chunk(parse_hidden(snakemake.config), campaigns, snakemake.output, provenance)

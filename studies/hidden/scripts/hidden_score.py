@@ -1,12 +1,7 @@
-from accelstudy.jobs.job import job
+from accelstudy.jobs.job import job, lists
 from studies.hidden.config import parse_hidden
-from studies.hidden.page import write_score
+from studies.hidden.scoring.page import write_score
 
 with job(snakemake) as provenance:
-    page = write_score(
-        parse_hidden(snakemake.config),
-        dict(snakemake.input.items()),
-        dict(snakemake.output.items()),
-        provenance,
-    )
-    print(page, end="")
+    config, inputs = parse_hidden(snakemake.config), lists(snakemake.input)
+    print(write_score(config, inputs, snakemake.output, provenance), end="")

@@ -24,11 +24,10 @@ from accelstudy.drawing.style import (
     say_empty,
     spread,
 )
-from studies.hidden.judging import ALL
-from studies.hidden.limits import EDGES, power_over
 from studies.hidden.physics.generate import place_of
-from studies.hidden.scoring import VERDICTS
-from studies.hidden.targets import LARGE, MOST_NAMES, plain
+from studies.hidden.scoring.judging import LARGE
+from studies.hidden.scoring.limits import EDGES, power_over
+from studies.hidden.scoring.tables import NAMELESS, TARGETS, shares
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -43,133 +42,99 @@ OTHERS: Mapping[str, Style] = {
     "known sigma": {"color": "#009E73", "marker": "D"},
     "chi2 omnibus": {"color": "#8A8A2B", "marker": "s"},
 }
-SIZE = "noncentrality $\\lambda$"
+ORANGE, RED, GREEN = OTHERS["F test"], OTHERS["BIC forward"], OTHERS["known sigma"]
 
 
 def figures(tables: Tables) -> dict[str, Callable[[], Figure]]:
     """Figures by name, each as a function that draws it from the tables of a score."""
-    drawn = {
-        "alarms": alarms,
-        "naming": naming,
-        "methods": methods,
-        "sets": sets,
-        "calibration": calibration,
-        "confusion": confusion,
-        "outside": outside,
-        "places": places,
-        "limits": limits,
-    }
-    return {name: partial(draw, tables) for name, draw in drawn.items()}
+    drawn = (alarms, naming, methods, sets, calibration, confusion, outside, places, limits)
+    return {draw.__name__: partial(draw, tables) for draw in drawn}
 
 
 def alarms(tables: Tables) -> Figure:
     """False alarms where nothing is missing, and effects named where only the noise is wrong."""
     fig = _wide_labels(new_figure(FULL, 88))
     left, right = fig.subplots(1, 2)
-    table = tables["shares"]
-    null = table[(table["set"] == "null") & (table["quantity"] == "alarm")]
-    null = null[(null["design"] != ALL)]
+    null, noise = (_of_set(tables, name) for name in ("null", "noise"))
     null = null.assign(label=null["design"] + ", " + null["approach"])
-    for sigma, offset, style in (("given", -0.15, OURS), ("not given", 0.15, OTHERS["F test"])):
-        part = null[null["sigma"] == sigma].sort_values("label")
+    for sigma, offset, style in (("given", -0.15, OURS), ("not given", 0.15, ORANGE)):
+        part = shares(null[null["sigma"] == sigma], "alarm", "label")
         _dots(left, part, offset, label=f"sigma {sigma}", **style)
     _rows(left, null["label"])
     left.axvline(0.05, color=INK, linewidth=0.8, linestyle="--")
     left.set_title("nothing missing: false alarms")
-    noise = table[(table["set"] == "noise") & (table["what"] != ALL) & table["size"].isna()]
-    for quantity, offset, style in (
-        ("noise_model", -0.15, OTHERS["known sigma"]),
-        ("answered", 0.15, OTHERS["BIC forward"]),
-    ):
-        part = noise[noise["quantity"] == quantity].sort_values("what")
-        name = {"noise_model": "noise found", "answered": "effects named or narrowed"}[quantity]
-        _dots(right, part, offset, label=name, **style)
+    _dots(right, shares(noise, "noise_model", "what"), -0.15, label="noise found", **GREEN)
+    _dots(right, shares(noise, "answered", "what"), 0.15, label="effects named or narrowed", **RED)
     _rows(right, noise["what"])
     right.set_title("only the noise is wrong")
     for ax in (left, right):
         ax.set_xlabel("share of campaigns")
         ax.set_xlim(left=0)
-    _legend(fig, 4)
-    return fig
+    return _with_legend(fig, 4)
 
 
 def naming(tables: Tables) -> Figure:
     """Found and named rightly over λ, beside the oracle; one effect, and two."""
-    fig = new_figure(FULL, 72)
-    detected, one, two = axes = fig.subplots(1, 3, sharey=True)
-    table = tables["shares"]
-    _curve(detected, table, "one", "alarm", label="found, or right", **OURS)
-    _curve(detected, table, "one", "oracle found", label="oracle", **ORACLE)
-    detected.set_title("one effect: something found")
-    _curve(one, table, "one", "right", **OURS)
-    _curve(one, table, "one", "named", label="named, right or wrong", **OTHERS["known sigma"])
-    _curve(one, table, "one", "wrong", label="wrong", **OTHERS["BIC forward"])
-    _curve(one, table, "one", "oracle right", **ORACLE)
-    _curve(
-        one, table, "one", "oracle right if told", label="oracle, told that there is one", **TOLD
-    )
-    one.set_title("one effect: name right")
-    _curve(two, table, "two", "right", **OURS)
-    _curve(two, table, "two", "one of two", label="one of two right, none wrong",
-           **OTHERS["F test"])  # fmt: skip
-    _curve(two, table, "two", "wrong", **OTHERS["BIC forward"])
-    _curve(two, table, "two", "oracle right", **ORACLE)
-    two.set_title("two effects: both right")
-    for ax in axes:
+    titles = ("one effect: something found", "one effect: name right", "two effects: both right")
+    fig, (detected, first, both) = _panels(72, titles)
+    one, two = (_of_set(tables, name) for name in ("one", "two"))
+    _curve(detected, one, "alarm", label="found, or right", **OURS)
+    _curve(detected, one, "oracle_found", label="oracle", **ORACLE)
+    _curve(first, one, "right", **OURS)
+    _curve(first, one, "named", label="named, right or wrong", **GREEN)
+    _curve(first, one, "wrong", label="wrong", **RED)
+    _curve(first, one, "oracle_right", **ORACLE)
+    _curve(first, one, "told_right", label="oracle, told that there is one", **TOLD)
+    _curve(both, two, "right", **OURS)
+    _curve(both, two, "one_of_two", label="one of two right, none wrong", **ORANGE)
+    _curve(both, two, "wrong", **RED)
+    _curve(both, two, "oracle_right", **ORACLE)
+    for ax in (detected, first, both):
         _over_size(ax)
-    _shares(detected)
-    _legend(fig, 3)
-    return fig
+    return _with_legend(fig, 3)
 
 
 def methods(tables: Tables) -> Figure:
     """Simpler methods on the same campaigns: all names right, and any name wrong."""
-    fig = new_figure(FULL, 70)
-    axes = fig.subplots(1, 2, sharey=True)
+    titles = ("one effect: the first name is right", "one effect: some name is wrong")
+    fig, axes = _panels(70, titles)
     table = tables["baselines"]
     one = table[(table["set"] == "one") & table["size"].notna()]
-    styles = {"diagnosis": OURS, "oracle": ORACLE, **OTHERS}
     for ax, quantity in zip(axes, ("first right", "wrong"), strict=True):
-        for method, style in styles.items():
+        for method, style in {"diagnosis": OURS, "oracle": ORACLE, **OTHERS}.items():
             part = one[(one["method"] == method) & (one["quantity"] == quantity)]
-            if method != "chi2 omnibus":  # which names nothing
-                _line(ax, part.sort_values("size"), label=method, **style)
+            if len(part) and method != "chi2 omnibus":  # which names nothing
+                _bars(ax, "size", part.sort_values("size"), label=method, **style)
         _over_size(ax)
-    axes[0].set_title("one effect: the first name is right")
-    axes[1].set_title("one effect: some name is wrong")
-    _shares(axes[0])
-    _legend(fig, 6)
-    return fig
+    return _with_legend(fig, 6)
 
 
 def sets(tables: Tables) -> Figure:
     """How often a credible set holds the truth, and how many names it has."""
     fig = new_figure(FULL, 66)
     left, right = fig.subplots(1, 2)
-    two = OTHERS["BIC forward"]
-    _curve(left, tables["shares"], "one", "set holds the truth", label="one effect", **OURS)
-    _curve(left, tables["shares"], "two", "set holds the truth", label="two effects", **two)
-    left.axhline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--", label="stated")
-    left.set_ylim(0, 1.02)
-    left.set_ylabel("sets that hold the truth")
-    campaigns = tables["campaigns"]
-    for name, style in (("one", OURS), ("two", two)):
-        given = campaigns[(campaigns["set"] == name) & campaigns["set_given"].eq(True)]
+    for name, label, style in (("one", "one effect", OURS), ("two", "two effects", RED)):
+        part = _of_set(tables, name)
+        given = part[part["set_given"].eq(True)]
+        _curve(left, part, "set_holds", label=label, **style)
         mean = given.groupby("size")["set_names"].agg(["mean", "sem"]).reset_index()
         if len(mean):
             error = 1.96 * mean["sem"].fillna(0)
             right.errorbar(mean["size"], mean["mean"], error, elinewidth=0.8, **style)
-    one = campaigns[(campaigns["set"] == "one") & campaigns["set_given"].eq(True)]
-    ideal = one.groupby("size")["oracle_alternatives"].mean()
+        if name == "one":
+            ideal = given.groupby("size")["oracle_alternatives"].mean()
+    left.axhline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--", label="stated")
+    left.set_ylim(0, 1.02)
+    left.set_ylabel("sets that hold the truth")
     right.plot(ideal.index, ideal.astype(float), label="oracle, one effect", **ORACLE)
-    right.plot([*MOST_NAMES], [*MOST_NAMES.values()], "_", color=INK, markersize=12,
+    most = next(line["most"] for line in TARGETS if line.get("of") == "set_names")
+    right.plot([*most], [*most.values()], "_", color=INK, markersize=12,
                label="wanted at most of one effect")  # fmt: skip
     right.set_ylim(bottom=0)
     right.set_ylabel("names in a set, mean")
     for ax in (left, right):
         _over_size(ax)
-    _legend(fig, 4)
-    return fig
+    return _with_legend(fig, 4)
 
 
 def calibration(tables: Tables) -> Figure:
@@ -179,17 +144,13 @@ def calibration(tables: Tables) -> Figure:
     ax.plot([0, 1], [0, 1], color=INK, linewidth=0.8, linestyle="--")
     table = tables["calibration"]
     names = {"explanation": "most probable explanation", "set": "credible set"}
-    for (kind, label), style in zip(names.items(), (OURS, OTHERS["BIC forward"]), strict=True):
+    for (kind, label), style in zip(names.items(), (OURS, RED), strict=True):
         part = table[table["of"] == kind]
         if len(part):
-            _bars(ax, part["stated"], part, label=label, linestyle="", **style)
-    ax.set_xlabel("stated probability")
-    ax.set_ylabel("share that is true")
-    ax.set_xlim(0, 1.02)
-    ax.set_ylim(0, 1.02)
-    ax.set_aspect("equal")
-    _legend(fig, 2)
-    return fig
+            _bars(ax, "stated", part, label=label, linestyle="", **style)
+    ax.set(xlabel="stated probability", ylabel="share that is true", xlim=(0, 1.02),
+           ylim=(0, 1.02), aspect="equal")  # fmt: skip
+    return _with_legend(fig, 2)
 
 
 def confusion(tables: Tables) -> Figure:
@@ -203,10 +164,8 @@ def confusion(tables: Tables) -> Figure:
     wide = table.pivot_table(index="truth", columns="answer", values="share", fill_value=0.0)
     families = [*wide.index]
     others = [name for name in wide.columns if name not in families]
-    answers = sorted(others, key=lambda name: name in VERDICTS.values())
-    answers = [*families, *answers]
-    wide = wide.reindex(columns=answers, fill_value=0.0)
-    values = wide.to_numpy()
+    answers = [*families, *sorted(others, key=lambda name: name in NAMELESS.values())]
+    values = wide.reindex(columns=answers, fill_value=0.0).to_numpy()
     image = ax.imshow(values, cmap="cividis", vmin=0, vmax=1, aspect="auto")
     for (i, j), value in np.ndenumerate(values):
         if value >= 0.005:
@@ -223,25 +182,17 @@ def confusion(tables: Tables) -> Figure:
 
 def outside(tables: Tables) -> Figure:
     """What becomes of physics that the catalogue does not have."""
-    fig = new_figure(FULL, 66)
-    axes = fig.subplots(1, 3, sharey=True)
-    titles = {
-        "outside": "never in the catalogue",
-        "unforeseen": "unforeseen",
-        "removed": "its family is taken out",
-    }
-    for ax, (name, title) in zip(axes, titles.items(), strict=True):
-        table = tables["shares"]
-        _curve(ax, table, name, "alarm", label="something found", **OURS)
-        _curve(ax, table, name, "unknown", label="unknown", **OTHERS["F test"])
-        _curve(ax, table, name, "learned", label="learned", **OTHERS["known sigma"])
-        _curve(ax, table, name, "wrong", label="wrong name", **OTHERS["BIC forward"])
+    titles = ("never in the catalogue", "unforeseen", "its family is taken out")
+    fig, axes = _panels(66, titles)
+    for ax, name in zip(axes, ("outside", "unforeseen", "removed"), strict=True):
+        part = _of_set(tables, name)
+        _curve(ax, part, "alarm", label="something found", **OURS)
+        _curve(ax, part, "unknown", label="unknown", **ORANGE)
+        _curve(ax, part, "learned", label="learned", **GREEN)
+        _curve(ax, part, "wrong", label="wrong name", **RED)
         _over_size(ax, 0.45)
         ax.axvline(LARGE, color=INK, linewidth=0.6, linestyle=":")
-        ax.set_title(title)
-    _shares(axes[0])
-    _legend(fig, 4)
-    return fig
+    return _with_legend(fig, 4)
 
 
 FATES: Mapping[str, str] = {
@@ -257,34 +208,29 @@ FATES: Mapping[str, str] = {
 def places(tables: Tables) -> Figure:
     """What becomes of each kind of physics that the catalogue does not have."""
     fig = _wide_labels(new_figure(FULL, 150))
-    left, right = fig.subplots(1, 2)
-    campaigns = plain(tables["campaigns"])
-    for ax, name, title in ((left, "outside", "never in the catalogue"),
-                            (right, "unforeseen", "unforeseen")):  # fmt: skip
-        part = campaigns[campaigns["set"] == name]
+    titles = {"outside": "never in the catalogue", "unforeseen": "unforeseen"}
+    for ax, (name, title) in zip(fig.subplots(1, 2), titles.items(), strict=True):
+        part = _of_set(tables, name)
+        part = part[part["large"].eq(True)]
         if len(part):
             _fates(ax, part)
             ax.set_title(title)
             ax.set_xlabel("share of campaigns")
-    _legend(fig, 3)
-    return fig
+    return _with_legend(fig, 3)
 
 
 def _fates(ax: Axes, part: pd.DataFrame) -> None:
     """Draw a bar of each kind, those with a place first."""
-    fates = np.select(
-        [part["place_right"].eq(True), part["learned"].eq(True), part["verdict"].eq("unknown"),
-         part["wrong"].eq(True)],
-        ["place right", "learned, no or another place", "unknown", "wrong name"],
-        "noise, gross error or nothing",
-    )  # fmt: skip
+    right, learned, unknown, _, wrong = FATES
+    asked = {right: "place_right", learned: "learned", unknown: "unknown", wrong: "wrong"}
+    fates = np.select([part[name].eq(True) for name in asked.values()], [*asked], [*FATES][3])
     counted = pd.crosstab(part["what"], fates, normalize="index").reindex(columns=[*FATES])
     order = sorted(counted.index, key=lambda kind: (not place_of(kind), kind))
-    shares = counted.fillna(0).loc[order]
+    share = counted.fillna(0).loc[order]
     start = np.zeros(len(order))
     for fate, color in FATES.items():
-        ax.barh(range(len(order)), shares[fate], left=start, color=color, label=fate)
-        start += shares[fate].to_numpy()
+        ax.barh(range(len(order)), share[fate], left=start, color=color, label=fate)
+        start += share[fate].to_numpy()
     names = [f"{words(kind)} ({', '.join(place_of(kind) or ('–',))})" for kind in order]
     ax.set_yticks(range(len(order)), names, fontsize=6)
     ax.set_ylim(len(order) - 0.4, -0.6)
@@ -294,31 +240,35 @@ def _fates(ax: Axes, part: pd.DataFrame) -> None:
 
 def limits(tables: Tables) -> Figure:
     """Power over the size beside the minimal detectable and identifiable sizes."""
-    fig = new_figure(FULL, 66)
-    axes = fig.subplots(1, 2, sharey=True)
-    cases = (
-        ("by_mdb", "alarm", "MDB", "something found"),
-        ("by_mib", "right", "MIB", "name right"),
-    )
-    for ax, (column, answer, limit, title) in zip(axes, cases, strict=True):
-        for sigma, style in (("given", OURS), ("not given", OTHERS["BIC forward"])):
-            part = power_over(tables["campaigns"], tables["limits"], column, answer, sigma)
-            _bars(ax, part["beside"], part, label=f"sigma {sigma}", **style)
+    fig, axes = _panels(66, ("something found", "name right"))
+    campaigns = tables["campaigns"]
+    for ax, limit, answer in zip(axes, ("MDB", "MIB"), ("alarm", "right"), strict=True):
+        for sigma, style in (("given", OURS), ("not given", RED)):
+            part = campaigns[campaigns["sigma"] == sigma]
+            power = power_over(part, tables["limits"], f"by_{limit.lower()}", answer)
+            _bars(ax, "beside", power, label=f"sigma {sigma}", **style)
         ax.axvline(1, color=INK, linewidth=0.6, linestyle=":")
         ax.axhline(0.8, color=INK, linewidth=0.6, linestyle=":")
         ax.set_xscale("log")
         log_ticks(ax.xaxis, EDGES[0], EDGES[-1])
         ax.set_xlabel(f"size / {limit}")
+    return _with_legend(fig, 2)
+
+
+def _of_set(tables: Tables, name: str) -> pd.DataFrame:
+    """Campaigns of a set."""
+    return tables["campaigns"][tables["campaigns"]["set"] == name]
+
+
+def _panels(height_mm: float, titles: tuple[str, ...]) -> tuple[Figure, list[Axes]]:
+    """Return a figure of panels over which shares of campaigns are drawn."""
+    fig = new_figure(FULL, height_mm)
+    axes = [*fig.subplots(1, len(titles), sharey=True)]
+    for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title)
-    _shares(axes[0])
-    _legend(fig, 2)
-    return fig
-
-
-def _shares(ax: Axes) -> None:
-    """Make the vertical axis one of shares of campaigns."""
-    ax.set_ylabel("share of campaigns")
-    ax.set_ylim(0, 1.02)
+    axes[0].set_ylabel("share of campaigns")
+    axes[0].set_ylim(0, 1.02)
+    return fig, axes
 
 
 def _wide_labels(fig: Figure) -> Figure:
@@ -327,30 +277,28 @@ def _wide_labels(fig: Figure) -> Figure:
     return fig
 
 
-def _curve(ax: Axes, table: pd.DataFrame, set_: str, quantity: str, **style: object) -> None:
+def _curve(ax: Axes, campaigns: pd.DataFrame, question: str, **style: object) -> None:
     """Draw a share over the size, with its intervals."""
-    part = table[(table["set"] == set_) & (table["quantity"] == quantity) & table["size"].notna()]
-    for name in ("what", "design", "approach", "sigma"):
-        part = part[part[name] == ALL]
-    _line(ax, part.sort_values("size"), **style)
+    table = shares(campaigns, question, "size")
+    if len(table):
+        _bars(ax, "size", table, **style)
 
 
-def _line(ax: Axes, part: pd.DataFrame, **style: object) -> None:
-    if len(part):
-        _bars(ax, part["size"], part, **style)
+def _bars(ax: Axes, x: str, table: pd.DataFrame, **style: object) -> None:
+    y, error = _intervals(table)
+    ax.errorbar(table[x], y, None if style.get("marker") == "" else error, elinewidth=0.8, **style)  # type: ignore[arg-type]
 
 
-def _bars(ax: Axes, x: pd.Series, part: pd.DataFrame, **style: object) -> None:
-    y = part["share"].to_numpy(float)
-    error = np.abs(np.stack([y - part["ci95_low"], part["ci95_high"] - y]).astype(float))
-    ax.errorbar(x, y, None if style.get("marker") == "" else error, elinewidth=0.8, **style)  # type: ignore[arg-type]
+def _dots(ax: Axes, table: pd.DataFrame, offset: float, **style: object) -> None:
+    x, error = _intervals(table)
+    rows = np.arange(len(table)) + offset
+    ax.errorbar(x, rows, xerr=error, elinewidth=0.8, linestyle="", **style)  # type: ignore[arg-type]
 
 
-def _dots(ax: Axes, part: pd.DataFrame, offset: float, **style: object) -> None:
-    x = part["share"].to_numpy(float)
-    error = np.abs(np.stack([x - part["ci95_low"], part["ci95_high"] - x]).astype(float))
-    places = np.arange(len(part)) + offset
-    ax.errorbar(x, places, xerr=error, elinewidth=0.8, linestyle="", **style)  # type: ignore[arg-type]
+def _intervals(table: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Shares, and how far their intervals reach on either side."""
+    share, low, high = (table[name].to_numpy(float) for name in ("share", "ci95_low", "ci95_high"))
+    return share, np.abs(np.stack([share - low, high - share]))
 
 
 def _rows(ax: Axes, labels: pd.Series) -> None:
@@ -360,7 +308,7 @@ def _rows(ax: Axes, labels: pd.Series) -> None:
     ax.set_ylim(max(len(names), 1) - 0.5, -0.5)
 
 
-def _legend(fig: Figure, columns: int) -> None:
+def _with_legend(fig: Figure, columns: int) -> Figure:
     """Add one legend below all axes, and say in empty axes that there is nothing to show."""
     entries: dict[str, Artist] = {}
     for ax in fig.axes:
@@ -370,6 +318,7 @@ def _legend(fig: Figure, columns: int) -> None:
             say_empty(ax, "no such campaigns")
     if entries:
         fig.legend([*entries.values()], [*entries], loc="outside lower center", ncols=columns)
+    return fig
 
 
 def _over_size(ax: Axes, apart: float = 0.2) -> None:
@@ -380,4 +329,4 @@ def _over_size(ax: Axes, apart: float = 0.2) -> None:
     ax.set_xticks(sizes[spread(np.log(sizes), apart)])
     ax.xaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()
-    ax.set_xlabel(SIZE)
+    ax.set_xlabel("noncentrality $\\lambda$")

@@ -10,13 +10,26 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from studies.hidden.cells import limit_cells
+from studies.hidden.cells import Cell
 from studies.hidden.config import HiddenConfig
-from studies.hidden.judging import with_intervals
-from studies.hidden.physics import generate
+from studies.hidden.physics.generate import Case, generate
+from studies.hidden.scoring.tables import with_intervals
 
 ALPHA = 0.001
 """Level of the tests for which the minimal detectable and identifiable sizes are computed."""
+EDGES = (0.4, 0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0, 4.5, 7.0)
+"""Bounds of the classes of sizes relative to a limit."""
+
+
+def study_limits(config: HiddenConfig) -> pd.DataFrame:
+    """Limits of all effects in each design and approach, from a campaign without any effect."""
+    model, rows = get_model(config.model), []
+    for design, approach in dict.fromkeys(place[:2] for place in config.places):
+        cell = Cell(Case("null", design, approach, sigma_known=True))
+        campaign, _ = generate(cell.case, cell.seed(config.seed, 0))
+        place = {"design": design, "approach": approach}
+        rows += [{**place, **row} for row in limit_rows(campaign, model)]
+    return pd.DataFrame(rows)
 
 
 def limit_rows(campaign: Campaign, model: SensorModel) -> list[dict[str, object]]:
@@ -42,28 +55,18 @@ def limit_rows(campaign: Campaign, model: SensorModel) -> list[dict[str, object]
     ]
 
 
-def study_limits(config: HiddenConfig) -> pd.DataFrame:
-    """Limits of all effects in each design and approach, from a campaign without any effect."""
-    model, rows = get_model(config.model), []
-    for cell in limit_cells(config):
-        campaign, _ = generate(cell.case, cell.seed(config.seed, 0))
-        place = {"design": cell.case.design, "approach": cell.case.approach}
-        rows += [{**place, **row} for row in limit_rows(campaign, model)]
-    return pd.DataFrame(rows)
-
-
 def with_limits(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
-    """Campaigns with one effect, with their sizes as multiples of the MDB and of the MIB.
+    """Campaigns with one effect for which there are limits.
 
     Parameters
     ----------
-    judged : DataFrame, of `studies.hidden.judging.judge`
+    judged : DataFrame, of `studies.hidden.scoring.judging.judge`
     limits : DataFrame, of `study_limits`
 
     Returns
     -------
     DataFrame
-        Those campaigns for which there are limits, with the columns by_mdb and by_mib.
+        With by_mdb and by_mib, their sizes as multiples of the MDB and of the MIB.
     """
     one = judged[judged["set"] == "one"]
     table = one.merge(limits, on=["what", "design", "approach"], how="inner")
@@ -86,41 +89,30 @@ def limit_table(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
         in which something is found, or the name is right; both should be 0.8 at least.
     """
     table = with_limits(judged, limits)
-    rows = []
-    keys = ["what", "design", "approach", "sigma"]
-    for key, part in table.groupby(keys):
-        first = part.iloc[0]
-        seen, told = part[part["by_mdb"] >= 1], part[part["by_mib"] >= 1]
-        rows.append(
-            {
-                **dict(zip(keys, key, strict=True)),
-                **{name: first[name] for name in ("mdb", "mib", "unit", "nearest")},
-                **{name: first[name] for name in ("lambda_mdb", "lambda_mib")},
-                "above_mdb": len(seen),
-                "detected": seen["alarm"].astype(bool).mean() if len(seen) else np.nan,
-                "above_mib": len(told),
-                "right": told["right"].astype(bool).mean() if len(told) else np.nan,
-            }
+    of_limits = ["mdb", "mib", "unit", "nearest", "lambda_mdb", "lambda_mib"]
+    groups = table.groupby(["what", "design", "approach", "sigma"])
+    made = groups[of_limits].first()
+    for limit, answer, name in (("mdb", "alarm", "detected"), ("mib", "right", "right")):
+        above = table[f"by_{limit}"] >= 1
+        yes = table[answer].astype(float).where(above)
+        groups = pd.DataFrame({"above": above, "yes": yes}).groupby(
+            [table[key] for key in made.index.names]
         )
-    return pd.DataFrame(rows)
-
-
-EDGES = (0.4, 0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0, 4.5, 7.0)
-"""Bounds of the classes of sizes relative to a limit."""
+        made[f"above_{limit}"], made[name] = groups["above"].sum(), groups["yes"].mean()
+    return made.reset_index()
 
 
 def power_over(
-    judged: pd.DataFrame, limits: pd.DataFrame, column: str, answer: str, sigma: str
+    judged: pd.DataFrame, limits: pd.DataFrame, column: str, answer: str
 ) -> pd.DataFrame:
     """Share of campaigns with an answer, over their size beside a limit.
 
     Parameters
     ----------
-    judged : DataFrame, of `studies.hidden.judging.judge`
+    judged : DataFrame, of `studies.hidden.scoring.judging.judge`
     limits : DataFrame, of `limit_table`
     column : str, "by_mdb" or "by_mib"
     answer : str, a column of `judged`
-    sigma : str, "given" or "not given"
 
     Returns
     -------
@@ -128,7 +120,7 @@ def power_over(
         beside (geometric mean), count, n, share, ci95_low, ci95_high
     """
     of_places = limits[["what", "design", "approach", "lambda_mdb", "lambda_mib"]].drop_duplicates()
-    table = with_limits(judged[judged["sigma"] == sigma], of_places)
+    table = with_limits(judged, of_places)
     place = pd.cut(table[column], EDGES, labels=False)
     groups = table.assign(yes=table[answer].astype(bool), log=np.log(table[column])).groupby(place)
     made = groups.agg(log=("log", "mean"), count=("yes", "sum"), n=("yes", "size"))
