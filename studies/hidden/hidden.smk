@@ -17,17 +17,16 @@ STUDY, RESULTS = configured(parse_hidden, "study")
 config.update(STUDY.model_dump(mode="json"))
 
 
-def used(*without):
-    """What a job uses of the configuration."""
-    return STUDY.model_dump(mode="json", exclude={"study", *without})
-
-
-def stage(name):
-    """Hash of the code that a script runs."""
-    return code_hash(workflow.source_path(f"scripts/{name}.py"), "studies")
-
-
-DIAGNOSED, COMPARED = used("baselines_every"), used("diagnosis_seed")
+# What the jobs use of it.
+PLANNED = STUDY.model_dump(
+    mode="json", exclude={"study", "model", "seed", "diagnosis_seed", "baselines_every"}
+)
+DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "baselines_every"})
+COMPARED = STUDY.model_dump(mode="json", exclude={"study", "diagnosis_seed"})
+CODE = {
+    stage: code_hash(workflow.source_path(f"scripts/hidden_{stage}.py"), "studies")
+    for stage in ("plan", "diagnose", "baselines", "score")
+}
 NUMBERS = [f"{i:04d}" for i in range(number_of_chunks(STUDY))]
 CHUNKS = {part: expand(f"{RESULTS}/{part}/{{chunk}}.parquet", chunk=NUMBERS) for part in PARTS}
 # Digest of what each table of a chunk depends on. It tells those of another configuration.
@@ -65,8 +64,8 @@ rule hidden_plan:
     resources:
         mem_mb=megabytes(4000),
     params:
-        cells=used("model", "seed", "diagnosis_seed", "baselines_every"),
-        code=stage("hidden_plan"),
+        cells=PLANNED,
+        code=CODE["plan"],
     message:
         "Choose the campaigns to simulate"
     script:
@@ -86,7 +85,7 @@ rule hidden_diagnose:
         mem_mb=megabytes(2000),
     params:
         spec=DIAGNOSED,
-        code=stage("hidden_diagnose"),
+        code=CODE["diagnose"],
     message:
         "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
     script:
@@ -106,7 +105,7 @@ rule hidden_baselines:
         mem_mb=megabytes(2000),
     params:
         spec=COMPARED,
-        code=stage("hidden_baselines"),
+        code=CODE["baselines"],
     message:
         "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
     script:
@@ -129,7 +128,7 @@ rule hidden_score:
     params:
         # What the tables of the chunks do not have: sessions in which nothing is hidden.
         limits=STUDY.model_dump(mode="json", include={"model", "seed", "designs", "approaches"}),
-        code=stage("hidden_score"),
+        code=CODE["score"],
     message:
         "Score the diagnoses of all campaigns"
     script:

@@ -189,6 +189,17 @@ def learned(s):
     return [s.percent(figure, "place right") for figure in figures]
 
 
+def wrongly(s):
+    """How often what is not in the catalogue gets a wrong name, percent."""
+    return [s.percent(OUTSIDE, cases) for cases in (NEVER, "unforeseen", "family taken out")]
+
+
+def confirmed_wrongly(s):
+    """How many of the wrong names are confirmed, percent."""
+    row = "confirmed, of those wrong"
+    return [s.percent(row, cases) for cases in ("unforeseen", "family taken out")]
+
+
 def places(s):
     """How often the place of physics outside the catalogue is right, and wrong, percent."""
     return [s.percent(f"place {what}", NEVER) for what in ("right", "wrong")]
@@ -281,13 +292,9 @@ QUOTES = {
         r"both named in (\d+) %; an oracle manages (\d+) %": lambda s: [
             s.percent(BOTH, "λ = 25"), 100 * s.oracle(BOTH, "λ = 25")
         ],
-        r"gets a wrong name in ([\d.]+) %, and in ([\d.]+) % where a whole family": lambda s: [
-            s.percent(OUTSIDE, NEVER), s.percent(OUTSIDE, "family taken out")
-        ],
+        r"gets a wrong name in ([\d.]+) %, in ([\d.]+) % of physics[^.]*, and in ([\d.]+) %": wrongly,
+        r"names of these two, (\d+) % and (\d+) % are even confirmed": confirmed_wrongly,
         r"the place is found in (\d+) %, and a wrong one in ([\d.]+) %": places,
-        r"(\d+) % of these are even confirmed": lambda s: [
-            s.percent("confirmed, of those wrong", "family taken out")
-        ],
         r"(\d+) of (\d+) were confirmed \((\d+) to (\d+) %": lambda s: [
             *confirmed(s), *s.interval(CONFIRMED, "nothing missing")
         ],
@@ -305,11 +312,9 @@ QUOTES = {
             s.measured(SETS_HOLD, "λ = 6"), *(x / 100 for x in larger(s, "set holds the truth"))
         ],
         r"(\d+) % of those given": lambda s: [100 - s.percent(WRONG, ONE_TWO)],
-        r"catalogue ([\d.]+) % got a wrong name": lambda s: [s.percent(OUTSIDE, NEVER)],
-        r"taken out of it, ([\d.]+) %, and (\d+) %": lambda s: [
-            s.percent(OUTSIDE, "family taken out"),
-            s.percent("confirmed, of those wrong", "family taken out"),
-        ],
+        r"catalogue ([\d.]+) % got a wrong[^.]*, ([\d.]+) %; where[^.]*, ([\d.]+) %":
+            wrongly,
+        r"names of these two, (\d+) % and (\d+) % were confirmed": confirmed_wrongly,
         r"wrong in ([\d.]+) %, from 0.8 on in ([\d.]+) %, from 0.85 on in ([\d.]+) %": lambda s: [
             s.percent(WRONG, ONE_TWO), *surer(s)
         ],
