@@ -292,7 +292,7 @@ QUOTES = {
         r"both named in (\d+) %; an oracle manages (\d+) %": lambda s: [
             s.percent(BOTH, "λ = 25"), 100 * s.oracle(BOTH, "λ = 25")
         ],
-        r"gets a wrong name in ([\d.]+) %, in ([\d.]+) % of physics[^.]*, and in ([\d.]+) %": wrongly,
+        r"a wrong name in ([\d.]+) %, in ([\d.]+) % of physics[^.]*, and in ([\d.]+) %": wrongly,
         r"names of these two, (\d+) % and (\d+) % are even confirmed": confirmed_wrongly,
         r"the place is found in (\d+) %, and a wrong one in ([\d.]+) %": places,
         r"(\d+) of (\d+) were confirmed \((\d+) to (\d+) %": lambda s: [
