@@ -12,7 +12,9 @@ from accelstudy.commands.options import PATH, angle_unit_option, example, force_
 
 @click.command(
     "apply",
-    epilog=example("accelstudy apply calibrated/calibration.json log.csv --out leveled.csv"),
+    epilog=example(
+        "accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv"
+    ),
 )
 @click.argument("calibration", type=PATH)
 @click.argument("log", type=PATH)

@@ -56,8 +56,9 @@ _SECTIONS = {
     cls=Sectioned,
     sections=_SECTIONS,
     epilog=example(
-        "accelstudy import log.csv --out my-campaign --rate 100 --columns fx=0,fy=1,fz=2",
-        "accelstudy import log.csv --out beside --rate 100 --columns fx=0,fy=1,fz=2 "
+        "accelstudy import calibration.csv --out my-campaign",
+        "accelstudy import log.csv --out by-number --rate 100 --columns fx=0,fy=1,fz=2",
+        "accelstudy import calibration.csv --out beside "
         "--reference-log ref.csv --reference calibrated/calibration.json",
     ),
 )

@@ -48,8 +48,8 @@ def site(tmp_path_factory):
     return folder
 
 
-def log_csv(path, seed=1):
-    """A log as a logger writes it: three columns without a header; 24 holds, a turn before each."""
+def log_csv(path, seed=1, named=False):
+    """A log as a logger writes it, of 24 holds, a turn before each; or with names and times."""
     rng = np.random.default_rng(seed)
     rows = []
     forces = -9.81 * get_scheme("fibonacci-24").directions
@@ -57,7 +57,10 @@ def log_csv(path, seed=1):
         rows += [np.linspace(before, after, 100), np.tile(after, (400, 1))]
     readings = np.concatenate(rows) * [1.002, 0.999, 1.001] + [0.05, 0.01, 0.03]
     readings += 0.005 * rng.standard_normal(readings.shape)
-    np.savetxt(path, readings, "%.5f", delimiter=",")
+    if named:
+        readings = np.column_stack([np.arange(len(readings)) / 100, readings])
+    header = "t,ax,ay,az" if named else ""
+    np.savetxt(path, readings, "%.5f", delimiter=",", header=header, comments="")
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +86,8 @@ def steps(site, walked):
     """
     folder = walked
     log_csv(folder / "log.csv")
-    log_csv(folder / "ref.csv", seed=2)
+    log_csv(folder / "calibration.csv", named=True)
+    log_csv(folder / "ref.csv", seed=2, named=True)
     for seed, season in enumerate(("spring", "autumn", "winter")):
         write_document(folder / season / "calibration.json", seed)
     for seed in (1, 2, 3):
@@ -142,6 +146,28 @@ def test_the_pages_have_what_a_reader_needs(steps):
         assert any(s["command"].startswith(f"accelstudy {command} ") for s in run), command
     (python,) = (s for s in run if s["source"] == "first_steps.py")
     assert len(re.findall(r"\d", python["output"])) > 50  # three arrays of numbers
+    (python,) = (s for s in run if s["command"].startswith("import accelstudy as acs"))
+    verdict, *parameters = python["output"].splitlines()
+    assert verdict in ("accepted", "rejected")
+    assert any(line.startswith("b_x ") for line in parameters)
+
+
+def test_the_first_example_of_a_log_needs_no_columns(steps):
+    """Those by number come second; both are the same log, so nothing else differs."""
+    first, second, *_ = (s for s in steps if s["command"].startswith("accelstudy import "))
+    assert first["command"] == "accelstudy import calibration.csv --out my-campaign"
+    assert "--columns fx=0" in second["command"]
+    holds = [re.search(r"^holds: .*", s["output"], re.M)[0] for s in (first, second)]
+    assert holds[0] == holds[1]
+    assert holds[0].startswith("holds: 24, ")
+
+
+def test_each_page_that_the_readme_names_can_be_clicked():
+    text = re.sub(r"```.*?```", "", README.read_text(encoding="utf-8"), flags=re.DOTALL)
+    links = re.findall(r"\]\(([^)#]+)[^)]*\)", text)
+    assert len(links) > 15
+    assert [link for link in links if not (ROOT / link).exists()] == []
+    assert re.findall(r"`[^`]*\.md`", text) == []
 
 
 def test_each_help_has_an_example(steps):

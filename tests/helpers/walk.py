@@ -32,7 +32,7 @@ WRITTEN = re.compile(r"^(?:campaign|figure|report): (\S+)", re.MULTILINE)
 
 
 def page_commands(page):
-    """Commands in the indented blocks of a page; a page of Python is one command."""
+    """Commands in the indented blocks of a page; a page or a block of Python is one command."""
     text = page.read_text("utf-8")
     if page.suffix == ".py":
         yield text
@@ -40,6 +40,7 @@ def page_commands(page):
     plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     for block in re.findall(r"(?:^ {4}.*\n)+", plain, re.MULTILINE):
         yield from joined(block)
+    yield from re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
 def help_commands():
