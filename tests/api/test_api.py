@@ -4,7 +4,7 @@ import ast
 import subprocess
 import sys
 from copy import copy
-from datetime import datetime
+from datetime import UTC, datetime
 
 import matplotlib
 import numpy as np
@@ -90,7 +90,7 @@ def test_calibrations_are_compared_and_followed_as_they_are_returned(guide):
     assert as_returned.model.name == "bias-scale"
     np.testing.assert_array_equal(as_returned.values, as_read.values)
     assert as_returned.test == as_read.test
-    dates = [datetime.fromisoformat(f"2025-{month}-01") for month in ("01", "04", "07")]
+    dates = [datetime(2025, month, 1, tzinfo=UTC) for month in (1, 4, 7)]
     assert len(history_of([one, other, read], dates).calibrations) == 3
     with pytest.raises(acs.InputError, match="calibration: expected what `calibrate` returns"):
         compare(one, 3)

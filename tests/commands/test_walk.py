@@ -160,6 +160,8 @@ def test_the_first_example_of_a_log_needs_no_columns(steps):
     holds = [re.search(r"^holds: .*", s["output"], re.M)[0] for s in (first, second)]
     assert holds[0] == holds[1]
     assert holds[0].startswith("holds: 24, ")
+    recognised = re.search(r"^columns: .*", first["output"], re.M)[0]
+    assert f"\n{recognised}\n" in README.read_text(encoding="utf-8")
 
 
 def test_each_page_that_the_readme_names_can_be_clicked():
