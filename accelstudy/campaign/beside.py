@@ -141,7 +141,7 @@ class Beside:
             seconds = growing[n].n * self.log.step
             if seconds < COVERED * (hold.t1 - hold.t0) or growing[n].n < FEWEST:
                 lost[n] = "the reference log does not cover it"
-            elif growing[n].saturated():
+            elif growing[n].saturated(np.zeros(3), np.ones(3)):
                 lost[n] = "the reference is saturated"
             else:
                 segments[n] = growing[n].finish()

@@ -289,6 +289,7 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
         reference=header.reference,
         nominal=None if header.nominal is None else header.conversion("forces"),
         full_range=header.range_mps2,
+        resolution=None if header.resolution_mps2 is None else np.array(header.resolution_mps2),
         log=header.log,
         **values,
     )
@@ -340,6 +341,8 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
     if campaign.full_range is not None:
         content["range_mps2"] = campaign.full_range
+    if campaign.resolution is not None:
+        content["resolution_mps2"] = np.asarray(campaign.resolution).tolist()
     if campaign.reasons:
         content["excluded"] = campaign.exclusions
     if campaign.log is not None:

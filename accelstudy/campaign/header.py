@@ -28,6 +28,7 @@ from accelstudy.files.validation import (
     Block,
     Finite,
     Gravity,
+    NotNegative,
     Number,
     OneOrMore,
     Positive,
@@ -207,6 +208,9 @@ class Header(Block):
     sensor_noise: _SensorNoise | None = None
     range_mps2: Annotated[Positive, Field(le=MOST)] | None = Field(
         None, description="the sensor measures ± this; where it can saturate"
+    )
+    resolution_mps2: Annotated[list[Annotated[NotNegative, Field(le=MOST)]], PerAxis] | None = (
+        Field(None, description="steps in which x, y and z are read; where rounding counts")
     )
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None

@@ -48,6 +48,8 @@ class Campaign:
     time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
     nominal : Conversion, of the three axes; with unit "counts" only
     full_range : float, m/s², optional, the sensor measures ± this
+    resolution : (3,) array, m/s², optional, steps in which the axes are read, 0 for none; where
+        rounding to them counts
     log : LogLayout, optional, layout of the log from which the campaign was made
     excluded : Campaign, optional, the holds that were left out, with the same columns
     reasons : mapping of int to str, why, by position
@@ -77,6 +79,7 @@ class Campaign:
     yaw: Array | None = None
     nominal: Conversion | None = None
     full_range: float | None = None
+    resolution: Array | None = None
     log: LogLayout | None = None
     excluded: Campaign | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)

@@ -10,7 +10,16 @@ import click
 from accelstudy.basics.progress import say, stage
 from accelstudy.commands.options import PATH, example, force_option, log_options, quiet_option
 
-UNUSED = ("offset", "full_range", "gravity", "threshold", "robot_sigma", "robot_unit")
+UNUSED = (
+    "offset",
+    "full_range",
+    "gravity",
+    "threshold",
+    "window",
+    "shortest",
+    "robot_sigma",
+    "robot_unit",
+)
 """Options of an import that a data sheet does without; a file of settings may have them."""
 
 

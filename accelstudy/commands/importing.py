@@ -38,7 +38,7 @@ _RANGE = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 _SECTIONS = {
     "The log": ("columns", "sensor", "time", "time_unit", "rate", "delimiter", "variable"),
     "Its numbers": ("unit", "scale", "offset", "full_range", "frame"),
-    "The holds": ("threshold", "exclude", "join", "figure"),
+    "The holds": ("threshold", "window", "shortest", "exclude", "join", "figure"),
     "A log of blocks instead": ("block",),
     "A table of means instead": ("means", "robot_sigma", "robot_unit"),
     "A calibrated sensor beside it": (
@@ -69,6 +69,12 @@ _SECTIONS = {
 @click.option("--range", "full_range", help="Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.")
 @click.option("--frame", help="Where x, y, z point: frd, flu, rfu …  [default: frd; of ROS flu]")
 @click.option("--threshold", type=float, help="Largest sd at rest, m/s².  [default: from the log]")
+@click.option(
+    "--window",
+    type=float,
+    help="Seconds over which rest is judged.  [default: 1; of a slow log 9 samples]",
+)
+@click.option("--shortest", type=float, help="Shortest hold, s, without its ends.  [default: 1]")
 @click.option(
     "--exclude", multiple=True, help="What to leave out, and why: 13:moved, 120s-135s:moved."
 )
@@ -192,6 +198,8 @@ def settings_of(
     rate: float | None,
     gravity: float | None,
     threshold: float | None,
+    window: float | None,
+    shortest: float | None,
     robot_sigma: float | None,
     robot_unit: str | None,
     exclude: Sequence[str],
@@ -216,6 +224,8 @@ def settings_of(
         "offset": None if offset is None else _numbers("--offset", offset),
         "rate_hz": rate,
         "threshold_mps2": threshold,
+        "window_s": window,
+        "shortest_s": shortest,
         "gravity": None if gravity is None else {"value_mps2": gravity},
         "robot": {k: v for k, v in robot.items() if v is not None} or None,
         "exclude": list(exclude) or None,

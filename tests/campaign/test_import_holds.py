@@ -174,7 +174,7 @@ def test_override_and_limits(tmp_path):
     np.testing.assert_array_equal(longer.of_each("start"), chosen.of_each("start") + 30)
     np.testing.assert_array_equal(longer.of_each("end"), chosen.of_each("end") - 30)
     for options, message in [
-        ({"shortest": 5.0}, r"no static hold of 5 s or more \(8 shorter ones"),
+        ({"shortest": 5.0}, "no static hold of 5 s or more .* 8 rests of 4.0 s are no hold: "),
         ({"threshold": 1e-6}, "no static hold"),
         ({"threshold": 0.0}, "threshold: must be positive"),
         ({"window": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),

@@ -11,6 +11,7 @@ from accelstudy.basics.levels import BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.importing.resolution import steps_text
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
@@ -33,6 +34,7 @@ def verdict_lines(assessment: Assessment) -> list[str]:
         max_tilt=MAX_TILT_GON * GON,
         usual_cause=USUAL_CAUSE,
         diagnose=state in (REJECTED, IMPLAUSIBLE) or bool(suspects),
+        resolution="" if fit.campaign.resolution is None else steps_text(fit.campaign.resolution),
         blind="" if fit.approach.uses_angles else BLIND,
     )
 

@@ -189,7 +189,7 @@ class MeanAccuracy:
     @property
     def ratio(self) -> float:
         """Factor by which the assumption of white noise is too optimistic."""
-        return self.allan / self.white
+        return self.allan / self.white if self.white > 0 else 1.0
 
 
 def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: int) -> MeanAccuracy:

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
+from accelstudy.campaign.importing.resolution import noise_before_rounding
 from accelstudy.campaign.importing.segments import Envelope, GrowingHold, Segment, Segmentation
 from accelstudy.campaign.importing.windows import (
+    FACTOR,
     Survey,
     Threshold,
     given_threshold,
@@ -59,24 +61,29 @@ def segment_blocks(
     for _ in envelope.along(survey.kept.again()):
         pass
     segments: dict[int, Segment] = {}
+    blocks: dict[int, GrowingHold] = {}
     left_out, scatter = {}, {}
     start = 0
     for number, rows in enumerate(_files(log) if size is None else _blocks(log, size), 1):
         if len(rows) < PARTS:  # most are left out, which the report says
             continue
-        block = GrowingHold(start, 0, survey.extremes, full_range, 0)
+        block = GrowingHold(start, 0, survey.extremes, full_range - survey.steps.max(), 0)
         block.keep(rows)
         start += len(rows)
         segments[number] = block.finish()
-        if block.saturated():
-            left_out[number] = "the sensor is saturated"
-            continue
+        blocks[number] = block
         means = [part.mean(axis=0) for part in np.array_split(rows[:, 1:4], PARTS)]
         scatter[number] = float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
+    sd = np.median([segment.sd for segment in segments.values()], axis=0)
+    noise = noise_before_rounding(survey.steps, sd)
+    for number in [n for n, block in blocks.items() if block.saturated(survey.steps, noise)]:
+        left_out[number] = "the sensor is saturated"
+        del scatter[number]
     if not scatter:
         raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
     if threshold is None:
-        usual = float(np.median([*scatter.values()]))
+        # Rounding hides the scatter of a coarse sensor.
+        usual = max(float(np.median([*scatter.values()])), FACTOR / RESTLESS * survey.rounding)
         reason = f"{RESTLESS:g} times the scatter of the {PARTS} parts of a typical block"
         chosen = Threshold(RESTLESS * usual, usual, reason)
     else:
@@ -84,7 +91,7 @@ def segment_blocks(
     for number, each in scatter.items():
         if each > chosen.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return survey, chosen, Segmentation(segments, 0, 0, 0, envelope, left_out, least)
+    return survey, chosen, Segmentation(segments, 0, 0, (), envelope, left_out, least)
 
 
 def _files(log: Recording) -> Iterator[Array]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -27,17 +27,16 @@ from accelstudy.campaign.importing.allan import (
     slope_sigmas,
 )
 from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.resolution import rounding_of_mean
 from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation
 from accelstudy.campaign.importing.settings import Selection
-from accelstudy.campaign.importing.windows import Survey, Threshold
+from accelstudy.campaign.importing.windows import RESTLESS, Survey, Threshold
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
 _ALIKE = 1.5  # largest over smallest norm of the means of one sensor in gravity
 _SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity; of a sphere 0.58
-RESTLESS = 0.02
-"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
 SLOW = 2.0
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand."""
@@ -61,6 +60,7 @@ class HoldNoise:
         are any
     accuracy : MeanAccuracy, of the mean over a typical hold in the channels of the sensor
     across : float, m/s², standard deviation of such a mean across gravity
+    rounding : float, m/s², what rounding to the steps of the readings leaves in any mean
     """
 
     allan: AllanDeviation
@@ -70,6 +70,12 @@ class HoldNoise:
     of_sensor: slice
     accuracy: MeanAccuracy
     across: float
+    rounding: float = 0.0
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the mean over a typical hold, m/s²."""
+        return float(np.hypot(self.accuracy.allan, self.rounding))
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,7 @@ class DetectedHolds:
     sd_slope : (n, 3) array, m/s²/s, standard deviations of the slopes of the samples
     threshold : Threshold
     step : float, s, usual time between samples; 1 where the log does not tell it
+    resolution : (3,) array, m/s², steps in which the axes are read; 0 where none is found
     envelope : Envelope, of the log, for its figure
     warnings : tuple of str
     size : int, samples of each block, or of the shortest, if the log consists of blocks
@@ -98,6 +105,7 @@ class DetectedHolds:
     sd_slope: Array
     threshold: Threshold
     step: float
+    resolution: Array
     envelope: Envelope
     warnings: tuple[str, ...]
     size: int | None = None
@@ -163,6 +171,7 @@ def detected_holds(
     segmentation: Segmentation,
     selection: Selection,
     window: float,
+    trim: float,
     shortest: float,
 ) -> DetectedHolds:
     """Collect the holds of one sensor, as its log was read with these settings.
@@ -188,7 +197,7 @@ def detected_holds(
     warnings = []
     if survey.gaps:
         warnings.append(f"{counted(survey.gaps, 'gap')} in time; no hold spans one")
-    if survey.frozen:
+    if survey.frozen and not survey.coarse:
         share = 100 * survey.frozen / survey.total
         warnings.append(
             f"a channel does not change over a window in {share:.2g} % of the log; left out"
@@ -205,11 +214,12 @@ def detected_holds(
     if not segmentation.segments:
         if segmentation.wandering:
             raise never_still("it turns slowly in all that looks like a hold")
+        warnings += _too_short(segmentation.short, window, trim, shortest)
         raise InputError(
-            f"{log.path}: no static hold of {shortest:g} s or more "
-            f"({counted(segmentation.short, 'shorter one')}; a window is at rest up to "
+            f"{log.path}: no static hold of {shortest:g} s or more (a window is at rest up to "
             f"{threshold.sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
         )
+    warnings += _too_short(segmentation.short, window, trim, shortest)
     segments = _joined(segmentation.segments, selection, threshold.sd)
     left_out = {**segmentation.left_out, **_left_out(segments, selection)}
     used = [segment for number, segment in segments.items() if number not in left_out]
@@ -220,10 +230,11 @@ def detected_holds(
         segments=segments,
         left_out=left_out,
         conditions=_conditions(list(segments.values()), log.conditions),
-        noise=hold_noise(used, log.step),
+        noise=hold_noise(used, log.step, survey.steps),
         sd_slope=_slope_sigmas(list(segments.values()), log.step),
         threshold=threshold,
         step=log.step,
+        resolution=survey.steps,
         envelope=segmentation.envelope,
         warnings=tuple(warnings),
         size=segmentation.size,
@@ -234,6 +245,22 @@ def detected_holds(
             "not like the noise of a sensor"
         )
     return holds
+
+
+def _too_short(rests: Sequence[float], window: float, trim: float, shortest: float) -> list[str]:
+    """Say which rests, of so many seconds, are no holds, and the option that takes them."""
+    if not rests:
+        return []
+    lost, several = window + 2 * trim, len(rests) > 1
+    spans = sorted({f"{min(rests):.1f}", f"{max(rests):.1f}"}, key=float)
+    left = (min(rests) - lost) * (1 + 1e-9)
+    digit = 10.0 ** np.floor(np.log10(left))
+    takes = digit * np.floor(left / digit)
+    return [
+        f"{counted(len(rests), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} no "
+        f"hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not count; "
+        f"--shortest {takes:g} (now {shortest:g}) takes {'them' if several else 'it'}"
+    ]
 
 
 def _joined(
@@ -316,8 +343,8 @@ def _names(numbers: Sequence[int]) -> str:
     return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
 
 
-def hold_noise(segments: Sequence[Segment], step: float) -> HoldNoise:
-    """Turn the samples of each hold to its channels, and add them up."""
+def hold_noise(segments: Sequence[Segment], step: float, resolution: ArrayLike = 0.0) -> HoldNoise:
+    """Sum the samples of each hold in its channels; `resolution` as of `DetectedHolds`."""
     center, directed = _center(np.array([segment.mean for segment in segments]))
     frames = [_frame(segment.mean - center) for segment in segments]
     variances = [
@@ -333,7 +360,9 @@ def hold_noise(segments: Sequence[Segment], step: float) -> HoldNoise:
         accuracy_of_mean(allan.channels(channels), typical * step, sd[channels], typical)
         for channels in (of_sensor, slice(1, 3))
     )
-    return HoldNoise(allan, sd, center, directed, of_sensor, accuracy, across.allan)
+    of_axes = np.sqrt(np.mean([segment.sd**2 for segment in segments], axis=0))
+    rounding = float(np.sqrt(np.mean(rounding_of_mean(resolution, of_axes) ** 2)))
+    return HoldNoise(allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding)
 
 
 def _slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
@@ -407,6 +436,8 @@ def _moves(holds: DetectedHolds) -> bool:
     if not holds.threshold.floor > RESTLESS * min(holds.radius, STANDARD_GRAVITY):
         return False
     curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
+    if sd == 0:  # all samples of a coarse sensor are rounded alike
+        return False
     reliable = (curve.differences >= RELIABLE) & (curve.tau >= SHORTEST)
     if not reliable.any():
         return True

@@ -194,7 +194,7 @@ def _import_blocks(
             log, each.block, each.threshold_mps2, _full_range(each)
         )
         window = survey.width * log.step
-        holds = detected_holds(log, survey, threshold, blocks, selection, window, 0.0)
+        holds = detected_holds(log, survey, threshold, blocks, selection, window, 0.0, 0.0)
         result[name] = campaign_of_holds(paths, each, log, holds)
     return result
 
@@ -254,7 +254,7 @@ def find_joint_holds(
     surveys = surveyed(logs, window, threshold)
     segmentations = segment_logs(logs, surveys, trim, shortest, full_range, one_each)
     return [
-        detected_holds(log, *survey, segmentation, selection or Selection(), window, shortest)
+        detected_holds(log, *survey, segmentation, selection or Selection(), window, trim, shortest)
         for log, survey, segmentation in zip(logs, surveys, segmentations, strict=True)
     ]
 

@@ -19,6 +19,7 @@ from accelstudy.campaign.importing.allan import MeanAccuracy
 from accelstudy.campaign.importing.holds import DetectedHolds
 from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording
+from accelstudy.campaign.importing.resolution import steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 TURNING = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
+
+COUNTS = 0.1
+"""Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +84,22 @@ class ImportReport:
             each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
             kind = "hold" if holds.size is None else "block"
             lines.append(f"left out: {counted(len(holds.left_out), kind)}: {each}")
-        return [
-            *lines,
+        lines.append(
             f"sigma of a mean over {mean}: {shown(accuracy.allan)} (Allan), "
-            f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}",
-        ]
+            f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}"
+        )
+        if _rounds(holds):
+            lines.append(
+                f"quantisation: readings in steps of {steps_text(holds.resolution)}; rounding "
+                f"leaves {shown(holds.noise.rounding)} in a mean, however long the hold; together "
+                f"{shown(holds.noise.sigma)}"
+            )
+        return lines
+
+
+def _rounds(holds: DetectedHolds) -> bool:
+    """Whether rounding to the steps of the readings counts beside the noise of a mean."""
+    return holds.noise.rounding > COUNTS * holds.noise.accuracy.allan
 
 
 def shown(sigma: float) -> str:
@@ -96,7 +111,6 @@ def campaign_of_holds(
     paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
 ) -> tuple[Campaign, ImportReport]:
     """Make the campaign of the holds of one sensor, and its report."""
-    accuracy = holds.noise.accuracy
     warnings = [*holds.warnings, *_doubts(holds, settings.gravity.value_mps2)]
     notes = []
     if settings.frame != "frd":
@@ -144,13 +158,15 @@ def campaign_of_holds(
         settings,
         forces,
         positions=holds.number,
-        sigma_force=accuracy.allan,
+        sigma_force=holds.noise.sigma,
+        resolution=holds.resolution if _rounds(holds) else None,
         n_samples=holds.n_samples,
         sd=holds.of_each("sd"),
         log=layout_of(settings, first.source, first.places),
         warnings=tuple(warnings),
         **columns,
     ).without(holds.left_out)
+    accuracy = holds.noise.accuracy
     report = ImportReport(
         len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
     )

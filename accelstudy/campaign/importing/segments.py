@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.importing.allan import AllanMoments, allan_moments
 from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.resolution import noise_before_rounding
 from accelstudy.campaign.importing.windows import Survey, Threshold, Windows
 
 Array = NDArray[np.float64]
@@ -25,6 +27,11 @@ LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 SATURATED = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
+BEYOND, SURE = 5.0, 3.0
+"""Samples that rounding alone would hardly leave out beyond the largest one (e⁻⁵), and standard
+deviations by which those at the largest one may exceed what it then explains."""
+SHORTEST = 8
+"""Samples left of a rest from which on it is told; a sensor that turns back is still for fewer."""
 WANDERING = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
 _NONE = np.empty((0, 1))  # rows
@@ -37,8 +44,9 @@ class Segmentation:
     Attributes
     ----------
     segments : mapping of int to Segment, by the numbers that figures and options use
-    saturated, wandering, short : int, runs at rest that are no holds: the sensor is saturated, it
-        turns slowly, or they are too short
+    saturated, wandering : int, runs at rest that are no holds: the sensor is saturated, or it turns
+        slowly
+    short : tuple of float, s, lengths of the rests that are too short to be holds
     envelope : Envelope, of the log, for its figure
     left_out : mapping of int to str, segments that are no positions, and why
     size : int, samples of each, or of the shortest, if the log consists of blocks
@@ -47,7 +55,7 @@ class Segmentation:
     segments: Mapping[int, Segment]
     saturated: int
     wandering: int
-    short: int
+    short: tuple[float, ...]
     envelope: Envelope
     left_out: Mapping[int, str] = field(default_factory=dict)
     size: int | None = None
@@ -79,33 +87,39 @@ def segment_logs(
         envelope.along(survey.kept.again())
         for envelope, (survey, _) in zip(envelopes, surveys, strict=True)
     ]
-    largest = [threshold.sd**2 for _, threshold in surveys]
-    extremes = [survey.extremes for survey, _ in surveys]
     groups: list[tuple[int, list[Segment | None]]] = []
-    saturated, wandering, short = [0] * len(logs), [0] * len(logs), 0
+    short: list[float] = []
+    runs: list[tuple[list[GrowingHold], list[Segment]]] = []
     with stage("holds", surveys[0][0].total) as advance:
-        for group in runs_at_rest(streams, largest, cut, extremes, full_range, advance):
-            if group[0].n < least:
-                short += 1
-                continue
-            kept: list[Segment | None] = []
-            for i, hold in enumerate(group):
-                full, segment = hold.saturated(), hold.finish()
-                # A sensor that turns slowly is nearly still in each window, yet has no constant
-                # attitude: its force changes over the run by more than within each of them.
-                wanders_off = not full and segment.variance > (WANDERING * surveys[i][1].sd) ** 2
-                saturated[i] += full
-                wandering[i] += wanders_off
-                kept.append(None if full or wanders_off else segment)
-            if any(kept):
-                groups.append((group[0].recording, kept))
+        for run in runs_at_rest(streams, surveys, cut, full_range, advance):
+            if run[0].n >= least:
+                runs.append((run, [hold.finish() for hold in run]))
+            elif run[0].n >= SHORTEST:
+                short.append((run[0].n + 2 * cut + surveys[0][0].width) * step)
+    saturated, wandering = [0] * len(logs), [0] * len(logs)
+    noise = [
+        noise_before_rounding(survey.steps, np.median([s[i].sd for _, s in runs], axis=0))
+        for i, (survey, _) in enumerate(surveys if runs else [])
+    ]
+    for holds, segments in runs:
+        kept: list[Segment | None] = []
+        for i, (hold, segment) in enumerate(zip(holds, segments, strict=True)):
+            full = hold.saturated(surveys[i][0].steps, noise[i])
+            # A sensor that turns slowly is nearly still in each window, yet has no constant
+            # attitude: its force changes over the run by more than within each of them.
+            wanders_off = not full and segment.variance > (WANDERING * surveys[i][1].sd) ** 2
+            saturated[i] += full
+            wandering[i] += wanders_off
+            kept.append(None if full or wanders_off else segment)
+        if any(kept):
+            groups.append((holds[0].recording, kept))
     numbered = _numbered(groups, one_each)
     return [
         Segmentation(
             {n: part for n, group in numbered.items() if (part := group[i]) is not None},
             saturated[i],
             wandering[i],
-            short,
+            tuple(short),
             envelope,
         )
         for i, envelope in enumerate(envelopes)
@@ -311,22 +325,34 @@ class GrowingHold:
             (moments.turned(about_line),),
         )
 
-    def saturated(self) -> bool:
-        """Whether samples pile up at the end of the scale, or lie at the sensor's range.
+    def saturated(self, step: Array, noise: Array) -> bool:
+        """Whether samples lie at the sensor's range or, if it is unknown, pile up at the extreme.
 
-        A coarse sensor that is not saturated reaches its largest value, too, but less often than
-        the next one.
+        In a hold of n samples of which none lies beyond the last step, the mean may be so high that
+        `BEYOND` of them were expected there. Those above the last edge but one are as many as the
+        step, and the noise before rounding, explain.
+
+        Parameters
+        ----------
+        step, noise : (3,) arrays, m/s², of the axes; a step of 0 is none
         """
+        if np.isfinite(self._range):
+            return bool(np.any(self._beyond > SATURATED * self.n))
         end, beside = self._at_extremes[:, 0], self._at_extremes[:, 1]
-        piled = (end > SATURATED * self.n) & (end > beside)
-        return bool(np.any(piled) or np.any(self._beyond > SATURATED * self.n))
+        beyond = min(BEYOND / self.n, 0.5)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            steps = np.where(step > 0, step / noise, 0.0)
+        steps[noise == 0] = np.inf  # every reading is the same in most holds
+        share = special.ndtr(steps + special.ndtri(beyond))
+        explained = self.n * share + SURE * np.sqrt(self.n * share * (1 - share))
+        piled = (end > np.maximum(SATURATED * self.n, explained)) & (end > beside)
+        return bool(np.any(piled))
 
 
 def runs_at_rest(
     streams: Sequence[Iterator[Windows]],
-    largest: Sequence[float],
+    surveys: Sequence[tuple[Survey, Threshold]],
     cut: int,
-    extremes: Sequence[Array],
     full_range: float,
     advance: Callable[[float], None],
 ) -> Iterator[list[GrowingHold]]:
@@ -336,9 +362,9 @@ def runs_at_rest(
     ----------
     streams : sequence of iterators of Windows, of sensors that moved together; their samples are
         simultaneous
-    largest : variance up to which a window of each sensor is at rest, (m/s²)²
+    surveys : of each sensor, as of `surveyed`
     cut : int, samples cut off at both ends
-    extremes, full_range : as of `GrowingHold`, `extremes` for each sensor
+    full_range : float, m/s², the sensors measure ± this
     advance : callable, gets the number of windows that were processed
     """
     holds: list[GrowingHold] | None = None
@@ -352,8 +378,8 @@ def runs_at_rest(
         piece = first_batch.piece
         still = np.all(
             [
-                (batch.variance <= most) & ~batch.frozen
-                for batch, most in zip(batches, largest, strict=True)
+                (batch.variance <= threshold.sd**2) & (survey.coarse | ~batch.frozen)
+                for batch, (survey, threshold) in zip(batches, surveys, strict=True)
             ],
             axis=0,
         )
@@ -364,9 +390,16 @@ def runs_at_rest(
                 holds = None
             if holds is None:
                 start = first_batch.index + first
+                # The largest reading of a converter is a step less than its range.
                 holds = [
-                    GrowingHold(start, cut, ends, full_range, first_batch.recording)
-                    for ends in extremes
+                    GrowingHold(
+                        start,
+                        cut,
+                        survey.extremes,
+                        full_range - survey.steps.max(),
+                        first_batch.recording,
+                    )
+                    for survey, _ in surveys
                 ]
             for hold, batch in zip(holds, batches, strict=True):
                 hold.grow(batch, slice(first, end))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from tempfile import SpooledTemporaryFile
 from typing import Any
@@ -17,6 +18,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing.recording import GAP, Recording
+from accelstudy.campaign.importing.resolution import Readings
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,11 @@ FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
 QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
 """The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
+RESTLESS = 0.02
+"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
+COARSE = 1.75
+"""Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
+same number all the time: that of noise of 0.4 steps."""
 
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
 
@@ -231,7 +238,9 @@ class Survey:
 
     def __init__(self, log: Recording, width: int) -> None:
         self.width, self.kept = width, KeptWindows(log, width)
-        self.counts = np.zeros(len(_BINS) - 1, dtype=int)
+        self.counts, self._counts_frozen = np.zeros((2, len(_BINS) - 1), dtype=int)
+        self._constant = 0
+        self._readings = Readings()
         self.total = self.frozen = self.gaps = 0
         self.span = (np.nan, np.nan)
         # Per axis the lowest and the highest value, and the ones next to them.
@@ -245,10 +254,51 @@ class Survey:
         self.span = (batch.time[0] if np.isnan(self.span[0]) else self.span[0], batch.time[-1])
         self.total += len(batch.time)
         self.frozen += int(batch.frozen.sum())
-        alive = batch.variance[~batch.frozen & (batch.variance > 0)]
-        self.counts += np.histogram(np.log10(alive), _BINS)[0]
+        varies = batch.variance > 0
+        self._constant += int(np.sum(~varies))
+        for counts, chosen in (
+            (self.counts, varies & ~batch.frozen),
+            (self._counts_frozen, varies & batch.frozen),
+        ):
+            counts += np.histogram(np.log10(batch.variance[chosen]), _BINS)[0]
+        self._readings.add(batch.forces)
         self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
         self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
+
+    @cached_property
+    def steps(self) -> Array:
+        """Steps in which the axes are read, (3,), m/s²; 0 where there are none."""
+        return self._readings.steps
+
+    @property
+    def rounding(self) -> float:
+        """Noise of a window by rounding alone, m/s²."""
+        return float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
+
+    @cached_property
+    def coarse(self) -> bool:
+        """Whether the steps explain that a channel at rest does not change over a window.
+
+        If all windows that change are motion, nothing else explains it either.
+        """
+        if not self.rounding > 0:
+            return False
+        noise = _noise_floor(self.counts + self._counts_frozen)
+        return bool(noise <= COARSE * self.rounding or noise > RESTLESS * STANDARD_GRAVITY)
+
+    @property
+    def counts_at_rest(self) -> NDArray[np.int_]:
+        """Histogram of the windows that may be at rest; none has less noise than that of rounding.
+
+        A channel that does not change is frozen, unless its steps explain it.
+        """
+        if not self.coarse:
+            return self.counts
+        counts = self.counts + self._counts_frozen
+        least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
+        counts[least] += counts[:least].sum() + self._constant
+        counts[:least] = 0
+        return counts
 
     def quietest(self) -> float:
         """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
@@ -298,16 +348,10 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
     threshold is below 0.003 g: a quiet sensor feels footsteps and pumps, and whatever moves less
     than that in a second is not being turned.
     """
-    counts = survey.counts
+    counts = survey.counts_at_rest
     if not counts.any():
         raise InputError(f"{log.path}: a channel does not change in any window; is it frozen?")
-    middle = (_BINS[:-1] + _BINS[1:]) / 2
-    quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
-    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
-    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
-    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
-    floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
-    noise = float(np.sqrt(floor))
+    noise = _noise_floor(counts)
     sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
     return Threshold(
         sd,
@@ -315,6 +359,19 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
         f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
         "around which windows at rest crowd",
     )
+
+
+def _noise_floor(counts: NDArray[np.int_]) -> float:
+    """Noise around which windows at rest crowd, m/s²; infinite without a window."""
+    if not counts.any():
+        return np.inf
+    middle = (_BINS[:-1] + _BINS[1:]) / 2
+    quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
+    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
+    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
+    floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
+    return float(np.sqrt(floor))
 
 
 def _otsu(counts: NDArray[np.int_], middle: Array) -> float:

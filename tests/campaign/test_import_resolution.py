@@ -1,0 +1,153 @@
+"""Readings in coarse steps: the step, what rounding leaves in a mean, holds without a change."""
+
+import numpy as np
+import pytest
+from calling import succeed
+from test_import_holds import find_holds, opened, write
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY as G
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.importing.blocks import segment_blocks
+from accelstudy.campaign.importing.resolution import (
+    noise_before_rounding,
+    rounding_of_mean,
+    step_of,
+)
+
+BIAS, SCALE = np.array([0.12, -0.08, 0.2]), 1 + 1e-6 * np.array([4000, -3000, 6000])
+
+
+def log_in_steps(step, noise=0.02, seed=1, still=500, moving=200):
+    """A log in 26 attitudes, read in steps; the faces, edges and corners of a cube, by hand."""
+    rng = np.random.default_rng(seed)
+    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
+    pieces = []
+    for direction in grid[np.any(grid != 0, axis=1)] + 0.02 * rng.standard_normal((26, 3)):
+        force = SCALE * G * direction / np.linalg.norm(direction) + BIAS
+        shake = 4 * np.sin(np.arange(moving)[:, None] * rng.uniform(0.05, 0.2, 3))
+        pieces += [force + shake, np.tile(force, (still, 1))]
+    forces = np.concatenate([*pieces, pieces[0]])
+    forces = forces + noise * rng.standard_normal(forces.shape)
+    return np.round(forces / step) * step if step else forces
+
+
+def truth(still=500, moving=200):
+    """Rows of the log within the holds, (26, still)."""
+    return moving + np.arange(26)[:, None] * (still + moving) + np.arange(still)
+
+
+@pytest.mark.parametrize("step", [0.1, G / 64])
+@pytest.mark.parametrize("noise", [0.001, 0.02, 0.05])
+def test_all_holds_of_coarse_readings_are_found_and_their_sigma_is_right(tmp_path, step, noise):
+    """The error of the means, known here, is within what their sigma says."""
+    exact, read = log_in_steps(0.0, noise=0.0), log_in_steps(step, noise)
+    holds = find_holds(opened(tmp_path, read))
+    assert len(holds) == 26
+    assert not holds.warnings or "does not change" not in "".join(holds.warnings)
+    np.testing.assert_allclose(holds.resolution, step, rtol=1e-5)
+    error = holds.mean - exact[truth()].mean(axis=1)
+    # 78 errors: their rms is known to 8 %, the noise before rounding not much better.
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(holds.noise.sigma, rel=0.4)
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.2, 0.3, 0.4])
+def test_what_rounding_leaves_in_a_mean(ratio):
+    """Against a simulation: the mean of many rounded samples of forces anywhere in a step."""
+    rng = np.random.default_rng(3)
+    force, step = rng.uniform(-0.5, 0.5, (4000, 1)), 1.0
+    read = np.round(force + ratio * rng.standard_normal((4000, 4000)).astype(np.float32))
+    sd = np.sqrt(np.mean(read.var(axis=1, ddof=1)))
+    error = np.sqrt(max(np.mean((read.mean(axis=1) - force[:, 0]) ** 2) - sd**2 / 4000, 0.0))
+    assert rounding_of_mean(step, sd) == pytest.approx(error, rel=0.05, abs=0.002)
+    assert noise_before_rounding(step, sd) == pytest.approx(ratio, rel=0.05, abs=0.005)
+
+
+def test_limits_of_rounding():
+    assert rounding_of_mean(0.1, 0.0) == pytest.approx(0.1 / np.sqrt(12), rel=1e-3)
+    assert rounding_of_mean(0.1, 0.2) == pytest.approx(0.0, abs=1e-9)
+    assert rounding_of_mean(0.0, 0.2) == 0.0
+    assert noise_before_rounding(0.0, 0.2) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("readings", "step"), [
+    (np.arange(-5, 9) * 0.1, 0.1),
+    (np.unique(np.round(np.arange(-64, 99) * G / 64, 2)), G / 64),  # the file rounds as well
+    (np.array([-3, -2, 4, 9, 10, 40]) * 0.25 + 0.07, 0.25),
+    (np.sort(np.random.default_rng(1).normal(size=300)), 0.0),
+    (np.arange(5) * 3.0, 0.0),  # no sensor is so coarse
+    (np.array([1.0, 2.0]), 0.0),
+])  # fmt: skip
+def test_the_step_of_readings(readings, step):
+    assert step_of(readings) == pytest.approx(step, rel=1e-3)
+
+
+def test_the_step_is_said_kept_and_counts_in_the_verdict(tmp_path):
+    path = write(tmp_path, log_in_steps(0.1))
+    result = succeed("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure")
+    assert "quantisation: readings in steps of 0.1 m/s²" in result.output
+    assert "does not change" not in result.output
+    campaign = read_campaign(tmp_path / "c")
+    np.testing.assert_allclose(campaign.resolution, 0.1)
+    # Noise of 20 mm/s² lets some 10 of the 29 mm/s² of plain rounding through.
+    assert 0.007 < campaign.sigma_force < 0.014
+    calibrated = succeed("calibrate", tmp_path / "c", "--out", tmp_path / "r").output
+    assert "ACCEPTED" in calibrated
+    assert "quantisation" in calibrated
+
+
+def test_a_fine_log_says_nothing_of_its_steps(tmp_path):
+    path = write(tmp_path, log_in_steps(0.001))
+    result = succeed("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure")
+    assert "quantisation" not in result.output
+    assert read_campaign(tmp_path / "c").resolution is None
+
+
+# --- Saturation ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("step", [0.006, 0.02, 0.1, G / 64])
+def test_a_pile_at_the_extreme_that_the_steps_explain_is_no_saturation(tmp_path, step):
+    """Short holds of calm turns, so that the extremes of the log are those of its faces."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        faces = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
+        read = np.round((G * faces + 0.02 * rng.standard_normal(faces.shape)) / step) * step
+        blocks = find_holds_of_blocks(tmp_path, read)
+        assert not blocks.left_out
+
+
+def find_holds_of_blocks(folder, read, full_range=np.inf):
+    return segment_blocks(opened(folder, read), 40, 10.0, full_range)[2]
+
+
+def test_with_a_range_only_the_range_counts(tmp_path):
+    rng = np.random.default_rng(1)
+    faces = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
+    read = np.minimum(G * faces + 0.02 * rng.standard_normal(faces.shape), G)
+    assert len(find_holds_of_blocks(tmp_path, read).left_out) == 3
+    assert not find_holds_of_blocks(tmp_path, read, 8 * G).left_out
+    with pytest.raises(InputError, match="saturated in all blocks"):
+        find_holds_of_blocks(tmp_path, read, G)
+
+
+# --- Short rests ---------------------------------------------------------------------------------
+
+
+def test_short_rests_are_counted_with_the_option_that_takes_them(tmp_path):
+    rng = np.random.default_rng(2)
+    pieces = []
+    for i in range(12):
+        force = rng.standard_normal(3)
+        force *= G / np.linalg.norm(force)
+        shake = 4 * np.sin(np.arange(150)[:, None] * rng.uniform(0.05, 0.2, 3))
+        pieces += [force + shake, np.tile(force, (400 if i % 4 == 0 else 200, 1))]
+    forces = np.concatenate([*pieces, pieces[0]])
+    path = write(tmp_path, forces + 0.02 * rng.standard_normal(forces.shape))
+    words = ("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure", "--force")
+    result = succeed(*words)
+    assert "(3 positions)" in result.stdout
+    assert "9 rests of 2.0 s are no hold: it takes 2.4 s" in " ".join(result.stderr.split())
+    option = result.stderr.split("--shortest ")[1].split()[0]
+    assert "(12 positions)" in succeed(*words, "--shortest", option).stdout
+    assert "(12 positions)" in succeed(*words, "--window", 0.5).stdout
