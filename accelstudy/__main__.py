@@ -3,10 +3,15 @@
 import gc
 import os
 import signal
+import sys
 
 
 def run() -> None:
     """Run the command line."""
+    # A stream that is closed would be one of the files that are opened, and the error of a library.
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     # Until a command begins nothing is written, so Ctrl-C may end it at once.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end)

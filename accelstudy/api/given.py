@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import Given
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def of_type(name: str, value: Any, *types: type, expected: str) -> None:
 def path_of(name: str, value: Any, expected: str = "a path") -> Path:
     """Path that was given as one, or as text."""
     of_type(name, value, str, PathLike, expected=expected)
+    check_file_name(value)
     return Path(value)
 
 

@@ -60,6 +60,9 @@ TIME = Range(-1e12, 1e12, "s")
 INTERVAL = Range(1e-6, 1e6, "s")
 DURATION = Range(1e-6, 1e7, "s")
 RATE = Range(1e-6, 1e9, "per second")
+# Parameters of sensors, in SI: no sensor has larger ones, and their squares stay finite.
+PARAMETER = Range(-1e6, 1e6)
+SIGMA_PARAMETER = Range(0.0, 1e9)
 
 CELLS = Range(1, 100_000)
 REPLICATES = Range(1, 10**6)

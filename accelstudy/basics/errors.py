@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+import unicodedata
 from collections.abc import Iterable
 
 
@@ -22,8 +23,18 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text
+        c
+        if c.isprintable() or unicodedata.category(c) == "Zs"  # such as a space that does not break
+        else c.encode("unicode_escape").decode("ascii")
+        for c in text
     )
+
+
+def printable_line(text: str) -> str:
+    """Make a text from a file one printable line: of a name, no line of another file is made."""
+    if text.isprintable():
+        return text
+    return "\t".join(map(printable, " ".join(text.splitlines()).split("\t")))
 
 
 _BRIEF = reprlib.Repr()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from errno import ENAMETOOLONG
 from pathlib import Path
 
 from accelstudy.basics.errors import InputError, shown
@@ -34,6 +36,18 @@ def check_path_name(name: str) -> str:
     if len(name.encode()) > LONGEST:
         raise InputError(f"{shown(name)} is too long for a folder; use at most {LONGEST} letters")
     return name
+
+
+def check_file_name(path: str | os.PathLike[str]) -> None:
+    """Raise `InputError` for a path that no file can have, or whose name no page could show."""
+    try:
+        os.fspath(path).encode()
+        os.lstat(path)
+    except ValueError:  # not UTF-8, or with a zero
+        raise InputError(f"{shown(str(path))}: no name of a file in UTF-8") from None
+    except OSError as error:
+        if error.errno == ENAMETOOLONG:
+            raise InputError(f"{shown(str(path))}: too long for the name of a file") from None
 
 
 def natural(path: str | Path) -> list[tuple[int, str]]:

@@ -22,6 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import check_file_name
 from accelstudy.basics.progress import warn
 
 PREFIX = "accelstudy."
@@ -29,6 +30,8 @@ PREFIX = "accelstudy."
 NOTHING = "registers nothing; expected a class or a function under @register"
 HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under plugins"
 """What a message adds to the names that are known."""
+LARGEST = 1_000_000
+"""Bytes of the largest file of code."""
 _CODE = (".py", ".yaml", ".yml", ".json")
 
 _files: dict[str, str] = {}
@@ -128,7 +131,12 @@ def _warn_once(text: str) -> None:
 
 
 def _load_file(path: Path) -> None:
+    check_file_name(path)
     try:
+        if path.exists() and not path.is_file():  # a folder, or a device that never ends
+            raise InputError(f"{path}: is no file; give one with Python code")
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"{path}: larger than {LARGEST // 10**6} MB; is it the right file?")
         content = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
@@ -252,7 +260,9 @@ def one_line(name: str, *own: Path) -> Iterator[None]:
         raise InputError(
             f"{name}: {file}line {error.lineno}: not valid Python: {error.msg}"
         ) from None
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         where = ""
         for frame in traceback.extract_tb(error.__traceback__):
             path = Path(frame.filename)
@@ -261,3 +271,19 @@ def one_line(name: str, *own: Path) -> Iterator[None]:
                 where += f"line {frame.lineno}: "
         what = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
         raise InputError(f"{name}: {where}{' '.join(what.split())}") from None
+
+
+@contextmanager
+def at_work() -> Iterator[None]:
+    """Turn whatever the code of a loaded file raises while it is used into one line."""
+    try:
+        yield
+    except (InputError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        guilty = next((f.filename for f in reversed(frames) if f.filename in _files), None)
+        if guilty is None:
+            raise
+        with one_line(guilty, Path(guilty)):
+            raise

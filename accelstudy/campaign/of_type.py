@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from accelstudy.adjustment.observations import Known
 from accelstudy.basics.errors import InputError
 from accelstudy.files.reading import read_layer
-from accelstudy.files.validation import Finite, NotNegative, Number, checked
+from accelstudy.files.validation import Number, ParameterSigma, ParameterValue, checked
 from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
@@ -53,10 +53,10 @@ class TypicalParameter(BaseModel):
     in_all : bool, whether all sensors of the type have it
     """
 
-    mean: Finite
-    sigma: NotNegative
-    scatter: NotNegative
-    scatter_below: NotNegative
+    mean: ParameterValue
+    sigma: ParameterSigma
+    scatter: ParameterSigma
+    scatter_below: ParameterSigma
     unit: str
     in_all: bool
 

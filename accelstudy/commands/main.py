@@ -111,7 +111,9 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""
-        with interruptible():
+        from accelstudy.basics.plugins import at_work  # which help does without
+
+        with interruptible(), at_work():
             return super().invoke(ctx)
 
 

@@ -13,10 +13,21 @@ import click
 from click.shell_completion import CompletionItem
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import check_file_name
 from accelstudy.basics.progress import feedback
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, Given, angles_in, parse_quantity
 
-PATH = click.Path(path_type=Path)
+
+class _Path(click.Path):
+    """A path that a file can have."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Check the name."""
+        check_file_name(value)
+        return super().convert(value, param, ctx)
+
+
+PATH = _Path(path_type=Path)
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 

@@ -146,14 +146,21 @@ def _parameters() -> dict[str, tuple[str, Parameter]]:
     return known
 
 
+def _parameter(name: str) -> tuple[str, Parameter]:
+    """Group and parameter of a name; a learned effect has as many as its function needs."""
+    if learned := re.fullmatch(r"h_(\w+)_(\d+)", name):
+        return "learned", Parameter(name, "1", f"$h_{{{learned[1]},{learned[2]}}}$")
+    return _parameters()[name]
+
+
 def group_of(parameter: str) -> str:
     """Group of a parameter: the effect it belongs to, "force" or "gravity"."""
-    return _parameters()[parameter][0]
+    return _parameter(parameter)[0]
 
 
 def symbol(parameter: str) -> str:
     """Return the symbol of a parameter (mathtext)."""
-    return _parameters()[parameter][1].symbol
+    return _parameter(parameter)[1].symbol
 
 
 def shown(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:

@@ -68,6 +68,12 @@ class Learned(Effect):
     count: ClassVar[int] = 0
     edge: ClassVar[float] = EDGE
 
+    def __init__(self, **settings: float) -> None:
+        super().__init__(**settings)
+        low, high = self.settings.get("low", -1.0), self.settings.get("high", 1.0)
+        if not low < high:
+            raise InputError(f"effect 'learned': low={low:g} must be below high={high:g}")
+
     @classmethod
     def chosen(cls, words: dict[str, str], settings: dict[str, float]) -> type[Learned]:
         """Return the kind with some coordinate and target, and as many functions as it needs."""

@@ -5,8 +5,11 @@ Errors name the file that was read, and no file is read without end.
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
+import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,19 +17,30 @@ from typing import Any
 
 import yaml
 
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, printable_line, shown
+from accelstudy.basics.names import check_file_name
 from accelstudy.basics.wording import one_line
 
 LARGEST = 100_000_000
 """Bytes of the largest text that is read as a whole, more than a campaign of 100 000 positions."""
-MOST_VALUES = 100_000
-"""Most values of a file with its aliases expanded; a file without aliases may have more."""
+LARGEST_YAML = 1_000_000
+"""Bytes of the largest YAML file: what people write, and what is slow to read."""
+LONGEST_LINE = 10_000_000
+"""Bytes of the longest line of a packed text, which may be much longer than the file."""
+_DEVICES = ("/dev/", "/proc/")
+"""Where a pipe is one that a shell has opened, and not one that waits for somebody to write."""
 
 
 @contextmanager
 def readable(path: str | Path) -> Iterator[None]:
-    """Turn errors of the system on reading a file into one line that names it."""
+    """Turn errors of the system on reading a file into one line that names it.
+
+    A name that no file can have is refused, and so is a named pipe, which could wait for ever.
+    """
+    check_file_name(path)
     try:
+        if stat.S_ISFIFO(os.stat(path).st_mode) and not os.path.abspath(path).startswith(_DEVICES):
+            raise InputError(f"{path}: a named pipe; give a file")
         yield
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
@@ -39,25 +53,44 @@ def readable(path: str | Path) -> Iterator[None]:
         raise InputError(f"{path}: cannot be read: {reason}") from None
 
 
-def read_text(path: str | Path) -> str:
+def read_text(path: str | Path, largest: int | None = None) -> str:
     """Read a text in UTF-8, from a file or a pipe; line ends become those of Python.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is larger than `LARGEST`, as a device that never ends.
+        If it cannot be read, or has more than `largest` bytes, by default `LARGEST`, as a device
+        that never ends.
     UnicodeDecodeError
         If it is not UTF-8; the caller knows what it should be.
     """
+    largest = LARGEST if largest is None else largest
     with readable(path), Path(path).open("rb") as file:
-        content = file.read(LARGEST + 1)
-    if len(content) > LARGEST:
-        raise InputError(f"{path}: larger than {LARGEST // 10**6} MB; is it the right file?")
+        content = file.read(largest + 1)
+    if len(content) > largest:
+        raise InputError(f"{path}: larger than {largest // 10**6} MB; is it the right file?")
     return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
+class Unpacked(gzip.GzipFile):
+    """A packed text whose lines are not longer than `LONGEST_LINE`."""
+
+    _since_the_end_of_a_line = 0
+
+    def read1(self, size: int = -1) -> bytes:
+        """Read some bytes; raise `InputError` if a line is too long."""
+        content = super().read1(size)
+        end = max(content.rfind(b"\n"), content.rfind(b"\r")) + 1
+        before = 0 if end else self._since_the_end_of_a_line
+        self._since_the_end_of_a_line = before + len(content) - end
+        if self._since_the_end_of_a_line > LONGEST_LINE:
+            most = LONGEST_LINE // 10**6
+            raise InputError(f"{self.name}: a line of more than {most} MB; is it a log?")
+        return content
+
+
 def read_json(path: str | Path, kind: str) -> Mapping[str, Any]:
-    """Read a JSON file of accelstudy.
+    """Read a JSON file of accelstudy; each text in it becomes one printable line.
 
     Parameters
     ----------
@@ -71,7 +104,7 @@ def read_json(path: str | Path, kind: str) -> Mapping[str, Any]:
         As `read_text`; if it is no JSON; if a newer version wrote it.
     """
     try:
-        content = json.loads(read_text(path))
+        content = _in_lines(json.loads(read_text(path)))
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
@@ -92,25 +125,22 @@ def check_version(content: object, path: str | Path) -> None:
 
 
 def read_layer(path: str | Path) -> dict[str, Any]:
-    """Read one YAML file.
+    """Read one YAML file; each text in it becomes one printable line.
 
     Raises
     ------
     InputError
-        If it cannot be read, is not valid YAML, names a key twice, is no mapping, becomes very
-        large by aliases of aliases, or was written by a newer version.
+        If it cannot be read, is not valid YAML, has aliases or tags, names a key twice, is no
+        mapping, or was written by a newer version.
     """
     try:
-        layer = _load(read_text(path))
+        layer = _in_lines(yaml.load(read_text(path, LARGEST_YAML), _Loader))
     except InputError:
         raise
     except RecursionError:
         raise InputError(f"{path}: not valid YAML: nested too deeply") from None
     except yaml.MarkedYAMLError as error:
         raise InputError(f"{path}: not valid YAML: {_where(error)}") from None
-    except (LookupError, TypeError, AttributeError):
-        # PyYAML trips over explicit tags that do not fit their value, such as !!int "".
-        raise InputError(f"{path}: not valid YAML: a tag does not fit its value") from None
     except (yaml.YAMLError, ValueError) as error:  # such as an impossible date
         line = " ".join(str(error).split())
         raise InputError(f"{path}: not valid YAML: {line}") from None
@@ -143,40 +173,15 @@ def config_hash(config: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _load(text: str) -> Any:
-    loader = _Loader(text)
-    try:
-        node = loader.get_single_node()
-        if node is None:
-            return None
-        _check_size(node)
-        return loader.construct_document(node)
-    finally:
-        loader.dispose()
-
-
-def _check_size(root: yaml.Node) -> None:
-    """Refuse aliases that make a small file large (`MOST_VALUES`) or put a value into itself."""
-    sizes: dict[int, int | None] = {}
-
-    def size(node: yaml.Node) -> int:
-        if id(node) in sizes:
-            counted = sizes[id(node)]
-            if counted is None:
-                raise yaml.YAMLError(f"line {node.start_mark.line + 1}: a value holds itself")
-            return counted
-        sizes[id(node)] = None
-        parts: list[yaml.Node] = []
-        if isinstance(node, yaml.CollectionNode):
-            mapping = isinstance(node, yaml.MappingNode)
-            parts = [part for pair in node.value for part in pair] if mapping else node.value
-        total = 1 + sum(size(part) for part in parts)
-        sizes[id(node)] = total
-        return total
-
-    # Without aliases the content is as large as the file.
-    if size(root) > max(MOST_VALUES, 2 * len(sizes)):
-        raise yaml.YAMLError(f"with its aliases written out it has more than {MOST_VALUES} values")
+def _in_lines(content: Any) -> Any:
+    """Content of a file whose texts are one printable line each."""
+    if isinstance(content, str):
+        return printable_line(content)
+    if isinstance(content, list):
+        return list(map(_in_lines, content))
+    if isinstance(content, dict):
+        return {_in_lines(key): _in_lines(value) for key, value in content.items()}
+    return content
 
 
 def _where(error: yaml.MarkedYAMLError) -> str:
@@ -186,7 +191,19 @@ def _where(error: yaml.MarkedYAMLError) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """A safe loader that refuses a key given twice."""
+    """A safe loader that refuses a key given twice, aliases and tags.
+
+    Aliases of aliases make a small file huge, and a tag can be of what its value is not.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        what = "an alias (*)" if isinstance(event, yaml.AliasEvent) else "a tag (!)"
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
+            problem = f"{what} is not read; write the value out"
+            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()

@@ -35,7 +35,11 @@ LIBRARIES = ("numpy", "scipy", "llvmlite")
 
 @cache
 def git_commit() -> str:
-    """Commit of the checkout that the package runs from; `+` marks uncommitted changes."""
+    """Commit of the checkout that the package runs from; `+` marks uncommitted changes.
+
+    An installed package may lie within a repository that has nothing to do with it, as in the
+    environment of a project; it is of that repository only if its files are.
+    """
     folder = Path(__file__).parent
 
     def git(*arguments: str) -> str:
@@ -43,6 +47,7 @@ def git_commit() -> str:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     try:
+        git("ls-files", "--error-unmatch", __file__)
         # A lock would stay behind if this process is killed, and stop every commit.
         changed = git("--no-optional-locks", "status", "--porcelain", "--untracked-files=no", ".")
         return git("rev-parse", "HEAD") + ("+" if changed else "")

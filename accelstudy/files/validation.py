@@ -49,30 +49,32 @@ Tilt = Annotated[float, Field(gt=0, lt=100), Number]
 Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
 
 
-def _within(range_: Range) -> tuple[Any, ...]:
+def within(range_: Range) -> tuple[Any, ...]:
     """Annotations that keep a number within a range, in the schema too."""
     ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
     finite = Field(json_schema_extra=dict(ends))
     return Number, AfterValidator(range_.check), finite
 
 
-Gravity = Annotated[float, *_within(bounds.GRAVITY)]
-GravityError = Annotated[float, *_within(bounds.GRAVITY_ERROR)]
-SigmaForce = Annotated[float, *_within(bounds.SIGMA_FORCE)]
-SigmaGravity = Annotated[float, *_within(bounds.SIGMA_GRAVITY)]
-SigmaAngle = Annotated[float, *_within(bounds.SIGMA_ANGLE)]
-Angle = Annotated[float, *_within(bounds.ANGLE)]
-Temperature = Annotated[float, *_within(bounds.TEMPERATURE)]
-Vibration = Annotated[float, *_within(bounds.VIBRATION)]
-Interval = Annotated[float, *_within(bounds.INTERVAL)]
-Duration = Annotated[float, *_within(bounds.DURATION)]
-Rate = Annotated[float, *_within(bounds.RATE)]
-Replicates = Annotated[int, *_within(bounds.REPLICATES)]
-Sessions = Annotated[int, *_within(bounds.SESSIONS)]
-Attitudes = Annotated[int, *_within(bounds.ATTITUDES)]
-BaseSamples = Annotated[int, *_within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
-Resamples = Annotated[int, *_within(bounds.RESAMPLES)]
-Seed = Annotated[int, *_within(bounds.SEED)]
+Gravity = Annotated[float, *within(bounds.GRAVITY)]
+GravityError = Annotated[float, *within(bounds.GRAVITY_ERROR)]
+SigmaForce = Annotated[float, *within(bounds.SIGMA_FORCE)]
+SigmaGravity = Annotated[float, *within(bounds.SIGMA_GRAVITY)]
+SigmaAngle = Annotated[float, *within(bounds.SIGMA_ANGLE)]
+ParameterValue = Annotated[float, *within(bounds.PARAMETER)]
+ParameterSigma = Annotated[float, *within(bounds.SIGMA_PARAMETER)]
+Angle = Annotated[float, *within(bounds.ANGLE)]
+Temperature = Annotated[float, *within(bounds.TEMPERATURE)]
+Vibration = Annotated[float, *within(bounds.VIBRATION)]
+Interval = Annotated[float, *within(bounds.INTERVAL)]
+Duration = Annotated[float, *within(bounds.DURATION)]
+Rate = Annotated[float, *within(bounds.RATE)]
+Replicates = Annotated[int, *within(bounds.REPLICATES)]
+Sessions = Annotated[int, *within(bounds.SESSIONS)]
+Attitudes = Annotated[int, *within(bounds.ATTITUDES)]
+BaseSamples = Annotated[int, *within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
+Resamples = Annotated[int, *within(bounds.RESAMPLES)]
+Seed = Annotated[int, *within(bounds.SEED)]
 
 
 class _OneOrMore:

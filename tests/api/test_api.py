@@ -206,6 +206,10 @@ def test_what_reading_refuses_is_diagnosed(tmp_path):
 WRONG = {
     "acs.read_log(3)": "log: expected a path or a DataFrame, not 3",
     "acs.read_log('none.csv')": "none.csv: no such file",
+    r"acs.read_log('\0')": "no name of a file",
+    r"acs.read_log('a\ud800')": "no name of a file",
+    "acs.read_log('x' * 5000)": "too long for the name of a file",
+    "acs.read_campaign('x/' * 5000)": "too long for the name of a file",
     "acs.read_log(table, rate='fast')": "rate_hz",
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
     "acs.find_holds({'fx': 1})": "log: expected a path",

@@ -1,5 +1,6 @@
 """Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
 
+import os
 import re
 import shutil
 import sys
@@ -50,6 +51,7 @@ class Mine(Base):
 BAD = {
     "syntax": ("x = (", "line 1: not valid Python: '(' was never closed"),
     "raises": ("x = 1\ny = x / 0", "line 2: ZeroDivisionError: division by zero"),
+    "leaves": ("class Away(BaseException): pass\nraise Away('off')", "line 2: Away: off"),
     "exits": ("raise SystemExit(3)", "line 1: SystemExit: 3"),
     "import": ("import no_such_thing", "line 1: ModuleNotFoundError: No module named"),
     "nothing": ("x = 1", "registers nothing; expected a class or a function under @register"),
@@ -150,7 +152,23 @@ def test_each_kind_of_thing_can_be_a_plug_in():
 
 def test_one_that_is_no_file_is_one_line():
     assert refusal("--plugin", "no.py", "effects") == "error: no.py: no such file\n"
-    assert refusal("--plugin", ".", "effects") == "error: .: cannot be read: Is a directory\n"
+    os.mkfifo("pipe.py")  # nobody writes to it, so to open it would last for ever
+    for path in (".", "/dev/zero", "pipe.py"):
+        assert f"{path}: is no file" in refusal("--plugin", path, "effects")
+    Path("large.py").write_text("#" * 1_000_001)
+    assert "large.py: larger than 1 MB" in refusal("--plugin", "large.py", "effects")
+
+
+def test_one_that_fails_at_work_is_one_line():
+    text = f"{HEAD}    def output(self, f, p, g, hold, xp):\n        if xp.__name__ == 'numpy':\n"
+    text = text.replace("xp.__name__ == 'numpy'", "'numpy' in str(xp)")
+    text += "            raise Away('I am off')\n        return super().output(f, p, g, hold, xp)\n"
+    Path("away.py").write_text(f"class Away(BaseException): pass\n{text}")
+    line = refusal(
+        "--plugin", "away.py", "simulate-campaign", "--effect", "mine: 1, 1, 1", "--out", "new"
+    )
+    assert "away.py: line 15: Away: I am off" in line
+    assert not Path("new").exists()
 
 
 def test_what_does_not_use_it_stays_the_same():

@@ -1,5 +1,6 @@
 """Files of the user: errors name the file that was read, and none is read without end."""
 
+import gzip
 import json
 import os
 from pathlib import Path
@@ -28,9 +29,39 @@ def test_an_error_of_the_disk_names_the_file(read, tmp_path):
 
 @pytest.mark.parametrize("read", [read_layer, read_calibration])
 def test_a_device_that_never_ends_is_refused(read, monkeypatch):
-    monkeypatch.setattr(reading, "LARGEST", 3_000_000)
+    for name in ("LARGEST", "LARGEST_YAML"):
+        monkeypatch.setattr(reading, name, 3_000_000)
     with pytest.raises(InputError, match=r"^/dev/zero: larger than 3 MB; is"):
         read("/dev/zero")
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_what_no_file_can_be_is_one_line(read, tmp_path):
+    for name in ("\0", "x" * 5000, "a\ud800", str(tmp_path / "\xff" / ("y/" * 4000))):
+        with pytest.raises(InputError, match=r"^[^\n]{,200}$"):
+            read(name)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)  # nobody writes to it, so to open it would last for ever
+    with pytest.raises(InputError, match=r"pipe: a named pipe; give a file$"):
+        read(pipe)
+
+
+def test_texts_of_a_file_are_printable_lines(tmp_path):
+    path = tmp_path / "file.yaml"
+    path.write_text('a\u00a0b: [" c\\nd\\e[31m ", "\\t", "C:\\\\ x"]\n', encoding="utf-8")
+    assert read_layer(path) == {"a\u00a0b": [" c d\\x1b[31m ", "\t", "C:\\ x"]}
+    path.write_text(json.dumps({"a": "b\x1b\nc\ud800"}), encoding="utf-8")
+    assert reading.read_json(path, "") == {"a": "b\\x1b c\\ud800"}
+
+
+def test_a_packed_line_has_an_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(reading, "LONGEST_LINE", 10**6)
+    path, text = tmp_path / "log.csv.gz", b"fx,fy,fz\n" + 40_000 * b"1,2,3\n"
+    path.write_bytes(gzip.compress(text + 3_000_000 * b"1"))
+    assert path.stat().st_size < 10_000
+    source = open_source(path)
+    with pytest.raises(InputError, match=r"a line of more than 1 MB; is it a log\?$"):
+        list(source.read([0, 1, 2], 10_000))
 
 
 def test_a_pipe_is_read():

@@ -12,7 +12,7 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, printable_line
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.header import LogLayout
@@ -99,6 +99,9 @@ def floats(low, high):
     return st.floats(low, high, allow_subnormal=False)
 
 
+texts = st.text(st.characters(exclude_categories=["Cs"])).map(printable_line)
+
+
 @st.composite
 def campaigns(draw):
     n = draw(st.integers(1, 12))
@@ -114,8 +117,8 @@ def campaigns(draw):
     unit = draw(st.sampled_from(["m/s^2", "g", "counts"]))
     scale, offset = rng.uniform(1e-4, 1e-2, 3) * rng.choice([-1, 1], 3), rng.normal(0, 3e4, 3)
     return Campaign(
-        name=draw(st.text(st.characters(exclude_categories=["Cs"]), min_size=1)),
-        sensor=maybe(draw(st.text(st.characters(exclude_categories=["Cs"])))),
+        name=draw(texts.filter(bool)),
+        sensor=maybe(draw(texts)),
         positions=np.cumsum(rng.integers(1, 3, n)), forces=forces, gravity=gravity,
         sigma_gravity=draw(st.just(0.0) | floats(1e-9, 1e-3)), unit=unit,
         sigma_force=maybe(draw(floats(1e-6, 1))),
@@ -323,7 +326,7 @@ BAD = {
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
     "two tables": (both(text("positions.parquet", "")), "two tables", "either positions.csv or"),
     "no YAML": (text("campaign.yaml", "a: [1"), "not valid YAML", "line 1"),
-    "odd tag": (text("campaign.yaml", "a: !!int ''"), "tag does not fit"),
+    "odd tag": (text("campaign.yaml", "a: !!int ''"), "a tag (!) is not read"),
     "empty YAML": (text("campaign.yaml", ""), "not a mapping"),
     "unknown key": (header(sensr="x"), "sensr: unknown key", "did you mean 'sensor'"),
     "unknown key below": (header(gravity={"value_mps2": 9.8, "sigma": 0}),

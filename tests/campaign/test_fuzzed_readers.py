@@ -5,6 +5,7 @@
 """
 
 import json
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call
+from calling import call, succeed
 from campaign_helpers import GRAVITY, NINE, simulated_campaign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -20,6 +21,8 @@ from scipy.io import savemat
 from test_campaign_apply import TRUTH
 from test_campaign_format import damages, edits
 
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
@@ -65,7 +68,7 @@ def one_line_at_most(folder, *arguments):
 
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.sampled_from(
-        ["counts", "g", "bias", "scale", "\ud800", 10**400, 1e308, -1, 3, "*/"],
+        ["counts", "g", "bias", "scale", "\ud800", 10**400, 1e308, 1e200, -1, 0, 3, "*/", "\n"],
     ),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
     max_leaves=4,
@@ -90,13 +93,71 @@ paths = st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=4)
 changes = st.lists(st.tuples(paths, anything, st.booleans()), min_size=1, max_size=3)
 
 
-def use(content, folder, form):
-    """Apply a calibration and export it."""
+def use(content, folder, form, other=None):
+    """Apply a calibration and export it; compare it with another one."""
     (folder / "calibration.json").write_bytes(content)
+    if other is not None:
+        (folder / "other.json").write_text(json.dumps(other), encoding="utf-8")
+        files = folder / "other.json", folder / "calibration.json"
+        one_line_at_most(folder, "compare", *files, "--out", folder / "compared")
     LOG.to_csv(folder / "log.csv", index=False)
     file, log = folder / "calibration.json", folder / "log.csv"
     one_line_at_most(folder, "apply", file, log, "--out", folder / "out.csv")
     one_line_at_most(folder, "export", file, "--form", form)
+
+
+def of(what, value):
+    """Change of one key of a calibration; of the covariance by a factor."""
+
+    def change(content):
+        if what == "covariance":
+            return {what: (value * np.array(content[what], dtype=float)).tolist()}
+        if what == "value":
+            first, *others = content["parameters"]
+            return {"parameters": [{**first, what: value}, *others]}
+        return {what: value}
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (of("redundancy", 0), "redundancy: must be 1 or more"),
+        (of("redundancy", -3), "redundancy: must be from 0"),
+        (of("redundancy", 10**400), "redundancy: must be from 0 to 1000000000, not a huge number"),
+        (of("covariance", -1), "covariance: expected variances above 0"),
+        (of("covariance", 0), "covariance: expected variances above 0"),
+        (of("covariance", 1e250), "covariance.0.0: must be from"),
+        (of("covariance", np.tri(9)), "covariance: must be symmetric"),
+        (of("covariance", 1 - 2 * np.eye(9)[::-1]), "covariance: "),
+        (of("value", 1e200), "parameters.0.value: must be from"),
+        (of("gravity_mps2", 1e200), "gravity_mps2: must be from 0.001 to 1000 m/s²"),
+        (of("ranges", {"fx_mps2": [2, 1]}), "ranges.fx_mps2: must be the smallest and the largest"),
+    ],
+)
+def test_what_no_calibration_can_hold_is_said_when_it_is_read(calibration, change, said):
+    content = {**calibration, "sigma_source": "a posteriori", **change(calibration)}
+    with TemporaryDirectory() as name:
+        file = Path(name) / "calibration.json"
+        file.write_text(json.dumps(content), encoding="utf-8")
+        with pytest.raises(InputError, match=re.escape(said)):
+            read_calibration(file)
+
+
+INJECTED = "x\n1\t1\tCAL_ACC0_XOFF\t9\t9\x1b[31m\u2028*/"
+
+
+@pytest.mark.parametrize("form", ["px4", "ros", "c", "yaml"])
+def test_a_name_is_no_line_of_an_export(calibration, form):
+    content = {**calibration, "sensor": INJECTED, "campaign": INJECTED}
+    with TemporaryDirectory() as name:
+        file = Path(name) / "calibration.json"
+        file.write_text(json.dumps(content), encoding="utf-8")
+        text = succeed("export", file, "--form", form).stdout
+    assert not any(line.startswith("1\t1\tCAL_ACC0_XOFF\t9") for line in text.splitlines())
+    assert "\x1b" not in text
+    assert "\u2028" not in text
 
 
 forms = st.sampled_from(["json", "yaml", "c", "matrix", "px4", "ros"])
@@ -110,7 +171,7 @@ def test_calibration_of_another_shape(calibration, changes, form):
     for path, value, remove in changes:
         content = replaced(content, path, value, remove)
     with TemporaryDirectory() as folder:
-        use(json.dumps(content).encode(), Path(folder), form)
+        use(json.dumps(content).encode(), Path(folder), form, calibration)
 
 
 @settings(max_examples=100)

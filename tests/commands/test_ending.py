@@ -1,6 +1,7 @@
 """How commands end: one line and an exit status, whatever stops them."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -38,6 +39,33 @@ def test_an_interrupt_of_an_import_is_one_line(module):
     assert ended.returncode == INTERRUPTED
     assert ended.stderr.splitlines()[-1] == "interrupted"
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+def test_a_closed_stream_is_no_file_that_a_command_opens(closed, tmp_path):
+    """A stream that is closed at the start leaves its number to the first file that is opened."""
+    words = ("simulate-campaign", "--scheme", "faces-6", "--out", tmp_path / "new", "--quiet")
+    code = f'exec "$@" {closed}'
+    command = ["sh", "-c", code, "sh", sys.executable, "-m", "accelstudy", *words]
+    ended = subprocess.run(command, capture_output=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert b"campaign: new" not in b"".join(
+        path.read_bytes() for path in (tmp_path / "new").iterdir()
+    )
+    refused = subprocess.run([*command[:-2], tmp_path], capture_output=True, check=False)
+    assert refused.returncode == 2
+
+
+@pytest.mark.parametrize("words", [
+    ("simulate-campaign", "--out", b"a\xff"), ("calibrate", b"a\xff", "--out", "new"),
+    ("calibrate", "x" * 5000, "--out", "new"),
+])  # fmt: skip
+def test_what_no_file_can_be_named_is_one_line(words, tmp_path):
+    command = [sys.executable, "-m", "accelstudy", *words]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert re.fullmatch(r"error: .*(no name of a file in UTF-8|too long for .*)\n", ended.stderr)
+    assert not list(tmp_path.iterdir())
 
 
 def one(function):

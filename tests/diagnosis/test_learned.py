@@ -15,6 +15,7 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import judge
+from accelstudy.drawing.style import group_of, symbol
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.models import get_model
@@ -111,9 +112,17 @@ def test_a_spec_holds_all_and_is_not_listed():
         "learned(coordinate=angle, target=bias)": "no bias can depend on the angle",
         "learned(coordinate=force, target=tilt)": "no tilt can depend on the force",
         "learned(target=bias, target=scale)": "target is given twice",
+        "learned(low=1, high=1)": "low=1 must be below high=1",
+        "learned(coordinate=time, low=3)": "low=3 must be below high=1",
     }.items():
         with pytest.raises(InputError, match=message):
             get_effect(spec)
+
+
+def test_its_parameters_have_symbols_in_figures():
+    names = get_model(f"bias+{SPEC}, length=0.25, amplitude=0.01)").parameter_names
+    assert [symbol(name) for name in names[3:]][:2] == ["$h_{x,1}$", "$h_{x,2}$"]
+    assert {group_of(name) for name in names} == {"bias", "learned"}
 
 
 @pytest.fixture(scope="module")

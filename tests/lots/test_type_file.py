@@ -145,6 +145,18 @@ def test_a_file_that_tells_too_little_is_refused(change, said, tmp_path):
         read_type(path, MODEL)
 
 
+def test_numbers_that_no_type_has_are_refused(tmp_path):
+    rng = np.random.default_rng(14)
+    path = type_of([measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)], tmp_path)
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    for key in ("mean", "sigma", "scatter_below"):
+        changed = json.loads(json.dumps(content))
+        changed["parameters"]["b_x"][key] = 1e200
+        path.write_text(yaml.safe_dump(changed, sort_keys=False), encoding="utf-8")
+        with pytest.raises(InputError, match=rf"parameters.b_x.{key}: must be from \S+ to"):
+            read_type(path, MODEL)
+
+
 def test_other_files_are_no_types(tmp_path):
     (tmp_path / "model.yaml").write_text("models: {a: [bias]}", encoding="utf-8")
     with pytest.raises(InputError, match="no file of a type"):

@@ -149,6 +149,28 @@ def test_commit(monkeypatch):
     git_commit.cache_clear()
 
 
+def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monkeypatch):
+    def git(*words):
+        given = ("-c", "user.name=n", "-c", "user.email=e@example.org")
+        subprocess.run(["git", "-C", tmp_path, *given, *words], check=True, capture_output=True)
+
+    git("init")
+    git("commit", "--allow-empty", "--message", "somebody's project")
+    installed = tmp_path / "env" / "tables.py"
+    installed.parent.mkdir()
+    installed.write_text("")
+    monkeypatch.setattr(tables, "__file__", str(installed))
+    found = []
+    for _ in range(2):
+        git_commit.cache_clear()
+        found.append(git_commit())
+        git("add", "--all")
+        git("commit", "--allow-empty", "--message", "a copy under git")
+    git_commit.cache_clear()
+    assert found[0] == "unknown"
+    assert len(found[1]) == 40
+
+
 # --- whole or not at all -------------------------------------------------------------------------
 
 

@@ -10,14 +10,25 @@ from typing import Annotated, Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.header import LogLayout, Nominal, PerAxis
+from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
-from accelstudy.files.reading import read_json
-from accelstudy.files.validation import Finite, NotNegative, Number, Positive, checked
+from accelstudy.files.reading import read_json, readable
+from accelstudy.files.validation import (
+    Finite,
+    Gravity,
+    NotNegative,
+    Number,
+    ParameterSigma,
+    ParameterValue,
+    checked,
+    within,
+)
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -28,6 +39,13 @@ Array = NDArray[np.float64]
 NO_CALIBRATION = "not a calibration.json of accelstudy"
 MARGIN = 0.1
 """A log may leave a range by this part of its width without a warning."""
+REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
+LEAST_VARIANCE = 1e-40
+"""SI; no estimate is as sure."""
+LEAST_REGULAR = 1e12
+"""Condition of a matrix beyond which it has no inverse."""
+ROUNDED = 1e-6
+"""Parts of a correlation by which a matrix may miss what it should be."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 
@@ -147,26 +165,44 @@ class _Shown(BaseModel):
 
 class _Parameter(BaseModel):
     name: str
-    value: Finite
-    sigma: NotNegative | None
-    sigma_priori: NotNegative | None
-    sigma_posteriori: NotNegative | None
+    value: ParameterValue
+    sigma: ParameterSigma | None
+    sigma_priori: ParameterSigma | None
+    sigma_posteriori: ParameterSigma | None
     unit: str
     shown: _Shown
 
 
-Triple = Annotated[list[Finite], PerAxis]
+def _regular(matrix: list[list[float]]) -> list[list[float]]:
+    if np.linalg.cond(np.array(matrix)) > LEAST_REGULAR:
+        raise ValueError("must be a matrix that has an inverse")
+    return matrix
+
+
+def _ordered(ends: list[float]) -> list[float]:
+    if ends[0] > ends[1]:
+        raise ValueError("must be the smallest and the largest value, in this order")
+    return ends
+
+
+Triple = Annotated[list[ParameterValue], PerAxis]
+Regular = Annotated[list[Triple], PerAxis, AfterValidator(_regular)]
+Ends = Annotated[
+    list[Annotated[float, *within(ANY)]],
+    Field(min_length=2, max_length=2),
+    AfterValidator(_ordered),
+]
 
 
 class _Affine(BaseModel):
-    matrix: Annotated[list[Triple], PerAxis]
+    matrix: Regular
     bias_mps2: Triple
 
 
 class _Mended(BaseModel):
     error: str
     reason: str
-    matrix: Annotated[list[Triple], PerAxis] | None
+    matrix: Regular | None
 
 
 class _Quality(BaseModel):
@@ -184,24 +220,24 @@ class _Document(BaseModel):
     date: str | None = None
     model: str
     approach: str = ""
-    n_positions: int | None = None
+    n_positions: Annotated[int, *within(bounds.POSITIONS)] | None = None
     effects: Annotated[list[str], Field(min_length=1)]
     unit: Literal["m/s^2", "g", "mg", "counts"]
     nominal: Nominal | None
-    gravity_mps2: Positive
+    gravity_mps2: Gravity
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
-    redundancy: int = 0
-    sigma_position_mps2: NotNegative | None
-    sigma_reading_mps2: NotNegative | None = None
-    sigmas_95: Positive | None = None
+    redundancy: Annotated[int, *within(REDUNDANCY)] = 0
+    sigma_position_mps2: ParameterSigma | None
+    sigma_reading_mps2: ParameterSigma | None = None
+    sigmas_95: ParameterSigma | None = None
     parameters: list[_Parameter]
-    covariance: list[list[Finite | None]]
+    covariance: list[list[Annotated[float, *within(VARIANCE)] | None]]
     affine: _Affine | None
     log: LogLayout | None = None
-    range_mps2: Positive | None = None
+    range_mps2: ParameterSigma | None = None
     mended: _Mended | None = None
     quality: _Quality = _Quality()
-    ranges: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=2)]] = {}
+    ranges: dict[str, Ends] = {}
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -210,9 +246,26 @@ class _Document(BaseModel):
             raise ValueError(f"parameters: expected {', '.join(names)}, in this order")
         if {len(row) for row in self.covariance} | {len(self.covariance)} != {len(names)}:
             raise ValueError(f"covariance: expected {len(names)} rows of {len(names)} numbers")
+        covariance = np.array(self.covariance, dtype=float)  # None becomes NaN
+        if (known := np.isfinite(np.diag(covariance))).any():
+            _check_covariance(covariance[np.ix_(known, known)])
+            if self.sigma_source == "a posteriori" and self.redundancy < 1:
+                raise ValueError("redundancy: must be 1 or more where sigmas are a posteriori")
         if self.unit == "counts" and self.nominal is None:
             raise ValueError("nominal: missing; unit: counts needs it")
         return self
+
+
+def _check_covariance(covariance: Array) -> None:
+    """Raise `ValueError` unless a matrix (u, u) can be that of estimates."""
+    variances = np.diag(covariance)
+    if not np.isfinite(covariance).all() or not (variances > LEAST_VARIANCE).all():
+        raise ValueError("covariance: expected variances above 0")
+    correlation = covariance / np.outer(np.sqrt(variances), np.sqrt(variances))
+    if np.abs(correlation - correlation.T).max() > ROUNDED:
+        raise ValueError("covariance: must be symmetric")
+    if np.linalg.eigvalsh(correlation)[0] < -ROUNDED:
+        raise ValueError("covariance: no estimates have it; it is not positive semidefinite")
 
 
 def read_calibration(path: str | Path) -> Calibration:
@@ -223,7 +276,9 @@ def read_calibration(path: str | Path) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    if Path(path).is_dir():
+    with readable(path):
+        is_folder = Path(path).is_dir()
+    if is_folder:
         raise InputError(f"{path}: a folder; give the calibration.json in it")
     content = read_json(path, NO_CALIBRATION)
     return calibration_of(content, f"{path}: {NO_CALIBRATION}")
@@ -243,9 +298,15 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
     specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]
     stays = np.flatnonzero(whole.stays)
     covariance = np.array(document.covariance, dtype=float)  # None becomes NaN
+    model = compose(document.model, tuple(specs))
+    parameters = np.array([entry.value for entry in document.parameters])[stays]
+    if not model.hold_columns:
+        probes = document.gravity_mps2 * np.concatenate([np.eye(3), -np.eye(3)])
+        if not np.isfinite(model.correct(probes, parameters, document.gravity_mps2)).all(1).any():
+            raise InputError(f"{where}: parameters: with these no force explains any reading")
     return Calibration(
-        model=compose(document.model, tuple(specs)),
-        parameters=np.array([entry.value for entry in document.parameters])[stays],
+        model=model,
+        parameters=parameters,
         covariance=covariance[np.ix_(stays, stays)],
         gravity=document.gravity_mps2,
         content=document.model_dump(),

@@ -45,7 +45,9 @@ def open_source(
     delimiter : str, between the columns of a text, see `LogLayout`
     """
     path = Path(path)
-    if (path / BAG_OF_FOLDER).is_file():
+    with readable(path):
+        is_bag = (path / BAG_OF_FOLDER).is_file()
+    if is_bag:
         return open_bag(path, variable)
     with readable(path):
         if not (path.is_file() or path.is_dir()) and path.stat():

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError, UnknownNameError, printable
 from accelstudy.basics.wording import counted, one_line
 from accelstudy.campaign.importing.clocks import is_stamp, nanoseconds
 from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.files.parquet import whole_parquet
-from accelstudy.files.reading import readable
+from accelstudy.files.reading import Unpacked, readable
 from accelstudy.sensors.conversion import LARGEST
 
 # Slow to import, so where a file needs it: what calibrates a campaign reads no log.
@@ -266,7 +266,7 @@ class TextSource:
     def _open_binary(self) -> BinaryIO:
         with self.path.open("rb") as start:
             packed = start.read(len(GZIP)) == GZIP
-        return cast(BinaryIO, gzip.GzipFile(self.path)) if packed else self.path.open("rb")
+        return cast(BinaryIO, Unpacked(self.path)) if packed else self.path.open("rb")
 
     def _open(self, skipped: int = 0) -> TextIO:
         """Open the file and skip some lines; quotation marks in a header have no meaning."""
@@ -372,7 +372,7 @@ class _Table:
             if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
                 continue
             cells = split_line(text.strip(_blanks(self.delimiter)), self.delimiter)
-            cells = [" ".join(cell.strip("\"'").split()) for cell in cells]
+            cells = [printable(" ".join(cell.strip("\"'").split())) for cell in cells]
             if not units and any(cells) and all(is_unit(cell) for cell in cells if cell):
                 units, self.header = cells, (line.strip(),)
                 continue
@@ -579,7 +579,7 @@ class ParquetSource:
             schema = file.schema_arrow
             first = next(file.iter_batches(1), None)
         self._columns, self._types = schema.names, schema.types
-        self.names = [" ".join(name.split()) for name in schema.names]
+        self.names = [printable(" ".join(name.split())) for name in schema.names]
         self.named = True
         self.layout = layout_by_names(self.names)
         self.dates: Set[int] = {
