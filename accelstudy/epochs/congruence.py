@@ -2,20 +2,26 @@
 
 The differences d of the parameters have the covariance matrix S = C₁ + C₂. With stated noise
 dᵀ S⁻¹ d is χ² distributed if nothing changed (Pelzer 1971). Where sigmas were estimated, each C is
-an estimate by r degrees of freedom. Then dᵀ S⁻¹ d / p is compared with F(p, ν). In the directions
-in which C₁ and C₂ are both diagonal the squares are those of t variables, each with the degrees of
-freedom of Welch and Satterthwaite; ν is that of the F variable with the same mean (Fai & Cornelius
-1996, J. Stat. Comput. Simul. 54, 363).
+an estimate by r degrees of freedom, and dᵀ S⁻¹ d / p is compared with F(p, ν).
+
+How the two variances compare is not known: the problem of Behrens & Fisher. An estimate that is
+small by chance makes dᵀ S⁻¹ d large, and its own share in S small; degrees of freedom by estimated
+shares (Welch & Satterthwaite) then promise certainty where there is none. So ν is that of the F
+variable with the same quantile as dᵀ S⁻¹ d has if the true C are r/χ²(r) times the estimated ones
+(the generalized p-value of Gamage, Mathew & Weerahandi 2004, J. Multivar. Anal. 88, 177). The level
+is kept, or not reached, whatever the variances are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, optimize, stats
+from numpy.typing import NDArray
+from scipy import linalg, optimize, special, stats
+from scipy.stats import qmc
 
 from accelstudy.positions.choice import first_best
 
@@ -25,6 +31,12 @@ LEVEL = 0.05
 """Level of the test, and of the search for what changed as a whole."""
 POWER = 0.8
 """Probability with which a detectable change is found."""
+POINTS = 10
+"""Binary logarithm of the number of variances that are tried for each estimated one."""
+SMALLEST = 1e-300
+"""Probability of which there is a logarithm."""
+NEAR = 1e-7
+"""Relative error of ν and of the quantile that it follows from."""
 ALIKE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
 
@@ -80,13 +92,23 @@ class Epochs:
         p = len(self.differences)
         if not p:
             return Test(0.0, (0, np.inf), 1.0)
+        squares, shares = self._split
+        statistic = float(np.sum(squares)) / p
+        parts = np.array([shares, 1 - shares])
+        nu = dof_of_squares(parts.sum(axis=1), parts @ parts.T, self.dof)
+        return Test(statistic, (p, nu), float(tail(statistic, p, nu)))
+
+    @cached_property
+    def _split(self) -> tuple[Array, Array]:
+        """Squares of the differences, and shares of the first epoch in S, (p,) each.
+
+        They are in directions in which the covariance matrices of both epochs are diagonal.
+        """
         # Parameters may differ in size by many powers of ten.
         size = np.sqrt(np.diag(self.covariance))
         first, second = (c / np.outer(size, size) for c in self.covariances)
         shares, directions = linalg.eigh(first, first + second)
-        statistic = float(np.sum((directions.T @ (self.differences / size)) ** 2)) / p
-        nu = _common_dof(np.clip(shares, 0.0, 1.0), self.dof)
-        return Test(statistic, (p, nu), float(tail(statistic, p, nu)))
+        return (directions.T @ (self.differences / size)) ** 2, np.clip(shares, 0.0, 1.0)
 
     def changed(self) -> tuple[int, ...]:
         """Fewest parameters that changed: all others are congruent, at one level for all.
@@ -116,7 +138,7 @@ class Epochs:
 
     def _explains_most(self, left: Sequence[int]) -> int:
         """Place of the parameter without which the others are the most congruent."""
-        rest = [self.of([i for i in left if i != one]).test().statistic for one in left]
+        rest = [np.sum(self.of([i for i in left if i != one])._split[0]) for one in left]
         return first_best(rest, ALIKE * rest[0])
 
 
@@ -130,20 +152,65 @@ def noncentrality(p: int, nu: float, level: float = LEVEL) -> float:
             return float(stats.ncx2.cdf(limit, p, size)) - (1 - POWER)
         return float(stats.ncf.cdf(limit, p, nu, size)) - (1 - POWER)
 
-    return float(optimize.brentq(missed, 1e-6, 1e4))
+    most = 1e4
+    while missed(most) > 0:
+        most *= 10
+    return float(optimize.brentq(missed, 1e-6, most))
 
 
-def _common_dof(shares: ArrayLike, dof: tuple[float, float]) -> float:
-    """Degrees of freedom ν of F; `shares` (p,) are those of the first epoch in each direction."""
-    a = np.asarray(shares, dtype=float)
-    with np.errstate(divide="ignore"):
-        each = 1 / (a**2 / dof[0] + (1 - a) ** 2 / dof[1])
-    if np.isinf(each).all():
+def dof_of_squares(
+    means: Array, products: Array, dof: Sequence[float] | Array, level: float = LEVEL
+) -> float:
+    """Degrees of freedom ν of F, where squares have variances that were estimated.
+
+    The squares are zᵀ P z with a projector P = Σ Aₖ of the rank f, in which Aₖ has the variance k.
+    With true variances they are zᵀ (Σ Aₖ / uₖ) z, where uₖ ~ χ²(rₖ)/rₖ are the ratios of estimated
+    and true ones. That is taken as a scaled χ² variable of the same mean and variance, for many u.
+
+    Parameters
+    ----------
+    means : (k,) array, traces of Aₖ
+    products : (k, k) array, traces of Aₖ Aₗ
+    dof : k degrees of freedom r of the variances; inf if one was stated
+    level : float, of the quantile that the squares have in common with f times F(f, ν)
+    """
+    inverse = 1 / _ratios(tuple(map(float, dof)))
+    f, mean = float(np.sum(means)), inverse @ means
+    if np.isinf(dof).all():
         return np.inf
-    if each.min() <= 2:  # no mean
-        return float(each.min())
-    mean = np.sum(1 / (1 - 2 / each))
-    return float(2 * mean / (mean - len(a)))
+    scale = np.einsum("nk,kl,nl->n", inverse, products, inverse) / mean
+
+    def too_often(log: float) -> float:
+        """Log of the probability beyond a limit, in parts of the level."""
+        beyond = np.mean(special.gammaincc(mean / scale / 2, np.exp(log) / scale / 2))
+        return float(np.log(max(beyond, SMALLEST) / level))
+
+    least = float(np.log(stats.chi2.isf(level, f)))
+    if too_often(least) <= 0:
+        return np.inf
+    most = least + 1
+    while too_often(most) > 0:
+        most += 2 * (most - least)
+    limit = np.exp(optimize.brentq(too_often, least, most, xtol=NEAR)) / f
+
+    def beyond_that(log: float) -> float:
+        return float(np.log(stats.f.isf(level, f, np.exp(log)) / limit))
+
+    fewest, many = np.log([max(0.1, min(dof) / 4), 1e9])
+    if beyond_that(many) > 0:
+        return np.inf
+    return float(np.exp(optimize.brentq(beyond_that, fewest, many, xtol=NEAR)))
+
+
+@cache
+def _ratios(dof: tuple[float, ...]) -> Array:
+    """Ratios of estimated and true variances, (2**POINTS, k), evenly in their distributions."""
+    points = qmc.Sobol(len(dof), scramble=False).random_base2(POINTS) + 0.5 / 2**POINTS
+    ratios = np.ones_like(points)
+    for k, r in enumerate(dof):
+        if np.isfinite(r):
+            ratios[:, k] = stats.chi2.ppf(points[:, k], r) / r
+    return ratios
 
 
 def tail(statistic: float, p: int, nu: float) -> float:

@@ -4,7 +4,7 @@ A parameter of session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the s
 the sd τ, as by switching off and on, and the noise of the calibration.
 
 * It changes if its squares about the mean are more than noise leaves: χ² with stated noise. Where
-  noise was estimated they follow Johansen (1980, Biometrika 67, 85).
+  noise was estimated the limit allows for it as that of the congruence test (`congruence.py`).
 * It scatters if its squares about the line are.
 * The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
   about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
@@ -30,7 +30,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import Calibrated, Calibration, applicable
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common
-from accelstudy.epochs.congruence import LEVEL, POWER, noncentrality, tail
+from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, noncentrality, tail
 
 Array = NDArray[np.float64]
 
@@ -83,16 +83,15 @@ class Course:
         (rate, sigma), half = self.rate, self.sigmas_95
         return rate - half * sigma, rate + half * sigma
 
-    @property
-    def p_values(self) -> tuple[float, float, float]:
-        """Whether nothing changes, nothing drifts, and nothing scatters."""
+    def p_values(self, level: float = LEVEL) -> tuple[float, float, float]:
+        """Whether nothing changes, nothing drifts, and nothing scatters; exact at some level."""
         rate, sigma = self.rate
         drifts = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
-        return self._exceeds(self.mean), drifts, self._exceeds(self.line)
+        return self._exceeds(self.mean, level), drifts, self._exceeds(self.line, level)
 
     def found(self, level: float) -> tuple[str, ...]:
         """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""
-        change, drift, scatter = (p <= level for p in self.p_values)
+        change, drift, scatter = (p <= level for p in self.p_values(level))
         if not change:
             return ()
         named = {"drifts": drift, "scatters": scatter}
@@ -100,7 +99,7 @@ class Course:
 
     def detectable_rate(self, level: float) -> float:
         """Rate that by itself is found to be a change with a probability of `POWER`."""
-        _, other = self._of_squares(self.mean)
+        other = self._other_dof(self.mean, level)
         # Squares about the mean that a rate of 1 adds.
         each = RandomEffects(self.years, self.variances, self.mean.design).squares(0.0)
         return float(np.sqrt(noncentrality(self.mean.dof, other, level) / each))
@@ -110,10 +109,9 @@ class Course:
 
         Squares are taken as a scaled χ² variable of the same mean and variance.
         """
-        factor, other = self._of_squares(self.mean)
+        other = self._other_dof(self.mean, level)
         f, root, design = self.mean.dof, np.sqrt(self.variances), self.mean.design
-        limit = factor * (stats.chi2.isf(level, f) / f if np.isinf(other)
-                          else stats.f.isf(level, f, other))  # fmt: skip
+        limit = stats.chi2.isf(level, f) if np.isinf(other) else f * stats.f.isf(level, f, other)
         apart = (np.eye(f + 1) - design @ self.mean.combination(0.0)) * root / root[:, None]
         sizes = np.linalg.eigvalsh((apart / self.variances) @ apart.T)[1:] * self.variances.min()
 
@@ -127,16 +125,16 @@ class Course:
             most *= 2
         return float(root.min() * optimize.brentq(missed, 0.0, most))
 
-    def _exceeds(self, fit: RandomEffects) -> float:
+    def _exceeds(self, fit: RandomEffects, level: float) -> float:
         """Probability that noise alone leaves such squares."""
-        factor, other = self._of_squares(fit)
-        return tail(fit.squares(0.0) / factor, fit.dof, other)
+        return tail(fit.squares(0.0) / fit.dof, fit.dof, self._other_dof(fit, level))
 
-    def _of_squares(self, fit: RandomEffects) -> tuple[float, float]:
-        """Factor c and second degrees of freedom ν: squares of noise alone are c F(f, ν)."""
-        leverage = np.einsum("iu,ui->i", fit.design, fit.combination(0.0))
-        a, f = float(np.sum((1 - leverage) ** 2 / self.dof)), fit.dof
-        return f + 2 * a - 6 * a / (f + 2), (f * (f + 2) / (3 * a) if a else np.inf)
+    def _other_dof(self, fit: RandomEffects, level: float) -> float:
+        """Second degrees of freedom ν: squares of noise alone are f F(f, ν)."""
+        root = np.sqrt(self.variances)
+        smooth = fit.design @ fit.combination(0.0) * root / root[:, None]
+        left = np.eye(len(root)) - smooth
+        return dof_of_squares(np.diag(left), left**2, self.dof, level)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,18 +76,18 @@ def history_document(history: History, interval: Interval | None = None) -> dict
                 "value": float(course.line.estimates[0]),
                 "sigma": float(np.sqrt(course.line.covariance[0, 0])),
                 "found": found,
-                "p_value": course.p_values[0],
+                "p_value": course.p_values(h.level)[0],
                 "rate": {
                     "per_year": course.rate[0],
                     "sigma": course.rate[1],
                     "ci95": course.rate_interval,
-                    "p_value": course.p_values[1],
+                    "p_value": course.p_values(h.level)[1],
                     "detectable": course.detectable_rate(h.level),
                 },
                 "scatter": {
                     "sd": course.line.scatter,
                     "ci95": course.line.scatter_interval(),
-                    "p_value": course.p_values[2],
+                    "p_value": course.p_values(h.level)[2],
                     "detectable": course.detectable_scatter(h.level),
                 },
             }

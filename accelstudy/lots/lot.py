@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -9,6 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -141,21 +144,45 @@ def weigh_lot(
     InputError
         If a campaign does not determine the model, or leaves no redundancy.
     """
-    with _processes(cores) as mapped:
+    with _processes(cores, len(campaigns)) as mapped:
         return _weigh_lot(campaigns, model, approach, seed, mapped)
 
 
 @contextmanager
-def _processes(cores: int) -> Iterator[Callable[..., Iterator[Any]]]:
-    """What maps a function over campaigns, in as many processes as there are cores.
+def _processes(cores: int, n: int) -> Iterator[Callable[..., Iterator[Any]]]:
+    """What maps a function over n campaigns, in as many processes as there are cores.
 
     Elsewhere than on Linux processes start anew, with all imports; there is one.
     """
+    cores = min(cores, n)
     if cores == 1 or sys.platform != "linux":
         yield map
         return
-    with ProcessPoolExecutor(cores, mp_context=get_context("fork")) as pool:
-        yield partial(pool.map, chunksize=4)
+    # Workers read from a pipe to which nobody writes. It ends with this process, however that ends,
+    # and so do they; otherwise they would go on, and hold what they share with it.
+    reads, writes = os.pipe()
+    pool = ProcessPoolExecutor(
+        cores, mp_context=get_context("fork"), initializer=_work, initargs=(reads, writes)
+    )
+    try:
+        yield partial(pool.map, chunksize=min(4, -(-n // cores)))
+        pool.shutdown()
+    finally:
+        os.close(writes)
+        pool.shutdown(cancel_futures=True)
+        os.close(reads)
+
+
+def _work(reads: int, writes: int) -> None:
+    """Let a worker end with the process that it works for, which alone answers to Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.close(writes)
+
+    def wait() -> None:
+        os.read(reads, 1)
+        os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
 
 
 def _weigh_lot(

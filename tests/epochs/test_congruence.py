@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy import stats
 
-from accelstudy.epochs.congruence import LEVEL, POWER, Epochs, noncentrality
+from accelstudy.epochs.congruence import LEVEL, POWER, Epochs, dof_of_squares
 
 N = 1000
 STANDARD_ERRORS = 3.3
@@ -37,26 +36,74 @@ def tolerance(share, n=N):
 def test_the_level_is_kept_with_noise_of_any_kind(dof, noise):
     rng = np.random.default_rng(1)
     true = [s**2 * cofactors(rng, n) for s, n in zip(noise, (40, 25), strict=True)]
-    each = zip(differences(rng, sum(true)), *(estimated(rng, r) for r in dof), strict=True)
+    n = 400
+    each = zip(differences(rng, sum(true), n), *(estimated(rng, r, n) for r in dof), strict=True)
     rejected = [not Epochs(d, (v * true[0], w * true[1]), dof).test().congruent for d, v, w in each]
-    assert np.mean(rejected) == pytest.approx(LEVEL, abs=tolerance(LEVEL))
+    assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, n)
+    # Where none of two similar variances is sure the level is not reached; not by far with these.
+    assert np.mean(rejected) >= LEVEL / 2 - tolerance(LEVEL / 2, n)
 
 
-@pytest.mark.parametrize("dof", [np.inf, 15])
-def test_a_detectable_change_is_found_as_often_as_is_said(dof):
-    """With equal designs the test is that of one F variable, whose power is known."""
+def design(n, each):
+    """Derivatives of what n positions say by bias, scale and the angles between the axes.
+
+    With `each` axis by itself, as beside a robot, or by the norm of the force, as by gravity.
+    """
+    k = np.arange(n) + 0.5
+    z, azimuth = 1 - 2 * k / n, np.pi * (1 + np.sqrt(5)) * k
+    f = 9.81 * np.column_stack([*(np.sqrt(1 - z**2) * [np.cos(azimuth), np.sin(azimuth)]), z])
+    axes = np.zeros((n, 3, P))
+    axes[:, :, :3], axes[:, [0, 1, 2], [3, 4, 5]] = np.eye(3), f
+    axes[:, 0, 6], axes[:, 0, 7], axes[:, 1, 8] = f[:, 1], f[:, 2], f[:, 2]
+    return axes.reshape(-1, P) if each else np.einsum("ni,niu->nu", f / 9.81, axes)
+
+
+@pytest.mark.parametrize(("n", "ratio"), [
+    (10, 1.0), (10, 3.0), (10, 0.3), (11, 1.0), (12, 1.0), (12, 10.0), (14, 1.0), (24, 1.0)
+])  # fmt: skip
+def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, ratio):
+    """Their noise is estimated by n − 9 and by 63 degrees of freedom, and may differ by a ratio.
+
+    With degrees of freedom by the estimated shares it was 0.23 with 10 positions, 0.11 with 12.
+    """
+    rng, draws = np.random.default_rng(5), 400
+    sessions = []
+    for rows, sigma in ((design(n, each=False), ratio), (design(24, each=True), 1.0)):
+        solve = np.linalg.pinv(rows)
+        noise = sigma * rng.standard_normal((draws, len(rows)))
+        left = noise - noise @ solve.T @ rows.T
+        variance = np.sum(left**2, axis=1) / (len(rows) - P)
+        sessions.append((noise @ solve.T, solve @ solve.T, variance))
+    (one, q, s), (other, r, t) = sessions
+    rejected = [
+        not Epochs(b - a, (v * q, w * r), (n - P, 63)).test().congruent
+        for a, b, v, w in zip(one, other, s, t, strict=True)
+    ]
+    assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, draws)
+
+
+def test_an_unknown_variance_alone_is_that_of_student():
+    """Closed forms: one epoch alone has F(p, r); so have two that are sure, with r = ∞."""
+    p = np.arange(1, 4)
+    for r in (1.0, 5.0, 40.0):
+        found = [dof_of_squares(np.array([k, 0.0]), np.diag([k, 0.0]), (r, 63.0)) for k in p]
+        np.testing.assert_allclose(found, r, rtol=0.02)
+    assert np.isinf(dof_of_squares(np.ones(2), np.eye(2), (np.inf, np.inf)))
+
+
+@pytest.mark.parametrize(("dof", "least"), [(np.inf, POWER), (63, 0.95 * POWER), (15, 0.7)])
+def test_a_detectable_change_is_found_about_as_often_as_is_said(dof, least):
+    """With equal designs a test that knew of the equal noise would be that of one F variable."""
     rng = np.random.default_rng(2)
     q = cofactors(rng, 40)
     change = np.zeros(P)
-    change[3] = Epochs(change, (q, q), (np.inf, np.inf)).detectable()[3]
-    drawn = differences(rng, 2 * q) + change
-    variances = (estimated(rng, dof) + estimated(rng, dof)) / 2
-    found = [not Epochs(d, (v * q, v * q), (dof, dof)).test().congruent
-             for d, v in zip(drawn, variances, strict=True)]  # fmt: skip
-    size = noncentrality(P, np.inf)
-    nu = 2 * dof
-    expected = POWER if np.isinf(dof) else stats.ncf.sf(stats.f.isf(LEVEL, P, nu), P, nu, size)
-    assert np.mean(found) == pytest.approx(expected, abs=tolerance(expected))
+    change[3] = Epochs(change, (q, q), (dof, dof)).detectable()[3]
+    n = 400
+    drawn = differences(rng, 2 * q, n) + change
+    variances = zip(estimated(rng, dof, n), estimated(rng, dof, n), strict=True)
+    found = [not Epochs(d, (v * q, w * q), (dof, dof)).test().congruent
+             for d, (v, w) in zip(drawn, variances, strict=True)]  # fmt: skip
+    assert least - tolerance(POWER, n) <= np.mean(found) <= POWER + tolerance(POWER, n)
 
 
 def test_the_parameter_that_changed_is_named_and_no_other():

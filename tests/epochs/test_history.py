@@ -47,13 +47,18 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
 
 @pytest.mark.parametrize(("sigmas", "dof"), [
     (UNEQUAL, STATED), (EQUAL, STATED), (UNEQUAL, np.full(6, 15.0)), (EQUAL, np.full(6, 9.0)),
+    (EQUAL, np.array([1.0, 63, 63, 63, 63, 63])), (UNEQUAL, np.array([63.0, 1, 63, 3, np.inf, 2])),
 ])  # fmt: skip
-def test_what_is_not_there_is_found_as_often_as_is_said(sigmas, dof):
+def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     """A change where there is none, and a scatter beside a drift."""
-    still = [c.p_values[0] < LEVEL for c in drawn(1, sigmas, dof=dof)]
-    drifting = [c.p_values[2] < LEVEL for c in drawn(1, sigmas, dof=dof, rate=3.0)]
+    sure = np.isinf(dof).all()
+    n = N if sure else 200
+    still = [c.p_values()[0] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
+    drifting = [c.p_values()[2] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
-        assert np.mean(found) == pytest.approx(LEVEL, abs=tolerance(LEVEL))
+        assert np.mean(found) <= LEVEL + tolerance(LEVEL, n)
+        if sure:
+            assert np.mean(found) >= LEVEL - tolerance(LEVEL, n)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.5, 5.0])
@@ -100,7 +105,7 @@ def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
     for size in (
         {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
     ):  # fmt: skip
-        found = [c.p_values[0] < 0.01 for c in drawn(4, sigmas, dof=dof, **size)]
+        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, dof=dof, **size)]
         # With estimated sigmas, and of the scatter with unequal ones, the distribution is near it.
         assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER) + 0.03)
 
