@@ -36,7 +36,7 @@ UNNAMED = "unknown"
 
 @dataclass(frozen=True)
 class Kind:
-    """A row of the table: what the lots lack, in which shares, and how large it is."""
+    """A row of the table: what the model of a lot lacks, in which share, and how large it is."""
 
     title: str
     choices: Callable[[str, str], list[tuple[str, ...]]] = lambda design, approach: [()]
@@ -160,7 +160,7 @@ def main(lots, seed):
             *(share([one[k] for one in of_kind]) for k in ("odd", "odd wrongly")),
         ])  # fmt: skip
     head = [
-        "what the lot lacks", "λ", "lots", "anything missing", "named rightly", "by the oracle",
+        "what the model lacks", "λ", "lots", "anything missing", "named rightly", "by the oracle",
         "a wrong name",
         "share inside", "sensors rightly", "odd found", "odd wrongly",
     ]  # fmt: skip

@@ -84,8 +84,10 @@ class RandomEffects:
         return most * float(optimize.brentq(lambda x: self.squares(x * most) - squares, 0.0, 1.0))
 
 
-def random_effects(values: Array, variances: Array) -> tuple[float, float, float]:
-    """Mean of values, their additional scatter, and the sigma of the mean.
+def random_effects(
+    values: Array, variances: Array
+) -> tuple[float, float, float, tuple[float, float]]:
+    """Mean of values, their scatter, the sigma of the mean, and the 95 % interval of the scatter.
 
     Parameters
     ----------
@@ -93,6 +95,7 @@ def random_effects(values: Array, variances: Array) -> tuple[float, float, float
     """
     known = np.isfinite(values) & np.isfinite(variances)
     if not known.any():
-        return np.nan, np.nan, np.nan
+        return np.nan, np.nan, np.nan, (np.nan, np.nan)
     fit = RandomEffects(values[known], variances[known], np.ones((known.sum(), 1)))
-    return float(fit.estimates[0]), fit.scatter, float(np.sqrt(fit.covariance[0, 0]))
+    interval = fit.scatter_interval() if fit.dof else (0.0, np.inf)
+    return float(fit.estimates[0]), fit.scatter, float(np.sqrt(fit.covariance[0, 0])), interval

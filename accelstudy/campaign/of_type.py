@@ -88,7 +88,7 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
         raise InputError(f"{path}: no file of a type; `accelstudy lot` writes one, {TYPE_FILE}")
     known = {key: content[key] for key in TYPE_KEYS if key in content}
     read = checked(TypeFile, known, path)
-    if tuple(read.parameters) != model.parameter_names:
+    if {*read.parameters} != {*model.parameter_names}:
         raise InputError(
             f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "
             f"{', '.join(model.parameter_names)}; give --model {path}"

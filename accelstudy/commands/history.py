@@ -100,6 +100,11 @@ def history_command(
         raise InputError("--confidence: a probability, such as 95%, not rms")
     with result_folder(out, HISTORY, calibrations, force) as folder, stage("history"):
         read = [read_calibration(path) for path in calibrations]
+        first: dict[bytes, Path] = {}
+        for path, one in zip(calibrations, read, strict=True):
+            # Noise never repeats: the same numbers are one campaign, whatever the file is called.
+            if (same := first.setdefault(one.parameters.tobytes(), path)) != path:
+                raise InputError(f"{path}: has the numbers of {same}; each campaign counts once")
         given = dates or [one.content["date"] for one in read]
         wheres = ["--date"] * len(dates) or [f"{path}: date" for path in calibrations]
         when = [_date(text, where) for text, where in zip(given, wheres, strict=True)]

@@ -48,7 +48,7 @@ def lot_command(
     cores: int,
     force: bool,
 ) -> None:
-    """Say what sensors of one type lack together.
+    """Say what the model of sensors of one type lacks.
 
     CAMPAIGN are folders, one per sensor, patterns such as 'sensor-*', or the list of a batch (a
     YAML file). They may differ in positions, columns and approach. What one campaign alone cannot
@@ -56,7 +56,7 @@ def lot_command(
     many of the sensors, how large it is, and which sensor is odd.
 
     The folder of results gets report.html, lot.json, a figure, a calibration.json of each sensor
-    with all that the lot lacks, and type.yaml: the model of the type for `--model`, what these
+    with all that the model lacks, and type.yaml: the model of the type for `--model`, what these
     sensors tell of the next one for `--prior`, and a data sheet for `plan --sensor`.
     """
     from accelstudy.approaches import get_approach

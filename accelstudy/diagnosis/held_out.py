@@ -1,8 +1,9 @@
 """Whether a finding holds on positions that were used neither for choosing nor for fitting it.
 
 Held-out positions take no part in choosing or fitting the effect. But a name is only given because
-all positions together, the held-out ones among them, seem to lack something. So if nothing is
-missing and a name is given all the same, the held-out positions support it more often than at 5 %.
+all positions together, the held-out ones among them, seem to have something that the model lacks.
+So if nothing is missing and a name is given all the same, the held-out positions support it more
+often than at 5 %.
 
 The threshold of the statistic is therefore found by simulating the campaign's own design. Noise
 gets a random effect and is weighted back to noise (importance sampling). Of the sets in which

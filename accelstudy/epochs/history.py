@@ -9,6 +9,9 @@ the sd τ, as by switching off and on, and the noise of the calibration.
 * The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
   about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
   2693; exact where all sigmas are equal).
+* That is so if the scatter of each session is independent of that of the others. If instead it adds
+  up from session to session, a random walk with the variance q t, a line is hardly seen in it. The
+  rate is given for that, too: by generalized least squares, with q by the squares, as τ is.
 
 Each of p parameters has the p-th part of the level. What changes is tested further for rate and for
 scatter: one of the two is not zero then, so that the other may take the same part.
@@ -23,7 +26,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import linalg, optimize, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.basics.errors import InputError
@@ -79,9 +82,44 @@ class Course:
 
     @property
     def rate_interval(self) -> tuple[float, float]:
-        """Interval that holds the rate with a probability of 95 %."""
+        """Interval that holds the rate with a probability of 95 %, if sessions are independent."""
         (rate, sigma), half = self.rate, self.sigmas_95
         return rate - half * sigma, rate + half * sigma
+
+    @cached_property
+    def wandering_rate(self) -> tuple[float, float]:
+        """Rate and its sigma, per year, if the parameter walks at random instead of scattering."""
+        design, f = self.line.design, self.line.dof
+        since = self.years - self.years.min()
+        noise, walk = np.diag(self.variances), np.minimum.outer(since, since)
+        # Contrasts without value and rate, of which the noise is white and the walk diagonal.
+        free = linalg.null_space((design * [1.0, 1 / np.ptp(since)]).T)
+        sizes, turned = linalg.eigh(free.T @ walk @ free, free.T @ noise @ free)
+        squares = (turned.T @ (free.T @ self.values)) ** 2
+
+        def too_many(q: float) -> float:
+            return float(np.sum(squares / (1 + q * np.maximum(sizes, 0.0)))) - f
+
+        q = 0.0
+        if too_many(0.0) > 0:
+            most = 1 / float(sizes.max())
+            while too_many(most) > 0:
+                most *= 4
+            q = optimize.brentq(too_many, 0.0, most)
+        weighted = np.linalg.solve(noise + q * walk, design).T
+        covariance = np.linalg.inv(weighted @ design)
+        return float((covariance @ weighted @ self.values)[1]), float(np.sqrt(covariance[1, 1]))
+
+    @property
+    def wandering_interval(self) -> tuple[float, float]:
+        """Interval of the rate as `rate_interval`, if the parameter walks at random."""
+        (rate, sigma), half = self.wandering_rate, self.sigmas_95
+        return rate - half * sigma, rate + half * sigma
+
+    def may_wander(self, level: float) -> bool:
+        """Whether a random walk without any rate would explain it as well, at some level."""
+        rate, sigma = self.wandering_rate
+        return abs(rate) <= float(stats.t.isf(level / 2, self.line.dof)) * sigma
 
     def p_values(self, level: float = LEVEL) -> tuple[float, float, float]:
         """Whether nothing changes, nothing drifts, and nothing scatters; exact at some level."""

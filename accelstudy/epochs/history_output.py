@@ -32,12 +32,14 @@ GRID = 50
 
 def history_said(history: History, interval: Interval | None = None) -> list[str]:
     """Say what drifts and what scatters; the verdict comes first."""
-    rates, scatters, others = [], [], []
+    rates, scatters, others, unsure = [], [], [], []
     for course, parameter, found in zip(
         history.courses, history.parameters, history.found, strict=True
     ):
         if "drifts" in found:
             rates.append(change_of(parameter, *course.rate))
+            if course.may_wander(history.level):
+                unsure.append(change_of(parameter, *course.wandering_rate))
         if "scatters" in found:
             size = estimate(course.line.scatter, course.line.scatter, parameter.unit)[1]
             scatters.append(f"{parameter.name} by {size} {shown_unit(parameter.unit)}".strip())
@@ -48,7 +50,15 @@ def history_said(history: History, interval: Interval | None = None) -> list[str
         largest(history.parameters, [c.detectable_scatter(history.level) for c in history.courses]),
     ]
     return lines(
-        "epochs/wording.txt.j2", "history", history, rates, scatters, others, least, interval
+        "epochs/wording.txt.j2",
+        "history",
+        history,
+        rates,
+        unsure,
+        scatters,
+        others,
+        least,
+        interval,
     )
 
 
@@ -81,6 +91,7 @@ def history_document(history: History, interval: Interval | None = None) -> dict
                     "per_year": course.rate[0],
                     "sigma": course.rate[1],
                     "ci95": course.rate_interval,
+                    "ci95_wandering": course.wandering_interval,
                     "p_value": course.p_values(h.level)[1],
                     "detectable": course.detectable_rate(h.level),
                 },

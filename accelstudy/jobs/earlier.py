@@ -144,8 +144,12 @@ def _check_folder(folder: Path, kind: Kind) -> None:
             _check_file(folder / name)
         except InputError:
             raise InputError(f"{folder}: {name} is damaged; {REMEDY}") from None
-    if not (folder / kind.marker).is_file():
-        raise InputError(f"{folder}: {kind.marker} is missing; {REMEDY}")
+    needed = [kind.marker]
+    if kind.marker.endswith(".json") and (folder / kind.marker).is_file():
+        needed += json.loads((folder / kind.marker).read_bytes()).get("files", [])
+    for file in needed:
+        if not (folder / file).is_file():
+            raise InputError(f"{folder}: {file} is missing; {REMEDY}")
 
 
 def _check_file(path: Path) -> None:

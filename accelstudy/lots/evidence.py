@@ -227,7 +227,7 @@ def mean_sensor(
 ) -> tuple[Campaign, LotNoise] | None:
     """Average sensors that were in the same positions and conditions, in one order.
 
-    What all of them lack is as large in their mean, and the noise is smaller by the root of their
+    What all of them have is as large in their mean, and the noise is smaller by the root of their
     number. It is told by their scatter about the mean. None if the positions differ.
     """
     if (n := len(campaigns)) < 2:

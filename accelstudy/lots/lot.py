@@ -1,4 +1,4 @@
-"""What a lot lacks: whether anything, what, in how many of its sensors, and which ones are odd."""
+"""What the model of a lot lacks: whether anything, what, in how many sensors, and which are odd."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 LEFT = 0.01
-"""Level of the test whether a lot lacks more than what was found."""
+"""Level of the test whether the model of a lot lacks more than what was found."""
 PASSES = 3
 """Most times that what was found is added to the model."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lot:
-    """What a lot lacks.
+    """What the model of a lot lacks.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Lot:
         ]
 
     def each(self) -> list[tuple[str, tuple[str, ...], float]]:
-        """Campaign, names of what it lacks under the lot, and their posterior, for each sensor."""
+        """Campaign, names of what the model lacks for it, and their posterior, for each sensor."""
         told = {found.names[0] for found, _ in self.effects}
         rows = []
         for i, sensor in enumerate(self.sensors):
@@ -129,7 +129,7 @@ def weigh_lot(
     seed: int = 1,
     cores: int = 1,
 ) -> Lot:
-    """Say what sensors of one type lack together.
+    """Say what the model of sensors of one type lacks, by all of them together.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _weigh_lot(
         models: Sequence[SensorModel | None], with_: SensorModel, noise: LotNoise | None
     ) -> Pass:
         n = len(campaigns)
-        seeds = range(seed, seed + n)
+        seeds, of_its_own = range(seed, seed + n), seed - 1 if seed else n
         each = mapped(sensor_evidence, campaigns, models, [approach] * n, seeds, [noise] * n)
         sensors, anything = [], Anything()
         # What noise alone would say is most of what a sensor gives, and is not kept.
@@ -216,7 +216,7 @@ def _weigh_lot(
             of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
         if of_mean is not None:
             with suppress(InputError):  # the positions do not determine the model
-                mean, _ = sensor_evidence(of_mean[0], with_, approach, seed - 1, of_mean[1])
+                mean, _ = sensor_evidence(of_mean[0], with_, approach, of_its_own, of_mean[1])
         joint = together([sensors[k] for k in usual])
         # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
         kept = tuple(replace(sensor, shown={}) for sensor in sensors)
@@ -345,10 +345,23 @@ def calibrations(
     return fits
 
 
+def variances(lot: Lot, fit: CampaignFit) -> Array:
+    """Variances of the parameters of a sensor, (u,), SI, by what all sensors tell of its noise.
+
+    Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
+    would look like scatter of the parameters.
+    """
+    own, noise = fit.sigma**2, lot.passes[-1].noise
+    if fit.trusts_sigma or noise is None:
+        return own
+    r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
+    return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
+
+
 def with_sizes(
     lot: Lot, fits: Sequence[CampaignFit | InputError], model: SensorModel
 ) -> list[Found]:
-    """Find the sizes of what the lot lacks.
+    """Find the sizes of what the model of the lot lacks.
 
     Parameters
     ----------
@@ -359,12 +372,14 @@ def with_sizes(
     values, sigmas = np.full((2, len(fits), lot.model.n_parameters), np.nan)
     for i, fit in enumerate(fits):
         if isinstance(fit, CampaignFit):
-            values[i], sigmas[i] = fit.parameters, fit.sigma
-    lacks, first, results = lot.each(), model.n_parameters, []
+            values[i], sigmas[i] = fit.parameters, np.sqrt(variances(lot, fit))
+    odd = {one.campaign for one in lot.odd}
+    each, first, results = lot.each(), model.n_parameters, []
     for found, spec in lot.effects:
         sizes = []
         if spec is not None:
-            rows = np.array([found.names[0] in names for _, names, _ in lacks])
+            rows = np.array([found.names[0] in names and campaign not in odd
+                             for campaign, names, _ in each])  # fmt: skip
             for j, p in enumerate(compose(spec, (spec,)).parameters, start=first):
                 of_type = random_effects(values[rows, j], sigmas[rows, j] ** 2)
                 sizes.append(Size(p.name, p.unit, *of_type, values[:, j], sigmas[:, j]))

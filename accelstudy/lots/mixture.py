@@ -1,14 +1,14 @@
-"""The mixture of a lot: which effects its sensors lack, how many of them do, and which ones.
+"""The mixture of a lot: which effects its model lacks, how many sensors have them, and which.
 
-An effect k of the lot is missing in each sensor with the probability ρ_k, its share: 1 in every
-second lot a priori, and uniform in the others. Effects are missing independently of each other. A
-set Z of effects of the lot has the evidence
+Each sensor has an effect k of the lot, which the model lacks, with the probability ρ_k, its share:
+1 in every second lot a priori, and uniform in the others. It has effects independently of each
+other. A set Z of effects of the lot has the evidence
 
     B_Z = ∫ Π_i [(1 − ε) Σ_{s ⊆ Z} Π_{k ∈ s} ρ_k Π_{k ∈ Z∖s} (1 − ρ_k) r_i(s) + ε r̄_i] dρ,
 
 with r_i(s) the odds of the campaign of sensor i for the set s against nothing, and r̄_i their mean
-over all that could be missing: a sensor may be odd, and then lack something of its own. Sets have
-up to three effects, and a sensor lacks up to two of them.
+over all that could be missing: a sensor may be odd, and then have something of its own. Sets have
+up to three effects, and a sensor has up to two of them.
 
 The r_i take the sizes of the sensors for independent. An effect may as well be the same in all of
 them: then the evidence is that of all campaigns as one, and either is equally probable a priori. If
@@ -37,9 +37,9 @@ Names = tuple[int, ...]
 ODD = 0.01
 """Prior probability that a sensor is odd."""
 MISSING = 0.5
-"""Prior probability that the lot lacks anything."""
+"""Prior probability that the model of the lot lacks anything."""
 ALL = 0.5
-"""Prior probability that an effect of the lot is missing in all of its sensors."""
+"""Prior probability that all sensors have an effect of the lot."""
 ALIKE = 0.5
 """Prior probability that an effect is equally large in all sensors."""
 MORE = 0.3
@@ -130,7 +130,7 @@ class Mixture:
 
     @property
     def missing(self) -> float:
-        """Posterior probability that the lot lacks anything."""
+        """Posterior probability that the model of the lot lacks anything."""
         return 1 - sum(p for one, p in zip(self.sets, self.probabilities, strict=True)
                        if not one.names)  # fmt: skip
 
@@ -148,7 +148,7 @@ class Mixture:
         return float(sum(p for one, p in each if {*one.names} & {*places}))
 
     def share(self, k: int) -> tuple[float, float, float]:
-        """Share of the sensors that lack an effect: mean, and the interval that holds 95 %."""
+        """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""
         grid, density = np.linspace(0, 1, 401), np.zeros(401)
         for one, p in zip(self.sets, self.probabilities, strict=True):
             if k in one.names and p > LEAST:
@@ -169,35 +169,35 @@ class Mixture:
 
     @cached_property
     def sensors(self) -> tuple[dict[Names, Array], Array]:
-        """Posterior of each sensor to lack a set of effects, {set: (n,)}, and to be odd, (n,)."""
+        """Posterior of each sensor to have a set of effects, {set: (n,)}, and to be odd, (n,)."""
         n = len(self.odds)
-        lacks: dict[Names, Array] = {}
+        of_sets: dict[Names, Array] = {}
         odd = np.zeros(n)
         for one, p in zip(self.sets, self.probabilities, strict=True):
             if p < LEAST:
                 continue
             of_set, odd_in_set = self.sensors_under(one.names)
             for subset, mass in of_set.items():
-                lacks[subset] = lacks.get(subset, np.zeros(n)) + p * mass
+                of_sets[subset] = of_sets.get(subset, np.zeros(n)) + p * mass
             odd += p * odd_in_set
-        return lacks, odd
+        return of_sets, odd
 
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
-        """Return what `sensors` has, if the lot lacks some effects."""
+        """Return what `sensors` has, if the model of the lot lacks some effects."""
         weights = np.ravel(self._posterior(names)[1])
-        lacks: dict[Names, list[Array]] = {}
+        of_sets: dict[Names, list[Array]] = {}
         odd = []
         for parts, strange in self._parts(names, self._judging(names)):
             total = np.logaddexp.reduce([*parts.values(), strange])
             for subset, log in parts.items():
                 mass = np.exp(log - total).reshape(len(log), -1) @ weights
-                lacks.setdefault(subset, []).append(mass)
+                of_sets.setdefault(subset, []).append(mass)
             odd.append(np.exp(strange - total).reshape(len(strange), -1) @ weights)
-        each = {subset: np.concatenate(masses) for subset, masses in lacks.items()}
+        each = {subset: np.concatenate(masses) for subset, masses in of_sets.items()}
         return each, np.concatenate(odd)
 
-    def lacking(self, k: int) -> Array:
-        """Posterior of each sensor to lack an effect, (n,)."""
+    def having(self, k: int) -> Array:
+        """Posterior of each sensor to have an effect, (n,)."""
         return np.asarray(sum((p for names, p in self.sensors[0].items() if k in names),
                               np.zeros(len(self.odds))))  # fmt: skip
 
@@ -302,7 +302,7 @@ def _nodes(size: int) -> tuple[Array, Array]:
 
 
 def _log_of_rest(share: Array) -> Array:
-    """Log of the share that does not lack an effect, −inf where all do."""
+    """Log of the share that does not have an effect, −inf where all do."""
     with np.errstate(divide="ignore"):
         return np.log1p(-share)
 
@@ -319,7 +319,7 @@ def _log_weights(size: int) -> Array:
 class Anything:
     """The test whether anything is missing in a lot, to which sensors are added one by one.
 
-    The statistic is the evidence that one effect is missing in a share of the sensors. Lots of
+    The statistic is the evidence that a share of the sensors has one effect. Lots of
     simulated noise say how large it is if nothing is missing.
 
     Attributes

@@ -46,7 +46,7 @@ EACH = "each"
 
 
 def said(lot: Lot, found: Sequence[Found], tilt: Array | None) -> list[str]:
-    """Say what the lot lacks, what it is worth, and which sensors are odd; the verdict is first."""
+    """Say what the model lacks, what it is worth, which sensors are odd; the verdict is first."""
     alternatives = [
         f"{' or '.join(map(shown, names[:3]))} ({probability(p)})" for names, p in lot.alternatives
     ]
@@ -102,6 +102,7 @@ def lot_document(
                         "name": size.name,
                         "mean": json_number(size.mean),
                         "scatter": json_number(size.scatter),
+                        "scatter_ci95": [json_number(bound) for bound in size.scatter_ci95],
                         "sigma": json_number(size.sigma),
                         "unit": size.unit,
                     }
@@ -189,12 +190,14 @@ def write_lot(
         figures=drawn,
         next_steps=steps,
     )
+    files = (path for path in folder.rglob("*") if path.is_file())
+    content["files"] = sorted(path.relative_to(folder).as_posix() for path in files)
     write_json(folder / "lot.json", content)
     return content
 
 
 def sensors_figure(lot: Lot, found: Sequence[Found]) -> Figure:
-    """Draw what each sensor has of what the lot lacks, with 95 % intervals, a parameter a row."""
+    """Draw what each sensor has of what the model lacks, with 95 % intervals, a parameter a row."""
     sizes = [size for f in found for size in f.sizes]
     figure = new_figure(FULL, 24 + 30 * max(len(sizes), 1))
     panels = figure.subplots(max(len(sizes), 1), 1, sharex=True, squeeze=False)[:, 0]

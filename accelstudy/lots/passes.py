@@ -34,7 +34,7 @@ its noise, and half by the noise of the type."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 FEW = 0.1
-"""Share of the sensors up to which what they lack makes them odd, and is no matter of the type."""
+"""Share of the sensors up to which what they have makes them odd, and is no matter of the type."""
 RIVAL = 0.02
 """Least posterior of what may be there in place of something else."""
 CERTAIN = 0.95
@@ -53,13 +53,13 @@ WEIGHTS = {
     AXES: priors.AXES,
     TAILS: priors.TAILS,
 }
-"""Prior weights of what a lot may lack, relative to one effect of the catalogue."""
+"""Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
 ODD = "odd"
-"""Name of what a sensor lacks that the others do not."""
+"""Name of what a sensor has that the model and the other sensors have not."""
 NEVER = -30.0
 """Log odds of what cannot be."""
 HAS = 0.5
-"""Posterior probability from which a sensor counts among those that lack an effect."""
+"""Posterior probability from which a sensor counts among those that have an effect."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class Size:
     name, unit : str, SI
     mean, scatter : float, of the type
     sigma : float, of the mean
+    scatter_ci95 : tuple of two floats, interval that holds the scatter with a probability of 95 %
     each, sigma_each : (n,) arrays, of the sensors; NaN where a campaign cannot show it
     """
 
@@ -79,18 +80,19 @@ class Size:
     mean: float
     scatter: float
     sigma: float
+    scatter_ci95: tuple[float, float]
     each: Array
     sigma_each: Array
 
 
 @dataclass(frozen=True)
 class Found:
-    """Something that the lot lacks.
+    """Something that the model of the lot lacks.
 
     Attributes
     ----------
     names : tuple of str, the names that mean the same in this lot
-    posterior : float, given that the lot lacks anything
+    posterior : float, given that the model lacks anything
     share : float, of the sensors
     share_ci95 : tuple of two floats
     sizes : tuple of Size, of an effect
@@ -105,7 +107,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Odd:
-    """A sensor that lacks what the others do not."""
+    """A sensor with an effect that neither the model nor the other sensors have."""
 
     campaign: str
     posterior: float
@@ -252,7 +254,7 @@ class Pass:
 
     @cached_property
     def wrong(self) -> float:
-        """Posterior probability that the lot lacks anything, or that a sensor is odd."""
+        """Posterior probability that the model lacks anything, or that a sensor is odd."""
         mixture = self.mixture
         nothing = 1 - mixture.missing
         none_odd = np.prod(1 - mixture.sensors_under(())[1]) if nothing > 0 else 1.0
@@ -262,7 +264,7 @@ class Pass:
     def found(self) -> list[tuple[int, Found]]:
         """What is missing and has a name that is sure enough, with its place in `classes`.
 
-        What few sensors lack makes these odd.
+        What few sensors have makes these odd.
         """
         if not self.missing:
             return []
@@ -301,14 +303,14 @@ class Pass:
 
     @cached_property
     def _rare(self) -> NDArray[np.bool_]:
-        """Whether few sensors lack it, if it is one of the lot, (K,)."""
+        """Whether few sensors have it, if it is one of the lot, (K,)."""
         of = np.maximum(self.mixture.of_effects, 1e-300)
-        surely = [np.sum(self.mixture.lacking(k) > HAS * of[k]) for k in range(len(of))]
+        surely = [np.sum(self.mixture.having(k) > HAS * of[k]) for k in range(len(of))]
         return np.array(surely) <= self._few
 
     @property
     def _few(self) -> float:
-        """Sensors up to which what they lack makes them odd."""
+        """Sensors up to which what they have makes them odd."""
         return max(1, FEW * len(self.sensors))
 
     @property
@@ -320,8 +322,8 @@ class Pass:
     @cached_property
     def odd(self) -> list[Odd]:
         """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly."""
-        lacks, odd = self.mixture.sensors
-        alone = sum((p for names, p in lacks.items() if any(self._rare[k] for k in names)), odd)
+        of_sets, odd = self.mixture.sensors
+        alone = sum((p for names, p in of_sets.items() if any(self._rare[k] for k in names)), odd)
         # Sensors of which nobody doubts it stay in their order.
         order = np.argsort(-np.round(alone, 3), kind="stable")
         wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)
@@ -349,10 +351,10 @@ class Pass:
 
     @cached_property
     def each(self) -> list[tuple[tuple[str, ...], float]]:
-        """Names of what a sensor lacks under the lot, and their posterior, for each sensor."""
-        lacks, odd = self.mixture.sensors
-        sets = [*lacks]
-        table = np.array([*lacks.values(), odd])
+        """Names of what the model lacks for a sensor, and their posterior, for each sensor."""
+        of_sets, odd = self.mixture.sensors
+        sets = [*of_sets]
+        table = np.array([*of_sets.values(), odd])
         rows = []
         for i, k in enumerate(table.argmax(axis=0)):
             names = (ODD,) if k == len(sets) else tuple(self.classes[c][0] for c in sets[k])
@@ -367,7 +369,7 @@ class Pass:
                 specs[k] = self._shapes(names)[names.index(k)]
                 continue
             counted: dict[str, float] = {}
-            for each, weight in zip(self.sensors, self.mixture.lacking(k), strict=True):
+            for each, weight in zip(self.sensors, self.mixture.having(k), strict=True):
                 if (spec := each.specs.get(self.classes[k][0])) is not None:
                     counted[spec] = counted.get(spec, 0.0) + float(weight)
             if counted:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -56,12 +56,12 @@ def evaluate_lot(
     place: str | Path = "",
     left_out: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Say what sensors of one type lack together, calibrate each of them, and write all of it.
+    """Say what the model of sensors of one type lacks, calibrate each of them, and write all of it.
 
     Parameters
     ----------
     campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
-        numbers behind it
+        numbers behind it, and those of one log count once
     folder : path, to write to
     place : path of the results, for the commands that the page gives
     left_out : mapping of campaigns that could not be read to what is wrong with them; what cannot
@@ -78,34 +78,51 @@ def evaluate_lot(
         If fewer than two campaigns can be judged.
     """
     usable, without = [], dict(left_out or {})
-    names = Counter(campaign.name for campaign in campaigns)
-    for number, given in enumerate(campaigns, start=1):
-        name = given.name if names[given.name] == 1 else f"{given.name} ({number})"
+    names, first = (
+        _own_names([campaign.name for campaign in campaigns], without),
+        dict[bytes, str](),
+    )
+    for given, name in zip(campaigns, names, strict=True):
         campaign = replace(given, name=name)
+        # Noise never repeats: the same numbers are the same log, whatever its folder.
+        if (same := first.setdefault(campaign.forces.tobytes(), name)) != name:
+            without[name] = f"{name}: has the readings of {same}; each sensor counts once"
+            continue
         try:
             fit_base(campaign, model, approach or usual_approach(campaign))
             usable.append(campaign)
         except InputError as error:
             without[campaign.name] = str(error)
-    for name, why in without.items():
-        say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
     if len(usable) < FEWEST:
         why = next(iter(without.values()), "")
         raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
+    for name, why in without.items():
+        say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
     lot = weigh_lot(usable, model, approach, seed, cores)
     fits = calibrations(lot, usable, approach)
     found = with_sizes(lot, fits, model)
-    lacks = any(spec is not None for _, spec in lot.effects)
+    named = any(spec is not None for _, spec in lot.effects)
     return write_lot(
         lot,
         found,
         fits,
-        worth(lot.usual(fits), model) if lacks else None,
+        worth(lot.usual(fits), model) if named else None,
         approach or usual_approach(usable[0]),
         folder,
         place,
         without,
     )
+
+
+def _own_names(given: Sequence[str], others: Collection[str]) -> list[str]:
+    """Names of campaigns, no two alike: of equal ones each gets a number behind it."""
+    names: list[str] = []
+    for number, name in enumerate(given, start=1):
+        if given.count(name) > 1 or name in others:
+            numbered = (f"{name} ({k})" for k in count(number))
+            name = next(one for one in numbered if one not in {*given, *others, *names})
+        names.append(name)
+    return names
 
 
 def run_lot(

@@ -18,7 +18,7 @@ from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import DataSheet
 from accelstudy.effects import Effect
 from accelstudy.files.outputs import whole_file
-from accelstudy.lots.lot import Lot
+from accelstudy.lots.lot import Lot, variances
 from accelstudy.sensors.models import compose
 
 SHEET = {
@@ -74,15 +74,15 @@ def _typical(
     lot: Lot, lasting: Sequence[Effect], fits: Sequence[CampaignFit]
 ) -> dict[str, TypicalParameter]:
     """Mean and scatter of each parameter; of an effect, over the sensors that have it."""
-    lacks = {campaign: names for campaign, names, _ in lot.each()}
+    each = {campaign: names for campaign, names, _ in lot.each()}
     rows: dict[str, NDArray[np.bool_]] = {}
     for found, spec in lot.effects:
         if spec is not None:
-            has = np.array([found.names[0] in lacks[fit.campaign.name] for fit in fits])
+            has = np.array([found.names[0] in each[fit.campaign.name] for fit in fits])
             rows |= dict.fromkeys(compose(spec, (spec,)).parameter_names, has)
     everyone = np.ones(len(fits), dtype=bool)
     values = np.array([fit.parameters for fit in fits])
-    variances = np.array([fit.sigma**2 for fit in fits])
+    squares = np.array([variances(lot, fit) for fit in fits])
     typical = {}
     wanted = {parameter for effect in lasting for parameter in effect.parameters}
     for j, parameter in enumerate(lot.model.parameters):
@@ -91,7 +91,7 @@ def _typical(
         told = rows.get(parameter.name, everyone)
         # Where no campaign of those that have it could be calibrated, the others tell of it.
         has = told if told.any() else everyone
-        of_type = RandomEffects(values[has, j], variances[has, j], np.ones((has.sum(), 1)))
+        of_type = RandomEffects(values[has, j], squares[has, j], np.ones((has.sum(), 1)))
         some = of_type.dof > 0
         typical[parameter.name] = TypicalParameter(
             mean=float(of_type.estimates[0]),

@@ -290,8 +290,11 @@ def test_the_campaigns_of_a_type_are_evaluated_together(tmp_path):
     page = (tmp_path / "results/b/lot/report.html").read_text(encoding="utf-8")
     assert "Which campaigns are not in the lot?" in page
     assert jobs(succeed(tmp_path, config, "--dry-run")) == {}
-    (tmp_path / "results/b/lot/lot.json").unlink()
-    assert run(tmp_path, config).returncode != 0
+    for name in ("type.yaml", "lot.json"):
+        (tmp_path / "results/b/lot" / name).unlink()
+        said = run(tmp_path, config)
+        assert said.returncode != 0
+        one_line(said.stdout, f"results/b/lot: {name} is missing; delete it")
 
 
 # --- public data ---------------------------------------------------------------------------------

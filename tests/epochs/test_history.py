@@ -41,7 +41,10 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
     for _ in range(n):
         values = 5 + rate * DATES + scatter * rng.standard_normal(6)
         values += sigmas * rng.standard_normal(6)
-        variances = np.ones(6) if np.isinf(dof).all() else rng.chisquare(dof) / dof
+        sure = np.isinf(dof)
+        variances = np.where(
+            sure, 1.0, rng.chisquare(np.where(sure, 1.0, dof)) / np.where(sure, 1, dof)
+        )
         yield Course(DATES, values, sigmas**2 * variances, dof)
 
 
@@ -77,6 +80,30 @@ def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     assert held >= 0.95 - tolerance(0.05)
     if scatter == 5:
         assert held == pytest.approx(0.95, abs=tolerance(0.05))
+
+
+@pytest.mark.parametrize("n_sessions", [5, 10])
+def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
+    """Independent scatter is what the usual interval takes it for: it holds far too seldom."""
+    rng = np.random.default_rng(6)
+    years = np.linspace(-3, 0, n_sessions)
+    ones, rate, level, n = np.ones(n_sessions), 0.4, LEVEL / 9, 300
+    usual, wandering, named = 0, 0, []
+    for _ in range(n):
+        walk = 100 * np.sqrt(np.diff(years)) * rng.standard_normal(n_sessions - 1)
+        values = rate * years + np.append(0, np.cumsum(walk)) + rng.standard_normal(n_sessions)
+        course = Course(years, values, ones, np.inf * ones)
+        usual += course.rate_interval[0] < rate < course.rate_interval[1]
+        wandering += course.wandering_interval[0] < rate < course.wandering_interval[1]
+        if "drifts" in course.found(level):
+            named.append(course.may_wander(level))
+    # Beside a walk that is this large noise is nothing, and the interval exact.
+    assert wandering / n == pytest.approx(0.95, abs=tolerance(0.05, n))
+    assert usual / n <= 0.8
+    # That a drift may be none is said of nearly all that are named, and of no strong one.
+    assert np.mean(named) >= 0.8
+    strong = Course(years, 1000 * years + rng.standard_normal(n_sessions), ones, np.inf * ones)
+    assert not strong.may_wander(level)
 
 
 @pytest.mark.parametrize("true", [None, "drifts", "scatters"])
@@ -160,6 +187,8 @@ def test_bad_input_ends_in_one_line(tmp_path):
     paths = [tmp_path / f"{k}.json" for k in range(3)]
     for k, path in enumerate(paths):
         write_document(path, k + 1)
+    copy = tmp_path / "copy.json"
+    copy.write_bytes(paths[0].read_bytes())
     other = tmp_path / "other.json"
     write_document(other, 4, model="quadratic_scale", scheme="fibonacci-30")
     for given, said in (
@@ -171,6 +200,7 @@ def test_bad_input_ends_in_one_line(tmp_path):
         (arguments(paths, [*YEARS[:2], "0202-01-01"]), "--date: 0202-01-01: the year must be"),
         ([*arguments(paths, YEARS[:3]), "--confidence=rms"], "--confidence: a probability"),
         (arguments([*paths[:2], paths[0]], YEARS[:3]), f"{paths[0]}: is given twice"),
+        (arguments([*paths[:2], copy], YEARS[:3]), f"{copy}: has the numbers of {paths[0]}"),
         (arguments([*paths, other], YEARS[:4]), "calibration 4 (session-4): effects: none in"),
     ):
         line = refusal("history", *given, "--out", tmp_path / "out")

@@ -29,6 +29,7 @@ from accelstudy.lots.lot import Lot, weigh_lot
 from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Anything, Mixture
 from accelstudy.lots.noise import LotNoise
 from accelstudy.lots.passes import LEVEL, Pass
+from accelstudy.lots.run import _own_names
 from accelstudy.lots.sizes import Told, TypeSizes
 from accelstudy.sensors.models import get_model
 
@@ -126,7 +127,7 @@ def test_probabilities_of_sensors_are_right():
     for _ in range(40):
         lacks = rng.random(20) < (1.0 if rng.random() < ALL else rng.random())
         odds = odds_of(shown_by(rng, np.column_stack([lacks, np.zeros(20)])))
-        said += Mixture.of(odds, {}, np.array([0.5, 0.5])).lacking(0).tolist()
+        said += Mixture.of(odds, {}, np.array([0.5, 0.5])).having(0).tolist()
         true += lacks.tolist()
     for low, high in ((0.0, 0.2), (0.2, 0.6), (0.6, 0.9), (0.9, 1.0)):
         chosen = (np.array(said) >= low) & (np.array(said) < high)
@@ -183,7 +184,7 @@ def test_sizes_of_the_type_say_which_sensors_have_it(scatter):
         of_type = TypeSizes.of(each, ("base_tilt",), range(20)).of_set(("base_tilt",))
         known = {(0,): of_type}
         mixture = Mixture.of(np.zeros((20, 1)), {}, np.ones(1), {(0,): 50.0}, known.get)
-        said += mixture.lacking(0).tolist()
+        said += mixture.having(0).tolist()
         true += lacks.tolist()
         _, low, high = mixture.share(0)
         inside.append(low <= share <= high)
@@ -279,16 +280,55 @@ def test_the_mean_of_sensors_has_their_noise_over_the_root_of_their_number():
     assert mean_sensor([replace(made[0], time=None), *made[1:]], each) is None
 
 
+def test_equal_positions_may_be_weighed_with_the_seed_zero():
+    weighed = weigh_lot(campaigns(3), get_model("bias-scale-nonorthogonality"), seed=0)
+    assert weighed.passes[0].mean is not None
+
+
+def test_names_of_campaigns_are_their_own():
+    given = ["a", "a", "a (2)", "b"]
+    assert _own_names(given, ["b"]) == ["a (1)", "a (3)", "a (2)", "b (4)"]
+
+
+def test_a_log_counts_once_whatever_its_folder(tmp_path):
+    one, other = campaigns(2)
+    for name, made in (("one", one), ("copy", replace(one, name="copy")), ("other", other)):
+        write_campaign(made, tmp_path / name)
+    said = refusal("lot", tmp_path / "one", tmp_path / "copy", "--out", tmp_path / "lot")
+    assert said == "error: copy: has the readings of s0; each sensor counts once\n"
+    given = [tmp_path / name for name in ("one", "copy", "other")]
+    succeed("lot", *given, "--out", tmp_path / "lot")
+    content = json.loads((tmp_path / "lot/lot.json").read_text(encoding="utf-8"))
+    assert content["sensors"] == 2
+    assert [left["campaign"] for left in content["left_out"]] == ["copy"]
+    assert {"type.yaml", "report.html"} <= {*content["files"]}
+
+
 def test_the_scatter_of_a_type_is_found():
     """Mean and scatter of many sensors with known ones, and a single sensor."""
     rng = np.random.default_rng(6)
     sigmas = rng.uniform(0.5, 1.5, 2000)
     values = 3 + rng.normal(0, 0.8, 2000) + sigmas * rng.standard_normal(2000)
-    mean, scatter, sigma = random_effects(values, sigmas**2)
+    mean, scatter, sigma, (low, high) = random_effects(values, sigmas**2)
+    assert low < scatter < high
     assert mean == pytest.approx(3, abs=STANDARD_ERRORS * sigma)
     assert scatter == pytest.approx(0.8, abs=0.1)
-    assert random_effects(np.array([2.0, np.nan]), np.array([0.25, 0.25])) == (2.0, 0.0, 0.5)
-    assert np.isnan(random_effects(np.array([]), np.array([]))).all()
+    assert random_effects(np.array([2.0, np.nan]), np.array([0.25, 0.25])) == (
+        2.0, 0.0, 0.5, (0.0, np.inf)
+    )  # fmt: skip
+    assert np.isnan(random_effects(np.array([]), np.array([]))[0])
+
+
+def test_the_interval_of_a_scatter_holds_it():
+    """Fifty sensors whose sigmas are three times their scatter, as in the tutorial."""
+    rng = np.random.default_rng(8)
+    n, held, true = 400, 0, 0.03
+    for _ in range(n):
+        sigmas = rng.uniform(0.07, 0.13, 50)
+        values = 0.15 + true * rng.standard_normal(50) + sigmas * rng.standard_normal(50)
+        low, high = random_effects(values, sigmas**2)[3]
+        held += low <= true <= high
+    assert held / n == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / n))
 
 
 def test_the_command_says_what_a_lot_lacks(tmp_path):
@@ -310,10 +350,17 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     for parameter, true in zip(effect["parameters"], (3e-4, -3e-4, 3e-4), strict=True):
         assert parameter["mean"] == pytest.approx(true, abs=4 * parameter["sigma"])
     assert [o["campaign"] for o in content["odd"]] == ["sensor-8"]
+    assert [e["names"] for e in content["each"]] == [["thermal_bias"]] * 8 + [["odd"]]
+    assert content["verdict"].startswith("The model lacks thermal bias, which ")
+    assert " of the sensors that are not odd have (" in content["verdict"]
+    for parameter in effect["parameters"]:
+        low, high = parameter["scatter_ci95"]
+        assert low <= parameter["scatter"] <= high
     assert content["verdict"] in told
     page = (tmp_path / "lot/report.html").read_text(encoding="utf-8")
     assert_sound(page)
     assert "A lot of 9 sensors" in text_of(page)
+    assert "odd: quadratic scale" in text_of(page)
     each = sorted(path.name for path in (tmp_path / "lot/each").iterdir())
     assert each == [f"{i + 1:04d}-sensor-{i}" for i in range(9)]
     calibrated = json.loads(

@@ -70,7 +70,7 @@ def test_what_a_third_has_is_found_beside_what_all_have():
         common = {(k,): known[k,].alike - 3 for k in range(3)}
         mixture = Mixture.of(np.zeros((N, 3)), {}, np.ones(3) / 3, common, known.get)
         named += mixture.sets[0].names == (0, 1)
-        right.append(np.mean((mixture.lacking(1) > 0.5) == lacks[:, 1]))
+        right.append(np.mean((mixture.having(1) > 0.5) == lacks[:, 1]))
     assert named >= 18
     # With a known size the error is Φ(−√λ/2) where half of the sensors have it, and less here.
     assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.6 / 2) - 0.03

@@ -161,3 +161,14 @@ def test_other_files_are_no_types(tmp_path):
     (tmp_path / "model.yaml").write_text("models: {a: [bias]}", encoding="utf-8")
     with pytest.raises(InputError, match="no file of a type"):
         read_type(tmp_path / "model.yaml", MODEL)
+
+
+def test_the_order_of_keys_says_nothing(tmp_path):
+    rng = np.random.default_rng(4)
+    true = np.full(MODEL.n_parameters, USUAL)
+    made = [measured("fibonacci-24", true, rng, f"s{i}") for i in range(5)]
+    path = type_of(made, tmp_path)
+    before = read_type(path, MODEL).known
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    path.write_text(yaml.safe_dump(content, sort_keys=True), encoding="utf-8")
+    assert read_type(path, MODEL).known == before

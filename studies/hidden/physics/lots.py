@@ -1,4 +1,4 @@
-"""Lots: campaigns of sensors of one type, which lack the same effects in sizes of their own."""
+"""Lots: campaigns of sensors of one type, with the same hidden effects in sizes of their own."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LotCase:
     approach : str, "gravity" or "robot"
     sigma_known : bool, whether the campaigns state their sigma
     effects : tuple of str, what is missing
-    shares : tuple of float, how many of the sensors lack each; 0 for one sensor
+    shares : tuple of float, how many of the sensors have each; 0 for one sensor
     lam : float, noncentrality of each effect in a typical sensor
     noise : str, kind of wrong noise of all sensors; None where it is right
     """
@@ -50,7 +50,7 @@ def generate_lot(
 
     What an effect is, its setting and its typical parameters, belongs to the type, and each
     parameter of a sensor is a factor away from it, exp(N(0, `SCATTER`²)). Sudden events, a jump or
-    a slip, come to each sensor when and as they like. What one sensor alone lacks has no type.
+    a slip, come to each sensor when and as they like. What one sensor alone has is of no type.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def generate_lot(
     for k, share in enumerate(case.shares):
         has[rng.permutation(sensors)[: max(round(share * sensors), 1)], k] = True
     for i, its_seed in enumerate(seeds):
-        names = tuple(name for name, lacks in zip(case.effects, has[i], strict=True) if lacks)
+        names = tuple(name for name, there in zip(case.effects, has[i], strict=True) if there)
         one = Case(
             "lot", case.design, case.approach, case.sigma_known, names, (case.lam,) * len(names),
             case.noise,
@@ -81,7 +81,7 @@ def generate_lot(
 
 
 def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
-    """Say what the oracle says of a lot that lacks one effect in a share of its sensors.
+    """Say what the oracle says of a lot with one hidden effect in a share of its sensors.
 
     It knows which sensors have it, and judges their mean, which has all that a size of the type
     shows.
