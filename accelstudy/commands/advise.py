@@ -22,6 +22,7 @@ from accelstudy.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from accelstudy.campaign.of_type import SensorType
     from accelstudy.campaign.session import Campaign
     from accelstudy.sequential.information import Prior
 
@@ -99,9 +100,9 @@ def advise_command(
     """Say in a session where to go next, and when to stop.
 
     CAMPAIGN is the folder of the session. It has a campaign.yaml; its positions.csv may have few
-    positions or none, or be missing still. Each position is tested against those before it, and
-    used if it agrees with them. The command says what is not determined yet, and the tilt accuracy
-    so far.
+    positions or none, or be missing still. The positions so far are calibrated and judged as
+    `calibrate` does. The command says what is not determined yet, which positions contradict the
+    others, and the tilt accuracy so far.
 
     The accuracy is the rms over all calibrations that could have come out. If the noise is known,
     about half of single ones leave more in roll or in pitch.
@@ -162,7 +163,7 @@ def advise_command(
         say("\nended")
 
 
-def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
+def _prior(path: Path | None, model: str) -> tuple[Prior] | tuple[Prior, SensorType] | tuple[()]:
     """What an earlier calibration, or a type, says; nothing without one."""
     if path is None:
         return ()
@@ -176,7 +177,8 @@ def _prior(path: Path | None, model: str) -> tuple[Prior, ...]:
 
     wanted = get_model(model)
     if path.suffix in TYPES:
-        return (Prior.of_known(read_type(path, wanted).known, wanted),)
+        of_type = read_type(path, wanted)
+        return Prior.of_known(of_type.known, wanted), of_type
     earlier = read_calibration(path)
     if earlier.model.parameter_names != wanted.parameter_names:
         raise InputError(

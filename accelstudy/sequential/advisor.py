@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations, whitened_jacobian
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
+from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.fit import (
     angle_errors,
+    campaign_estimability,
     campaign_noise,
     campaign_observations,
     check_campaign,
+    fit_campaign,
     initial_values,
 )
+from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.effects import HoldConditions
@@ -27,7 +32,7 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.choice import Chooser, typical_sizes
 from accelstudy.sequential.information import NOTHING_KNOWN, Prior
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, get_rule
-from accelstudy.sequential.screening import Agreement, LastPosition, Screening
+from accelstudy.sequential.recursion import Recursion
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -49,7 +54,7 @@ class NoiseTaken:
     stated : float or None, by the campaign
     seen : float or None, from the residuals; None without redundancy
     taken : float or None, the one that is used; None as long as it is unknown
-    refuted : bool, whether the residuals are larger than the stated noise allows
+    refuted : bool, whether the residuals contradict the stated noise
     redundancy : int
     """
 
@@ -58,6 +63,22 @@ class NoiseTaken:
     taken: float | None
     refuted: bool
     redundancy: int
+
+
+@dataclass(frozen=True)
+class LastPosition:
+    """The last position, tested by all others as in the report of a calibration.
+
+    Attributes
+    ----------
+    index : int, in the session
+    p_value : float, adjusted for the number of positions; NaN where the others cannot test it
+    conflict : bool, whether it contradicts the others
+    """
+
+    index: int
+    p_value: float
+    conflict: bool
 
 
 @dataclass(frozen=True)
@@ -82,7 +103,8 @@ class Advice:
     ----------
     positions : (n,) int array, numbers of the positions, without those that the campaign leaves out
     last : LastPosition or None
-    set_aside : tuple of int, numbers of positions that disagree with the others and are not used
+    suspects : tuple of int, numbers of positions that contradict the others; they are used
+    state : str, of a calibration with these positions; empty if there is none yet
     undetermined : tuple of str, parameters that the positions do not determine yet
     vague : tuple of str, parameters known less well than the typical size in a cheap sensor
     noise : NoiseTaken
@@ -90,12 +112,13 @@ class Advice:
     next : NextPosition
     to_go : int or None, positions still needed; None if unknown or too many
     foreseeable : bool, whether `to_go` can be known
-    enough : bool, whether the promise is kept
+    enough : bool, whether the promise is kept, by a calibration that is not rejected
     """
 
     positions: NDArray[np.int_]
     last: LastPosition | None
-    set_aside: tuple[int, ...]
+    suspects: tuple[int, ...]
+    state: str
     undetermined: tuple[str, ...]
     vague: tuple[str, ...]
     noise: NoiseTaken
@@ -110,13 +133,17 @@ class Advice:
 class Advisor:
     """Advice for a session that is being measured.
 
+    The session so far is calibrated and assessed as any campaign, and advice follows that: which
+    positions are odd, how large a tilt error is left, and whether anything is wrong.
+
     Parameters
     ----------
     model : SensorModel
     approach : Approach
     promise : Promise
     directions : (k, 3) array, attitudes to choose from
-    prior : Prior, optional
+    prior : Prior, optional, from an earlier calibration or from the type of the sensor
+    of_type : SensorType, optional, the type, if the prior is from it
     """
 
     model: SensorModel
@@ -124,11 +151,12 @@ class Advisor:
     promise: Promise
     directions: Array
     prior: Prior = NOTHING_KNOWN
-    _screening: Screening | None = field(default=None, init=False)
+    of_type: SensorType | None = None
+    _recursion: Recursion | None = field(default=None, init=False)
 
     def restart(self) -> None:
         """Forget all positions, because they have changed."""
-        self._screening = None
+        self._recursion = None
 
     def check(self, campaign: Campaign) -> None:
         """Raise `InputError` where no number of positions would be enough."""
@@ -156,22 +184,34 @@ class Advisor:
             The session so far; positions that were taken before are unchanged.
         """
         observed = campaign_observations(campaign)
-        if self._screening is None or not self._screening.recursion.solved[0]:
+        if self._recursion is None or not self._recursion.solved[0]:
             initial = None
             if self.prior is NOTHING_KNOWN and campaign.n_positions:
                 initial = initial_values(self.model, campaign.forces, campaign.gravity)
-            sigma_known = campaign.sigma_force is not None
-            self._screening = Screening(
-                self.model, self.approach, observed, sigma_known, self.prior, initial
-            )
+            self._recursion = Recursion(self.model, self.approach, observed, self.prior, initial)
         else:
-            self._screening.add(observed)
-        return self._advice(campaign, self._screening)
+            self._recursion.add(observed)
+        return self._advice(campaign, self._recursion, self._assessed(campaign))
 
-    def _advice(self, campaign: Campaign, screening: Screening) -> Advice:
-        recursion, noise = screening.recursion, campaign_noise(campaign)
-        solved = bool(recursion.solved[0])
-        trusted = screening.sigma_trusted
+    def _assessed(self, campaign: Campaign) -> Assessment | None:
+        """Assess the calibration of the session so far; None if there is none."""
+        if not campaign.n_positions:
+            return None
+        try:
+            known = replace(campaign, of_type=self.of_type)
+            return assess(fit_campaign(known, self.model, self.approach))
+        except InputError:  # it is not determined yet, or does not converge
+            return None
+
+    def _advice(
+        self, campaign: Campaign, recursion: Recursion, assessed: Assessment | None
+    ) -> Advice:
+        noise, no_prior = campaign_noise(campaign), self.prior is NOTHING_KNOWN
+        solved = bool(recursion.solved[0]) and not (no_prior and assessed is None)
+        trusted = campaign.sigma_force is not None
+        if assessed is not None:
+            trusted = assessed.fit.trusts_sigma
+        wrong = assessed is not None and assessed.state in (REJECTED, IMPLAUSIBLE)
         root = recursion.root_information
         chooser = Chooser(
             self.directions,
@@ -182,35 +222,40 @@ class Advisor:
             typical_sizes(self.model, root.shape[-1]),
         )
         rms = np.full((1, 2), np.inf)
-        if solved:
+        if solved and assessed is not None and no_prior and campaign.sigma_force is not None:
+            rms = tilt_left(assessed.fit, self.promise.tilt_range)[None]
+        elif solved:
             rms = chooser.rms(root, recursion.omega, recursion.redundancy)
-        enough = bool(self.promise.reached(rms)[0])
+        enough = bool(self.promise.reached(rms)[0]) and not wrong
 
         last, repeats = None, None
         if campaign.n_positions:
             last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
-        latest = screening.last
-        if latest is not None and latest.agreement is Agreement.CONFLICT and not latest.repeats:
+        latest = _last_position(campaign, assessed)
+        if latest is not None and latest.conflict:
             repeats = int(campaign.positions[latest.index])
         # The conditions of later positions are unknown.
         to_go, varying = None, bool(CONDITIONS & {*self.model.hold_columns})
         foreseeable = (trusted or recursion.redundancy >= LEAST_REDUNDANCY) and not varying
-        if not enough and foreseeable:
+        if foreseeable and not enough and not wrong:
             r = recursion.redundancy
             variance = 1.0 if trusted else float(recursion.omega[0]) / r
             to_go = chooser.positions_to_go(root[0], variance, r, rms[0], last)
         if repeats is None or last is None:
             before = None if last is None else last[None]
-            best = chooser.directions[chooser.choose(root, recursion.solved, rms, before)[0]]
+            choice = chooser.choose(root, np.array([solved]), rms, before)[0]
+            best = chooser.directions[choice]
         else:
             best = last
+        suspects = () if assessed is None else assessed.suspects
         return Advice(
             positions=campaign.positions,
             last=latest,
-            set_aside=tuple(int(campaign.positions[i]) for i in screening.aside),
-            undetermined=self._undetermined(root[0], solved),
-            vague=self._vague(screening) if solved else (),
-            noise=_noise_taken(screening, campaign.sigma_force, noise.sigma_force),
+            suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
+            state="" if assessed is None else assessed.state,
+            undetermined=self._undetermined(campaign, root[0], solved),
+            vague=self._vague(recursion) if solved else (),
+            noise=_noise_taken(recursion, campaign, trusted, noise.sigma_force),
             rms=rms[0] if np.isfinite(rms).all() else None,
             next=NextPosition(best, repeats),
             to_go=to_go,
@@ -224,30 +269,50 @@ class Advisor:
             parameters = parameters[: self.model.n_parameters]  # without gravity
         return self.promise.tilt_error(self.model, parameters, campaign.gravity, hold)
 
-    def _undetermined(self, root: Array, solved: bool) -> tuple[str, ...]:
+    def _undetermined(self, campaign: Campaign, root: Array, solved: bool) -> tuple[str, ...]:
         """Parameters that the positions do not determine better than their typical size."""
         if solved:
             return ()
         names, sizes = self.model.parameter_names, typical_sizes(self.model, len(root))
         covariance = np.linalg.inv(root.T @ root + np.diag(sizes**-2))
         sigma = np.sqrt(np.diag(covariance))[: len(names)]
-        return tuple(n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size)
+        vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size]
+        if vague or not campaign.n_positions:
+            return tuple(vague)
+        theory = campaign_estimability(campaign, self.model, self.approach)
+        return tuple(name for name in theory.not_estimable if name in names)
 
-    def _vague(self, screening: Screening) -> tuple[str, ...]:
+    def _vague(self, recursion: Recursion) -> tuple[str, ...]:
         """Parameters that are known less well than they are of any cheap sensor."""
         names = self.model.parameter_names
-        sigma = np.sqrt(np.diag(screening.recursion.cofactors[0]))[: len(names)]
+        sigma = np.sqrt(np.diag(recursion.cofactors[0]))[: len(names)]
         sizes = typical_sizes(self.model, len(names))
         return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
 
 
-def _noise_taken(screening: Screening, stated: float | None, unit: float) -> NoiseTaken:
+def _last_position(campaign: Campaign, assessed: Assessment | None) -> LastPosition | None:
+    """Say of the last position what the assessment says of it."""
+    last = campaign.n_positions - 1
+    if last < 0:
+        return None
+    if assessed is None:
+        return LastPosition(last, np.nan, conflict=False)
+    conflict = any(suspect.position == last for suspect in assessed.suspects)
+    return LastPosition(last, float(assessed.p_adjusted[last]), conflict)
+
+
+def _noise_taken(
+    recursion: Recursion, campaign: Campaign, trusted: bool, unit: float
+) -> NoiseTaken:
     """Noise of a position by which the accuracy is judged."""
-    recursion, refuted = screening.recursion, screening.refuted
-    r, seen, taken = recursion.redundancy, None, stated
+    stated, r = campaign.sigma_force, recursion.redundancy
+    seen, taken = None, stated
     if recursion.solved[0] and r > 0:
         seen = unit * float(np.sqrt(recursion.omega[0] / r))
-    if stated is None or refuted:
+    refuted = stated is not None and not trusted
+    if refuted:
+        taken = seen
+    elif stated is None:
         bound = float(np.sqrt(get_rule("bound")(recursion.omega, r)[0]))
         taken = unit * bound if np.isfinite(bound) else None
     return NoiseTaken(stated, seen, taken, refuted, r)

@@ -161,13 +161,6 @@ class Recursion:
         for n in range(self.n_positions + 1, observed.forces.shape[1] + 1):
             self._take(observed.take(np.arange(n)))
 
-    def copy(self) -> Recursion:
-        """Return the same sessions, which take further positions without a change of these."""
-        part = copy(self)
-        for name in _OF_SESSIONS:
-            setattr(part, name, getattr(self, name).copy())
-        return part
-
     def only(self, chosen: NDArray[np.int_]) -> Recursion:
         """Return some of the sessions, to continue with them alone."""
         part = copy(self)

@@ -14,6 +14,7 @@ from places import ROOT
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, angles_in
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.commands import advise as command
@@ -96,7 +97,7 @@ def test_what_is_said_leads_from_nothing_to_the_end(begun, name):
     shown = {n: advise(begun(n, name)) for n in (2, 5, 13, 30)}
     assert "position 2: taken; there is nothing to test it by yet" in shown[2]
     assert "not determined yet" in shown[2]
-    assert re.search(r"position 13: agrees with the others \(p = 0\.\d+\)", shown[13])
+    assert re.search(r"position 13: agrees with the others \(p [=>] \d\.\d+\)", shown[13])
     accuracies = [
         float(re.search(r"tilt accuracy: roll ([\d.]+) mgon", shown[n])[1]) for n in (13, 30)
     ]
@@ -189,7 +190,7 @@ def test_what_depends_on_more_than_the_attitude(begun):
     assert "YOU CAN STOP" in text
     # Without the effect most positions disagree. It is not they that are wrong.
     text = advise(begun(30, "warm"))
-    assert "set aside" not in text
+    assert "in conflict with" not in text
     assert "or the model lacks an effect" in text
     assert "YOU CAN STOP" not in text
 
@@ -197,41 +198,52 @@ def test_what_depends_on_more_than_the_attitude(begun):
 # --- conflicts -----------------------------------------------------------------------------------
 
 
-def test_a_bumped_position_is_set_aside_and_to_be_repeated(begun):
+def test_a_bumped_position_is_named_and_to_be_repeated(begun):
     text = advise(begun(17, bumped=[17]))
     assert re.search(r"position 17: IN CONFLICT with the others \(p [<=].*repeat it", text)
-    assert "set aside: position 17" in text
+    assert "in conflict with the others: position 17;" in text
     assert "next position: position 17 once more, " in text
-    folder = begun(18, bumped=[17])
+    folder = begun(30, bumped=[17])
     text = advise(folder)
-    assert "position 18: agrees with the others" in text
+    assert "position 30: agrees with the others" in text
+    assert "YOU CAN STOP" not in text
     entry = re.search(r"excluded: \[.*\]", text)[0]
     with (folder / "campaign.yaml").open("a", encoding="utf-8") as file:
         file.write(entry + "\n")
     assert read_campaign(folder).reasons == {17: "in conflict"}
     left_out = advise(folder)
-    assert "set aside" not in left_out
-    assert "17 positions so far" in left_out
-    accuracy = [re.search("tilt accuracy.*", shown)[0] for shown in (text, left_out)]
-    assert accuracy[0] == accuracy[1]
+    assert "in conflict" not in left_out
+    assert "29 positions so far" in left_out
+    assert "to go: about 1 position" in left_out
 
 
-def test_a_bump_that_nothing_could_show_is_found_later(begun):
-    text = advise(begun(14, bumped=[3]))
-    assert "set aside: position 3;" in text
-    assert re.search(r"position 14: agrees with the others", text)
+@pytest.mark.parametrize(("n", "bumped"), [(10, []), (14, [3]), (17, [16]), (30, []), (30, [5, 9])])
+def test_it_judges_as_the_calibration_does(begun, n, bumped):
+    """It said that one can stop where the calibration was rejected, and set positions aside."""
+    measured, promise = read_running(begun(n, bumped=bumped)).campaign, Promise(1.0, 50 * GON)
+    advisor = Advisor(get_model(MODEL), get_approach("gravity"), promise, candidates("cube"))
+    advice = advisor.advise(measured)
+    calibrated = assess(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
+    assert (
+        advice.state
+        == calibrated.state
+        == ("rejected" if bumped else "accepted" if n > 11 else "cannot tell")
+    )
+    np.testing.assert_allclose(advice.rms, calibrated.tilt, rtol=1e-12)
+    suspects = [int(measured.positions[s.position]) for s in calibrated.suspects]
+    assert list(advice.suspects) == sorted(suspects)
+    assert advice.enough == (not bumped)
 
 
 def test_a_repeat_that_disagrees_too_was_not_bumped(begun):
-    folder = begun(17, bumped=[16])
+    folder = begun(30, bumped=[29])
     rows = (folder / "positions.csv").read_text(encoding="utf-8").splitlines()
-    cells = rows[16].split(",")
-    again = [cells[0].replace("16", "17"), *cells[1:]]
-    (folder / "positions.csv").write_text("\n".join([*rows[:17], ",".join(again)]) + "\n")
+    cells = rows[29].split(",")
+    again = [cells[0].replace("29", "30"), *cells[1:]]
+    (folder / "positions.csv").write_text("\n".join([*rows[:30], ",".join(again)]) + "\n")
     text = advise(folder)
-    assert "position 17: IN CONFLICT" in text
-    assert "so was the same attitude before" in text
     assert "once more" not in text
+    assert "`accelstudy diagnose` tells what is wrong or missing" in text
 
 
 # --- what is known before ------------------------------------------------------------------------

@@ -71,6 +71,17 @@ class Assessment:
         return np.hypot(self.tilt_parameters, self.tilt_missing)
 
     @property
+    def p_adjusted(self) -> Array:
+        """P-values of the positions, (n,), adjusted for their number.
+
+        That of a suspect is from the round in which it was found, without the worse ones before it.
+        """
+        p_values = self.tests.p_adjusted(self.fit.trusts_sigma)
+        for suspect in self.suspects:
+            p_values[suspect.position] = suspect.p_value
+        return p_values
+
+    @property
     def warnings(self) -> list[str]:
         """What of the calibration can only come from a gross error; empty for a plausible one."""
         gross = self.gross_error
@@ -128,7 +139,12 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
     )
 
 
-def tilt_missing(fit: CampaignFit) -> Array:
+def tilt_left(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> Array:
+    """Rms tilt error that a calibration leaves up to a tilt, rad, (2,), as `Assessment.tilt`."""
+    return np.hypot(tilt_shares(fit, max_tilt)["all"], tilt_missing(fit, max_tilt))
+
+
+def tilt_missing(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> Array:
     """Tilt error of a reading that is wrong by the excess of the residuals, (2,), rad.
 
     The excess of the residuals over the stated noise is what the model does not describe. An effect
@@ -138,21 +154,21 @@ def tilt_missing(fit: CampaignFit) -> Array:
     if not fit.sigma_known or fit.trusts_sigma:
         return np.zeros(2)
     excess = fit.sigma_position_posteriori**2 - campaign_noise(fit.campaign).sigma_force ** 2
-    slope = tilt_by_output(*_in_use(fit))
+    slope = tilt_by_output(*_in_use(fit, max_tilt))
     return np.sqrt(max(excess, 0.0) * np.mean(np.sum(slope**2, axis=-1), axis=0))
 
 
-def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
+def tilt_shares(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> dict[str, Array]:
     """Tilt error from the uncertainty of each effect's parameters, and of "all", (2,), rad.
 
     With a reference there is also the part of all that its calibration causes, "reference".
 
-    It is the rms of roll and of pitch over tilts up to `MAX_TILT_GON`, without the noise of a
+    It is the rms of roll and of pitch over tilts up to `max_tilt`, rad, without the noise of a
     reading. Effects that depend on temperature or time have those of the campaign. Effects of the
     rig have no share: the sensor in use has left the rig.
     """
     model, covariance = fit.model, fit.covariance
-    slope = tilt_slope(*_in_use(fit)) * model.stays
+    slope = tilt_slope(*_in_use(fit, max_tilt)) * model.stays
 
     def rms(columns: slice, covariance: Array = covariance) -> Array:
         part, block = slope[..., columns], covariance[columns, columns]
@@ -169,13 +185,15 @@ def tilt_shares(fit: CampaignFit) -> dict[str, Array]:
     return shares
 
 
-def _in_use(fit: CampaignFit) -> tuple[SensorModel, Array, Array, Array, float, HoldConditions]:
-    """Return the calibrated sensor in all tilts, as `tilt_slope` takes it.
+def _in_use(
+    fit: CampaignFit, max_tilt: float
+) -> tuple[SensorModel, Array, Array, Array, float, HoldConditions]:
+    """Return the calibrated sensor in all tilts up to one, rad, as `tilt_slope` takes it.
 
     These are the model, its parameters, readings and forces (k, 3), m/s², gravity and conditions.
     """
     model, campaign, g = fit.model, fit.campaign, fit.gravity
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, g)
+    f_b = cap_forces(max_tilt, ATTITUDES, g)
     hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
     p = np.where(model.stays, fit.parameters, 0.0)
     return model, p, model.sense(f_b, p, g, hold), f_b, g, hold

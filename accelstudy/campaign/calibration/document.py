@@ -167,7 +167,7 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
             "statistic": tests.statistic,
             "dof": tests.dof,
             "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,
-            "p_value_adjusted": tests.p_adjusted(fit.trusts_sigma),
+            "p_value_adjusted": assessment.p_adjusted,
             "tau": tests.tau,
             "mdb_mps2": scale * reliability.mdb[:, -1],
             "external_roll_mgon": scale * reliability.leveling[:, 0] / MGON,
