@@ -120,7 +120,10 @@ class Calibration:
 
 @for_programs
 def calibrate(
-    campaign: Campaign, *, model: str = "bias-scale-nonorthogonality", approach: str = "gravity"
+    campaign: Campaign,
+    *,
+    model: str = "bias-scale-nonorthogonality",
+    approach: str | None = None,
 ) -> Calibration:
     """Calibrate a campaign.
 
@@ -128,7 +131,7 @@ def calibrate(
     ----------
     campaign : Campaign
     model : str, a name, a composition, or the path of a YAML file
-    approach : str, "gravity" or "robot"
+    approach : str, optional, "gravity" or "robot"; with the robot, if the campaign has its angles
 
     Raises
     ------
@@ -137,6 +140,8 @@ def calibrate(
     """
     of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns")
     of_type("model", model, str, expected="the name of a model")
-    of_type("approach", approach, str, expected="the name of an approach")
-    fit = fit_campaign(campaign, get_model(model), get_approach(approach))
+    if approach is not None:
+        of_type("approach", approach, str, expected="the name of an approach")
+    chosen = None if approach is None else get_approach(approach)
+    fit = fit_campaign(campaign, get_model(model), chosen)
     return Calibration(calibration_content(fit, assess(fit)), fit)

@@ -109,6 +109,7 @@ def advise_command(
     """
     from accelstudy.approaches import get_approach
     from accelstudy.basics.suggested import calibrate
+    from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.sensors.models import get_model
     from accelstudy.sequential.advisor import Advisor
     from accelstudy.sequential.choice import DEFAULTS, candidates
@@ -124,12 +125,13 @@ def advise_command(
         now = running.campaign
         if running.unfinished:
             warn(f"{campaign}: the last line of the table is not whole; it is not counted")
-    name = approach or ("gravity" if now.angles is None else "robot")
+    equipment = usual_approach(now) if approach is None else get_approach(approach)
+    name = equipment.name
     sensor = get_model(model)
     directions = candidates(
         attitudes or DEFAULTS.get(name, "grid"), pole_distance, max_roll, max_pitch
     )
-    advisor = Advisor(sensor, get_approach(name), promise, directions, *_prior(prior, model))
+    advisor = Advisor(sensor, equipment, promise, directions, *_prior(prior, model))
 
     def tell(now: Campaign) -> None:
         """Print the advice."""

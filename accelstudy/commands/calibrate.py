@@ -23,13 +23,13 @@ from accelstudy.commands.options import (
 @click.argument("campaign", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Folder to write to.")
 @model_option
-@approach_option("gravity")
+@approach_option(None)
 @prior_option
 @force_option
 @angle_unit_option
 @quiet_option
 def calibrate_command(
-    campaign: Path, model: str, approach: str, prior: Path | None, out: Path, force: bool
+    campaign: Path, model: str, approach: str | None, prior: Path | None, out: Path, force: bool
 ) -> None:
     """Calibrate a CAMPAIGN (a folder) and report on it.
 
@@ -42,14 +42,14 @@ def calibrate_command(
     from accelstudy.basics.wording import estimate
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
-    from accelstudy.campaign.calibration.wording import interval_words, next_steps
+    from accelstudy.campaign.calibration.wording import approach_words, interval_words, next_steps
     from accelstudy.campaign.format import read_campaign
     from accelstudy.campaign.of_type import with_type
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
     from accelstudy.sensors.models import get_model
 
-    chosen = get_model(model), get_approach(approach)
+    chosen = get_model(model), None if approach is None else get_approach(approach)
     inputs = [campaign] if prior is None else [campaign, prior]
     with result_folder(out, CALIBRATION, inputs, force) as folder, stage("calibration"):
         measured = with_type(read_campaign(campaign), prior, chosen[0])
@@ -63,6 +63,7 @@ def calibrate_command(
     if content["sigmas_95"] is not None:
         say(f"±: {interval_words(fit)}")
     quality = content["quality"]
+    say(approach_words(fit))
     say(axes_note(None if measured.log is None else measured.log.frame))
     click.echo(f"{quality['state'].upper()}: {quality['verdict']}")
     what, command = next_steps(fit, quality["state"], campaign, out / "calibration.json")[0]

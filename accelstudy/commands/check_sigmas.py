@@ -23,7 +23,7 @@ from accelstudy.commands.options import (
 )
 @click.argument("campaign", type=PATH)
 @model_option
-@approach_option("gravity")
+@approach_option(None)
 @click.option(
     "--replicates",
     default=2000,
@@ -35,7 +35,7 @@ from accelstudy.commands.options import (
 @angle_unit_option
 @quiet_option
 def check_sigmas_command(
-    campaign: Path, model: str, approach: str, replicates: int, seed: int
+    campaign: Path, model: str, approach: str | None, replicates: int, seed: int
 ) -> None:
     """Check the sigmas of a calibration by simulation.
 
@@ -49,7 +49,8 @@ def check_sigmas_command(
     from accelstudy.campaign.format import read_campaign
     from accelstudy.sensors.models import get_model
 
-    fit = fit_campaign(read_campaign(campaign), get_model(model), get_approach(approach))
+    named = None if approach is None else get_approach(approach)
+    fit = fit_campaign(read_campaign(campaign), get_model(model), named)
     table = check_sigmas(fit, replicates, seed)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")

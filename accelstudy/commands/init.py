@@ -89,15 +89,15 @@ def _sensor(given: str | None) -> NewSensor | None:
 
 def _sensor_of_campaign(folder: Path) -> NewSensor:
     """Calibrate a campaign, and take what was found for the truth."""
-    from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
+    from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.format import read_campaign
     from accelstudy.data_sheets.measured import sheet_of_campaign
     from accelstudy.sensors.models import get_model
     from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
 
     sheet, campaign = sheet_of_campaign(folder), read_campaign(folder)
-    approach, model = usual_approach(campaign), get_model("bias-scale-nonorthogonality")
-    fit = fit_campaign(campaign, model, approach)
+    model = get_model("bias-scale-nonorthogonality")
+    fit = fit_campaign(campaign, model)
     found = dict(zip(model.parameter_names, fit.parameters.tolist(), strict=True))
     errors = {
         effect.name: tuple(found[parameter.name] for parameter in effect.parameters)

@@ -14,7 +14,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import display_unit
 from accelstudy.basics.wording import amount
-from accelstudy.campaign.calibration.fit import fit_campaign, usual_approach
+from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
 from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
@@ -190,7 +190,7 @@ def examine_campaign(
     model : SensorModel
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     """
-    fit = fit_campaign(campaign, model, approach or usual_approach(campaign))
+    fit = fit_campaign(campaign, model, approach)
     return examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
 
 

@@ -73,9 +73,10 @@ def write_log(folder):
 
 BATCH = {
     "batch": "bench",
-    "campaigns": [{"campaign": "campaigns/*"},
-                  {"campaign": "campaigns/aided", "approach": "robot"},
-                  {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale"},
+    "campaigns": [{"campaign": "campaigns/*", "approach": "gravity"},
+                  {"campaign": "campaigns/aided"},  # takes the robot's angles, as it has them
+                  {"campaign": "campaigns/aided", "name": "six", "model": "bias-scale",
+                   "approach": "gravity"},
                   {"log": "log.parquet", "name": "session", "import": {"rate_hz": 100},
                    "gravity": {"value_mps2": 9.81}}],
 }  # fmt: skip

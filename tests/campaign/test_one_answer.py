@@ -1,12 +1,27 @@
 """What a campaign determines, and how good it is, is the same in every command."""
 
+import json
+
 import numpy as np
+import pytest
 from calling import refusal, succeed
+from page_helpers import text_of
+
+import accelstudy as acs
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.document import assessed_positions
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.wording import verdict_lines
+from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.session import Campaign
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.models import get_model
 
 GOLDEN = (1 + 5**0.5) / 2
 AXES = np.array([[0, 1, GOLDEN], [0, 1, -GOLDEN], [1, GOLDEN, 0], [1, -GOLDEN, 0], [GOLDEN, 0, 1]])
 NINE = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
 """Nine faces of a dodecahedron on five axes: five sums and three biases, one too few."""
+CUBE = get_scheme("faces-edges-corners-26").directions
 HEADER = """\
 schema_version: 1
 name: made-up
@@ -41,3 +56,88 @@ def test_nine_positions_of_rank_eight(tmp_path):
     rows = "".join(f"- [{x:.3f}, {y:.3f}, {z:.3f}]\n" for x, y, z in NINE)
     scheme.write_text(f"directions:\n{rows}", encoding="utf-8")
     assert "8/9" in succeed("schemes", scheme).output
+
+
+def test_the_approach_follows_the_campaign_and_is_said(tmp_path):
+    """`calibrate` left the angles of the robot aside without a word."""
+    campaign = tmp_path / "aided"
+    succeed("simulate-campaign", "--out", campaign, "--approach", "robot", "--seed", 2)
+    said = succeed("calibrate", campaign, "--out", tmp_path / "c").output
+    assert "the roll and pitch of a robot (approach robot)" in said
+    page = (tmp_path / "c/report.html").read_text(encoding="utf-8")
+    assert "approach robot · " in text_of(page)
+    content = json.loads((tmp_path / "c/calibration.json").read_text(encoding="utf-8"))
+    assert content["approach"] == "robot"
+    assert acs.calibrate(read_campaign(campaign)).content["approach"] == "robot"
+    options = ("--approach", "gravity", "--out", tmp_path / "g")
+    said = succeed("calibrate", campaign, *options).output
+    assert "gravity alone; the measured roll and pitch are not used" in said
+    page = (tmp_path / "g/report.html").read_text(encoding="utf-8")
+    assert "approach gravity, the measured roll and pitch are not used · " in text_of(page)
+
+
+def test_one_p_value_of_a_position_in_conflict(tmp_path):
+    """Two bumps hide each other: one had p = 0.015 in the box and > 0.999 in the table."""
+
+    def bumped(directions):
+        errors = np.zeros_like(directions)
+        errors[[4, 11]] = -np.array([[0.05], [0.012]]) * directions[[4, 11]]
+        return errors
+
+    campaign = read_campaign(written(tmp_path / "bumped", CUBE, 1, bumped))
+    assessed = assess(fit_campaign(campaign, get_model("bias-scale-nonorthogonality")))
+    named = {int(campaign.positions[s.position]): s.p_value for s in assessed.suspects}
+    assert {5, 12} <= set(named)
+    table = assessed_positions(assessed).set_index("position")
+    for position, p_value in named.items():
+        assert table.loc[position, "p_value_adjusted"] == p_value < 0.05
+
+
+def test_an_accepted_calibration_is_not_sent_to_look_for_what_is_wrong(tmp_path):
+    """One bump of four sigmas among 26 positions; all together they agree with the noise."""
+
+    def bumped(directions):
+        return -np.where(np.arange(26) == 4, 0.0095, 0.0)[:, None] * directions
+
+    campaign = written(tmp_path / "bumped", CUBE, 1, bumped)
+    said = succeed("calibrate", campaign, "--out", tmp_path / "c").output
+    assert "ACCEPTED" in said
+    assert "In conflict with the others: position 5 " in said
+    assert "leave it out if the sensor was bumped there" in said
+    assert "looks for what is wrong" not in said
+
+
+def tilts(forces):
+    """Roll and pitch of forces (n, 3), rad."""
+    x, y, z = forces.T
+    return np.column_stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))])
+
+
+@pytest.mark.parametrize("angle", [0.0, 2.45e-3])  # rad between the axes, 0 and 156 mgon
+def test_without_angles_between_the_axes_the_tilt_error_has_a_condition(tmp_path, angle):
+    """Six faces show no angles. The simulation has no code in common with the package."""
+    sensor = np.array([[1.004, 0, 0], [angle, 0.997, 0], [-angle, angle, 1.006]])
+    bias, g = np.array([0.12, -0.08, 0.2]), 9.80665
+    faces = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 4, axis=0)
+    rng = np.random.default_rng(5)
+    promised, left = [], []
+    for _ in range(8):
+        forces = g * faces @ sensor.T + bias + 0.002 * rng.standard_normal(faces.shape)
+        read = Campaign("six", np.arange(len(forces)), forces, g, sigma_force=0.002)
+        assessed = assess(fit_campaign(read, get_model("bias-scale")))
+        promised.append(assessed.tilt)
+        says = " ".join(verdict_lines(assessed))
+        assert "if the axes of the sensor are at right angles, as the model bias-scale" in says
+        b, s = np.split(assessed.fit.parameters, 2)
+        # Directions evenly over the cap up to 50 gon.
+        height = 1 - rng.random(4000) * (1 - np.cos(np.pi / 4))
+        around = 2 * np.pi * rng.random(4000)
+        radius = np.sqrt(1 - height**2)
+        up = np.column_stack([radius * np.cos(around), radius * np.sin(around), height])
+        used = ((-g * up) @ sensor.T + bias - b) / (1 + s)
+        left.append(np.mean((tilts(used) - tilts(-g * up)) ** 2, axis=0))
+    ratio = np.sqrt(np.mean(left, axis=0)) / np.sqrt(np.mean(np.square(promised), axis=0))
+    if angle:
+        assert ratio.min() > 5
+    else:
+        assert 0.6 < ratio.min() < ratio.max() < 1.6

@@ -76,7 +76,8 @@ class Task(Block):
     name : str, of the results
     kind : "campaign", "log" or "public"
     source : str, path of the folder or file, or name of the public data
-    model, approach : str
+    model : str
+    approach : str, optional; by default robot-aided if the campaign has the robot's angles
     gravity : GravitySettings, replaces that of a campaign folder; None keeps it
     settings : ImportSettings, of a log or public data
     """
@@ -85,7 +86,7 @@ class Task(Block):
     kind: Kind
     source: str
     model: str
-    approach: str
+    approach: str | None
     gravity: GravitySettings | None = None
     settings: ImportSettings | None = None
 
@@ -117,7 +118,9 @@ class BatchConfig(Configuration):
 
     batch: PathName = Field(description="name; results go to results/<batch>/")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model of all campaigns")
-    approach: str = Field("gravity", description="approach of all campaigns")
+    approach: str | None = Field(
+        None, description="approach of all; by default robot where a campaign has its angles"
+    )
     public_folder: str = Field(
         "resources/public",
         description="folder with public files, in any subfolder; missing ones are downloaded to it",

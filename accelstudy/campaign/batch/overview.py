@@ -134,6 +134,7 @@ def _row(status: Mapping[str, Any], content: Mapping[str, Any] | None) -> dict[s
     suspects = [str(suspect["position"]) for suspect in quality["suspects"]]
     return {
         **row,
+        "approach": content["approach"],
         **{key: content[key] for key in CAMPAIGN_COLUMNS if key in content and key not in row},
         "sigma_priori_mps2": priori,
         "sigma_posteriori_mps2": posteriori,

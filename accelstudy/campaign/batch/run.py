@@ -68,7 +68,8 @@ def _calibrate(
 ) -> str | None:
     try:
         campaign = _measured(task, folder / "campaign", record)
-        fit = fit_campaign(campaign, get_model(task.model), get_approach(task.approach))
+        named = None if task.approach is None else get_approach(task.approach)
+        fit = fit_campaign(campaign, get_model(task.model), named)
         write_calibration(fit, folder)
     except InputError as error:
         _remove_results(folder)

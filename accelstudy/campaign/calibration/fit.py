@@ -264,7 +264,10 @@ def check_columns(campaign: Campaign, model: SensorModel) -> None:
 
 
 def fit_campaign(
-    campaign: Campaign, model: SensorModel, approach: Approach, diagnosing: bool = False
+    campaign: Campaign,
+    model: SensorModel,
+    approach: Approach | None = None,
+    diagnosing: bool = False,
 ) -> CampaignFit:
     """Calibrate a campaign.
 
@@ -272,7 +275,7 @@ def fit_campaign(
     ----------
     campaign : Campaign
     model : SensorModel
-    approach : Approach
+    approach : Approach, optional; by default robot-aided if the campaign has the robot's angles
     diagnosing : bool, whether gross errors were looked for, and mended, already
 
     Raises
@@ -281,6 +284,7 @@ def fit_campaign(
         If the campaign lacks what the approach or the model needs, if its positions do not
         determine the model (says which parameters), or if the adjustment does not converge.
     """
+    approach = approach or usual_approach(campaign)
     check_campaign(campaign, model, approach)
     start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
     theory = campaign_estimability(campaign, model, approach)

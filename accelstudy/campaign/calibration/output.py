@@ -74,6 +74,7 @@ def write_calibration(
         doc=content,
         quality=content["quality"],
         lines=lines,
+        angles_unused=fit.campaign.angles is not None and not fit.approach.uses_angles,
         positions=_listed(positions).to_dict("records"),
         refuted=REFUTED,
         figures=drawn,

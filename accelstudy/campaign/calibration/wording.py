@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from accelstudy.basics import suggested
-from accelstudy.basics.levels import BLIND, IMPLAUSIBLE, REJECTED
+from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
@@ -15,6 +15,9 @@ from accelstudy.campaign.importing.resolution import steps_text
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
+
+ANGLES = {"nonorthogonality", "cross_axis_misalignment"}
+"""Effects that a model has unless it takes the axes to be at right angles."""
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:
@@ -33,10 +36,22 @@ def verdict_lines(assessment: Assessment) -> list[str]:
         limit=max(shares, key=lambda name: float(shares[name].max())) if says_tilt else "",
         max_tilt=MAX_TILT_GON * GON,
         usual_cause=USUAL_CAUSE,
-        diagnose=state in (REJECTED, IMPLAUSIBLE) or bool(suspects),
+        diagnose=state in (REJECTED, IMPLAUSIBLE) or (state != ACCEPTED and bool(suspects)),
         resolution="" if fit.campaign.resolution is None else steps_text(fit.campaign.resolution),
+        right_angles=state != REJECTED
+        and not ANGLES & {effect.name for effect in fit.model.effects},
         blind="" if fit.approach.uses_angles else BLIND,
     )
+
+
+def approach_words(fit: CampaignFit) -> str:
+    """Say what the positions were held against."""
+    name, campaign = fit.approach.name, fit.campaign
+    if fit.approach.uses_angles:
+        source = "a robot" if campaign.reference is None else "the sensor beside it"
+        return f"Held against gravity and the roll and pitch of {source} (approach {name})."
+    unused = "" if campaign.angles is None else "; the measured roll and pitch are not used"
+    return f"Held against gravity alone{unused} (approach {name})."
 
 
 def interval_words(fit: CampaignFit) -> str:
