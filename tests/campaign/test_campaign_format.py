@@ -336,7 +336,7 @@ BAD = {
     "no version": (header(schema_version=None), "schema_version", "must be given"),
     "no name": (header(name=None), "name", "must be given"),
     "number for a name": (header(name=2014), "name", "not 2014"),
-    "unit": (header(unit="mg"), "unit", "'m/s^2', 'g' or 'counts'", "not 'mg'"),
+    "unit": (header(unit="ug"), "unit", "'m/s^2', 'g', 'mg' or 'counts'", "not 'ug'"),
     "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
     "infinite gravity": (header(gravity={"value_mps2": float("inf")}),
@@ -494,7 +494,7 @@ def test_a_poor_sensor_is_no_error(tmp_path):
 @pytest.mark.parametrize(("changes", "part"), [
     ({"name": ""}, "name"),
     ({"name": "\ud800"}, "name"),
-    ({"unit": "mg"}, "unit"),
+    ({"unit": "ug"}, "unit"),
     ({"unit": "counts"}, "nominal"),
     ({"forces": np.full((8, 3), np.nan)}, "not finite"),
     ({"time": np.arange(7)}, r"time: shape \(7,\), not \(8,\)"),
