@@ -21,12 +21,7 @@ from accelstudy.simulation.sessions import Noise, session
 Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
-"""Singular values of the scaled design matrix below this count as zero."""
-ALIKE = 0.01
-"""rad, by which attitudes must differ to count as different. A sensor that nobody has calibrated
-and its noise turn readings by less, and would give any positions full rank."""
-INVOLVED = 0.15
-"""Share of a parameter in a combination from which on that combination hides it."""
+"""Singular values of the scaled design matrix below this fraction of the largest count as zero."""
 ROUNDING = 1e-14
 """Columns of the design matrix shorter than this fraction of the longest count as zero."""
 
@@ -86,9 +81,7 @@ def estimability(
     """Work out what a scheme determines, before any simulation.
 
     Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
-    is near-singular for every real sensor. What only attitudes within `ALIKE` of each other would
-    determine counts as not determined, so nominal and measured positions have the same rank. The
-    cofactors are taken at `parameters`.
+    is near-singular for every real sensor. The cofactors are taken at `parameters`.
 
     Parameters
     ----------
@@ -106,10 +99,8 @@ def estimability(
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
-    given = (scheme.directions, model, approach, noise, ideal, gravity, hold, known)
-    a = _design(*given)
-    shifted = [_design(*given, shift) for shift in ALIKE * gravity * np.eye(3)]
-    rank, condition, free = rank_of(a, np.concatenate(shifted) - np.tile(a, (3, 1)))
+    a = _design(scheme.directions, model, approach, noise, ideal, gravity, hold, known)
+    rank, condition, free = rank_of(a)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
     cofactors = np.full((len(names), len(names)), np.nan)
@@ -149,11 +140,10 @@ def _design(
     gravity: float,
     hold: HoldConditions | None,
     known: Known,
-    shift: Array | float = 0.0,
 ) -> Array:
-    """Design matrix (conditions, u) with unit weights, of forces that are shifted by (3,), m/s²."""
-    ideal = session(model, parameters, directions, gravity, hold).observations(noise)
-    observed = replace(ideal, forces=ideal.forces + shift, known=known)
+    """Design matrix (conditions, u) with unit weights."""
+    ideal = session(model, parameters, directions, gravity, hold)
+    observed = replace(ideal.observations(noise), known=known)
     return whitened_jacobian(model, approach, observed, parameters)
 
 
@@ -165,32 +155,19 @@ def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: floa
     return rank_of(a)[0] < a.shape[1]
 
 
-def rank_of(a: Array, changes: Array | None = None) -> tuple[int, float, NDArray[np.bool_]]:
-    """Rank and condition of a design matrix, and which parameters its null space involves.
-
-    A combination w of parameters is determined if |A w| is larger than its changes |D w|. These are
-    generalised singular values, which do not depend on the units of the parameters.
-
-    Parameters
-    ----------
-    a : (m, u) array, A
-    changes : (k, u) array, D, of its rows if the positions change as much as does not count
-    """
-    u = a.shape[1]
-    changes = np.zeros((0, u)) if changes is None else changes
-    if not (np.isfinite(a).all() and np.isfinite(changes).all()):
-        return 0, np.inf, np.ones(u, dtype=bool)
+def rank_of(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
+    """Rank and condition of a design matrix, and which columns its null space involves."""
+    if not np.isfinite(a).all():
+        return 0, np.inf, np.ones(a.shape[1], dtype=bool)
     length = np.linalg.norm(a, axis=0)
     longest = length.max() or 1.0
     # A column of rounding errors must stay short: scaled to unit length it would count.
-    unit = 1 / np.where(length > ROUNDING * longest, length, longest)
-    # R of a QR decomposition has the same null space, and saves a matrix of all conditions.
-    scaled = np.linalg.qr(a * unit, mode="r")
-    both = np.linalg.qr(np.concatenate([scaled, changes * unit, SINGULAR * np.eye(u)]), mode="r")
-    # The whole null space is wanted, also of a matrix with fewer rows than columns.
-    _, cosines, vt = np.linalg.svd(scaled @ np.linalg.inv(both), full_matrices=True)
-    rank = int(np.count_nonzero(cosines**2 > 0.5))
-    values = np.linalg.svd(scaled, compute_uv=False)
-    condition = float(values[0] / values[-1]) if rank == u else np.inf
-    null = np.linalg.solve(both, vt[rank:].T) * np.linalg.norm(both, axis=0)[:, None]
-    return rank, condition, np.linalg.norm(null, axis=1) > INVOLVED
+    scaled = a / np.where(length > ROUNDING * longest, length, longest)
+    # The whole null space is wanted, also of a matrix with fewer rows than columns. R of a QR
+    # decomposition has the same null space, and saves a matrix of all conditions by all conditions.
+    triangle = np.linalg.qr(scaled, mode="r") if len(scaled) > len(length) else scaled
+    _, values, vt = np.linalg.svd(triangle, full_matrices=True)
+    rank = int(np.count_nonzero(values > SINGULAR * values[0]))
+    complete = rank == a.shape[1]
+    condition = float(values[0] / values[-1]) if complete else np.inf
+    return rank, condition, np.linalg.norm(vt[rank:], axis=0) > 1e-3

@@ -222,35 +222,5 @@ def test_repeats_of_too_few_attitudes_are_told():
     """Noise makes the design regular, but six attitudes hold no nine parameters."""
     settings = CampaignSettings(scheme="faces-6", repeats=3, approach="gravity")
     campaign, _ = simulate_campaign(settings)
-    with pytest.raises(InputError, match=r"18 positions do not determine .* rank 6 of 9: .*alpha"):
+    with pytest.raises(InputError, match=r"18 positions hardly determine it .* more attitudes"):
         fit_campaign(campaign, NINE, GRAVITY)
-
-
-GOLDEN = (1 + 5**0.5) / 2
-AXES = np.array([[0, 1, GOLDEN], [0, 1, -GOLDEN], [1, GOLDEN, 0], [1, -GOLDEN, 0], [GOLDEN, 0, 1]])
-DODECAHEDRON = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
-"""Nine faces on five axes: five sums and three biases, so eight of nine parameters."""
-
-
-@pytest.mark.parametrize("sigma", [2e-5, 2e-3, 2e-2])
-def test_the_rank_of_readings_is_that_of_their_attitudes(sigma):
-    """Neither the noise nor the scales and angles of a sensor make eight parameters nine."""
-    sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
-    for seed in range(10):
-        noise = sigma * np.random.default_rng(seed).standard_normal((9, 3))
-        forces = -9.80665 * DODECAHEDRON @ sensor.T + [0.12, -0.08, 0.2] + noise
-        read = Campaign("read", np.arange(9), forces, 9.80665, sigma_force=sigma)
-        with pytest.raises(InputError, match=r"rank 8 of 9: .*s_x, s_y, s_z"):
-            fit_campaign(read, NINE, GRAVITY)
-
-
-def test_a_ring_tells_nothing_of_the_axis_that_stays_level():
-    """Its few mm/s² out of the plane are those of the angles between the axes."""
-    turn = np.arange(12) * np.pi / 6
-    ring = np.column_stack([np.zeros(12), np.cos(turn), np.sin(turn)])
-    sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
-    noise = 2e-5 * np.random.default_rng(1).standard_normal((12, 3))
-    forces = 9.80665 * ring @ sensor.T + noise
-    read = Campaign("ring", np.arange(12), forces, 9.80665, sigma_force=2e-5)
-    with pytest.raises(InputError, match=r"rank 4 of 6: b_x.*, s_x"):
-        fit_campaign(read, get_model("bias-scale"), GRAVITY)

@@ -37,8 +37,6 @@ Array = NDArray[np.float64]
 
 _ALIKE = 1.5  # largest over smallest norm of the means of one sensor in gravity
 _SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity; of a sphere 0.58
-FLAT = 0.01
-"""Points whose extent in a direction is below this share of that in others have no sphere."""
 SLOW = 2.0
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand."""
@@ -421,10 +419,8 @@ def fit_sphere(forces: Array) -> tuple[Array, float] | None:
     # Relative to their mean, so that a large offset costs no digits.
     middle = forces.mean(axis=0)
     points = forces - middle
-    size = float(np.sqrt(np.mean(points**2))) or 1.0
-    design = np.column_stack([points / size, np.ones(len(points))])
-    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=FLAT)
-    solution[:3] /= 2 * size
+    design = np.column_stack([2 * points, np.ones(len(points))])
+    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=1e-6)
     square = solution[3] + solution[:3] @ solution[:3]
     if rank < 4 or square <= 0:
         return None
