@@ -88,6 +88,8 @@ def _whole(path: str | Path, remedy: str) -> Iterator[None]:
     """Turn Arrow's error on an incomplete file into one line."""
     try:
         with readable(path):
+            with Path(path).open("rb") as file:  # Arrow's errors do not say that it is the disk
+                file.read(1)
             yield
     except InputError:
         raise

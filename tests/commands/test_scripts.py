@@ -69,9 +69,10 @@ def made(tmp_path_factory):
         np.savetxt("log.csv", readings, "%.5f", delimiter=",")
         for state, options in STATES.items():
             succeed("simulate-campaign", "--out", state, *options)
-        succeed("calibrate", "accepted", "--out", EPOCHS[0])
-        for epoch in EPOCHS[1:]:
-            shutil.copytree(EPOCHS[0], epoch)
+        for seed, epoch in enumerate(EPOCHS, 11):
+            again = (*STATES["accepted"], "--seed", seed, "--truth", f"{epoch}.yaml")
+            succeed("simulate-campaign", "--out", f"of-{epoch}", *again)
+            succeed("calibrate", f"of-{epoch}", "--out", epoch)
     return folder
 
 

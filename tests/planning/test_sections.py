@@ -76,7 +76,7 @@ def test_the_workflow_says_it_too(tmp_path):
 
 def test_a_section_alone_runs_only_its_rules(tmp_path):
     asked = {"tilt_accuracy": "10mgon", "sensor": "adxl355"}
-    config = {"study": "tiny", "plan": {"cases": {"one": asked, "again": asked}}}
+    config = {"study": "tiny", "plan": {"cases": {"one": asked, "again": {**asked}}}}
     assert jobs(run_workflow("plan", tmp_path, config, "--dry-run").stdout) == {"plan": 2}
 
 

@@ -82,7 +82,7 @@ def test_each_key_of_a_calibration_is_described(pages):
         "comparison.json": set(_keys(comparison_document(compare(one, one)))),
         "history.json": set(_keys(history_document(history))),
         "history.parquet": set(history_table(history)),
-        "lot.json": set(_keys(_lot())),
+        "lot.json": {*_keys(_lot()), "files"},
         "type.yaml": {
             *TypeFile.model_fields,
             *(f"parameters.{n}" for n in TypicalParameter.model_fields),

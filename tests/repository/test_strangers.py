@@ -101,7 +101,8 @@ def write_log(path, directions):
     axes = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
     read = true @ axes.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
     read += rng.normal(0, NOISE, read.shape)
-    np.savetxt(path, read, "%.5f", delimiter=",")
+    timed = np.column_stack([0.01 * np.arange(len(read)), read])
+    np.savetxt(path, timed, "%.5f", delimiter=",", header="t,ax,ay,az", comments="")
     return true
 
 
@@ -112,7 +113,7 @@ def test_a_geodesist_levels_a_log(shell):
     design, imported, calibrate, apply, advise = commands
     shell(design)
     positions = yaml.safe_load((shell.folder / "my-positions.yaml").read_text(encoding="utf-8"))
-    true = write_log(shell.folder / "log.csv", np.array(positions["directions"]))
+    true = write_log(shell.folder / "calibration.csv", np.array(positions["directions"]))
     assert "campaign: my-campaign (18 positions)" in shell(f"{imported} --gravity 9.80795")
     said = shell(calibrate)
     assert "ACCEPTED" in said

@@ -22,7 +22,7 @@ def test_counts_and_g_come_back():
     (("counts", [1, 0, 1]), "scale: must not be 0"),
     (("counts", 1, np.inf), "offset: must be finite"),
     (("g", 2), "goes with unit counts, not g"),
-    (("mg",), "unknown unit of a log 'mg'"),
+    (("lsb",), "unknown unit of a log 'lsb'"),
 ])  # fmt: skip
 def test_what_does_not_fit_the_unit(given, said):
     with pytest.raises(InputError, match=said):

@@ -42,7 +42,7 @@ def test_a_composition_has_one_name(text, name, number):
     ("bias++scale", "a part is empty"),
     ("bias+saturation[k_sat]", "did you mean 'k_sat_"),
     ("nowhere/model.yaml", "nowhere/model.yaml: no such file"),
-    (f"{'x' * 300}.yaml", "File name too long"),
+    (f"{'x' * 300}.yaml", "too long for the name of a file"),
     ("x" * 5000, "unknown model"),
 ])  # fmt: skip
 def test_what_is_no_model_is_one_line(text, words):
