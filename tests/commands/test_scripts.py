@@ -50,7 +50,7 @@ HAVE = {
     "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
     "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
     "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
-    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ", "history": "^UNCHANGED: ",
+    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ", "history": "^(UN)?CHANGED: ",
     "lot": "is missing",
 }  # fmt: skip
 """What its result has."""
