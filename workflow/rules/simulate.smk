@@ -1,7 +1,7 @@
 rule simulate:
     output:
-        estimates=ESTIMATES,
         **{name: f"{BATCH}/{name}.parquet" for name in TABLES},
+        estimates=ESTIMATES,
     log:
         f"{RESULTS}/logs/simulate/{{batch}}.log",
     benchmark:
