@@ -18,6 +18,6 @@ def claims_command(results: Path) -> None:
     those of this project about what simulation adds to linear theory.
     """
     from accelstudy.files.tables import read_table
-    from accelstudy.study.claims.judging import claims_markdown
+    from accelstudy.study.claims.page import claims_markdown
 
     click.echo(claims_markdown(read_table(results / "claims.parquet")), nl=False)

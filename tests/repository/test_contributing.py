@@ -13,10 +13,11 @@ from places import ROOT
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 EXAMPLES = dict(re.findall(r"`(accelstudy/[\w/]+\.py)`:\n\n```python\n(.*?)```", PAGE, re.DOTALL))
 
+(CLAIM,) = re.findall(r"```yaml\n(- claim: .*?)```", PAGE, re.DOTALL)
+
 LOOK = r"""
 import json
 import sys
-from types import SimpleNamespace
 
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import captions, draw, figure_names, figure_tables
@@ -29,7 +30,8 @@ import pandas as pd
 from click.testing import CliRunner
 
 from accelstudy.commands.main import main
-from accelstudy.study.claims import base, judge
+from accelstudy.study.claims.judging import claim_table, judge_claim
+from accelstudy.study.claims.quantities import Evidence
 
 found["captions"] = captions(found["figures"], study)
 found["tables"] = figure_tables("tilt-over-condition")
@@ -40,11 +42,11 @@ found["points"] = [line.get_xydata().tolist() for line in ax.get_lines()]
 
 pairs = [("b_x", "s_x", -0.01), ("b_x", "b_y", 0.5), ("s_x", "s_y", 0.25)]
 correlations = pd.DataFrame(pairs, columns=["parameter_1", "parameter_2", "adjustment"])
-base._JUDGES[:] = [its for its in base._JUDGES if its.__name__ == "bias_and_scale"]
-evidence = SimpleNamespace(
-    cell=SimpleNamespace(name="mine"), correlations=correlations.assign(cell="mine")
-)
-found["claims"] = judge(evidence)[0].to_dict("records")
+settings = study.sensitivity
+cell = f"{settings.model}/{settings.scheme}/gravity"
+tables = {"correlations": correlations.assign(cell=cell)}
+evidence = Evidence(study, tables, pd.DataFrame(), pd.DataFrame())
+found["claims"] = [judge_claim(claim_table()["paper"][-1], evidence)]
 
 found["said"] = []
 for line in sys.stdin.read().splitlines():
@@ -77,6 +79,9 @@ def found(tmp_path_factory):
     for path, text in EXAMPLES.items():
         assert not (clone / path).exists(), path
         (clone / path).write_text(text, encoding="utf-8")
+    claims = clone / "accelstudy/study/claims/claims.yaml"
+    papers, others = claims.read_text(encoding="utf-8").split("\n# Each is judged")
+    claims.write_text(f"{papers}{CLAIM}\n# Each is judged{others}", encoding="utf-8")
     checks = (["check", "--no-cache"], ["format", "--check", "--no-cache"])
     for words in checks:
         subprocess.run([sys.executable, "-m", "ruff", *words, *EXAMPLES], cwd=clone, check=True)
@@ -97,7 +102,7 @@ def test_each_checklist_has_one_file():
     rooms = [path.split("/")[1:-1] for path in EXAMPLES]
     assert rooms == [
         ["effects"], ["noise_effects"], ["schemes"], ["approaches"],
-        ["study", "figures"], ["study", "claims"],
+        ["study", "figures"],
     ]  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from places import ROOT
 PACKAGE = "accelstudy"
 REGISTRIES = (
     *("approaches", "campaign.gross_errors", "commands", "effects", "noise_effects", "schemes"),
-    *("study.claims", "study.figures"),
+    "study.figures",
 )
 """Rooms in which each idea has a file, however small."""
 SMALL = 40

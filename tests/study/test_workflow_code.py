@@ -42,7 +42,7 @@ def names():
     ("drawing/style.py", {"figures", "calibrate"}),
     ("study/figures/sweep.py", {"figures"}),
     ("study/beyond_linear_theory.py", {"claims", "figures"}),
-    ("study/claims/base.py", {"claims"}),
+    ("study/claims/claims.yaml", {"claims"}),
     ("study/claims/page.html.j2", {"claims"}),
     ("pages/base.html.j2", {"claims", "calibrate", "overview"}),
     ("campaign/gross_errors/base.py", {"calibrate"}),

@@ -8,41 +8,6 @@ a number. Where one is not met, the verdict says by how much.
 Claims of this project say what simulation adds to linear theory. They are of no section of the
 paper, and hold or not by an interval of 95 %; where that has both, they are not decided.
 
-To add a claim, write a module next to this file with a function under `register`.
+`claims.yaml` lists the claims, `quantities.py` measures what they are about, and `judging.py`
+applies their rules. To add a claim, add an entry to the list.
 """
-
-from __future__ import annotations
-
-from accelstudy.basics.registry import import_modules
-from accelstudy.study.claims.base import (
-    FAILS,
-    HOLDS,
-    NOT_REPRODUCED,
-    OPEN,
-    REPRODUCED,
-    SLIP,
-    Claim,
-    Evidence,
-    SchemeClaim,
-    judge,
-    register,
-)
-from accelstudy.study.claims.judging import evidence_from
-
-__all__ = [
-    "FAILS",
-    "HOLDS",
-    "NOT_REPRODUCED",
-    "OPEN",
-    "REPRODUCED",
-    "SLIP",
-    "Claim",
-    "Evidence",
-    "SchemeClaim",
-    "evidence_from",
-    "judge",
-    "register",
-]
-
-# A module registers its claims when it is imported.
-import_modules(__name__, __path__)

@@ -1,38 +1,59 @@
-"""The claims judged by the files of a study: verdicts as tables, as a page and as Markdown."""
+"""The claims of `claims.yaml`, judged by the tables of a study."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from string import Formatter
+from typing import Any
 
+import numpy as np
 import pandas as pd
+import yaml
 
-from accelstudy.basics.wording import interval, number
+from accelstudy.basics.wording import counted, number
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.study.beyond_linear_theory import beyond_linear_theory, knows_all
-from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
-from accelstudy.study.claims.base import Array, Evidence, judge, schemes_with_both
-from accelstudy.study.config import StudyConfig
-from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.distributions import (
-    EDGES,
-    PROBABILITIES,
-    Controlled,
-    Sample,
-    apart_by_quantile,
+from accelstudy.study.beyond_linear_theory import (
+    beyond_linear_theory,
+    knows_all,
+    noise_when_off,
 )
-from accelstudy.study.monte_carlo.followed import EFFECT, cell_tilt_error
-from accelstudy.study.monte_carlo.replicates import Replicates, read_replicates
-from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.cells import study_cells
+from accelstudy.study.claims import quantities
+from accelstudy.study.claims.page import claims_page
+from accelstudy.study.claims.quantities import Evidence, Numbers
+from accelstudy.study.claims.reductions import reductions
+from accelstudy.study.config import StudyConfig
+
+REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
+HOLDS, FAILS, OPEN = "holds", "does not hold", "not decided"
 
 TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
 """What the claims are judged by, beside estimates."""
-SWEEP = "config/sweeps/positions.yaml"
-"""A study for readers of the claims who want one of their own."""
+COLUMNS = (
+    *("claim", "section", "statement", "unit", "paper", "ours", "ci95_low", "ci95_high"),
+    *("verdict", "sentence", "single_low", "single_high", "percentile"),
+)
+"""Columns of the claims; `section` is empty for a claim of this project."""
+SCHEME_COLUMNS = (
+    *("claim", "scheme", "paper", "mean", "single_low", "median", "single_high", "percentile"),
+)
+RELATIONS = {
+    **{"at most": operator.le, "at least": operator.ge},
+    **{"below": operator.lt, "above": operator.gt},
+}
+MOST = 10
+"""Most set-ups that a sentence names."""
+
+
+@cache
+def claim_table() -> dict[str, list[dict[str, Any]]]:
+    """Read the claims."""
+    text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text))
 
 
 def judge_claims(
@@ -59,156 +80,167 @@ def judge_claims(
         for cell in study_cells(study)
         if cell.name == "/".join([settings.model, cell.scheme, cell.approach])
     ]
-    read = {name: read_table(tables[name]) for name in TABLES}
-    known = knows_all(study)
-    beyond = beyond_linear_theory(read["cells"], read["summary"]) if known else None
-    evidence = evidence_from(
-        cells,
-        estimates,
-        study.leveling.model_dump(),
-        scheme=settings.scheme,
-        correlations=read["correlations"],
-        sensitivity=read["sensitivity"],
-        shapley=read["shapley"],
-        beyond=beyond,
-        base_samples=settings.base_samples,
-        resamples=settings.resamples,
-        seed=study.seed,
-    )
-    claims, by_scheme = judge(evidence)
+    reduced = reductions(cells, estimates, study.leveling.model_dump(), papers_reductions())
+    claims, by_scheme = judge(study, {name: read_table(tables[name]) for name in TABLES}, reduced)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], by_scheme, provenance)
     with whole_file(outputs["html"]) as path:
         path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
 
 
-def evidence_from(
-    cells: Iterable[Cell],
-    estimates: Sequence[str | Path],
-    leveling: Mapping[str, Any],
-    **rest: Any,
-) -> Evidence:
-    """Collect the evidence.
+def papers_reductions() -> dict[str, float]:
+    """The paper's reduction, %, of the sd of each effect."""
+    rows = claim_table()["by_scheme"]
+    return {row["of"]: row["paper"] for row in rows if row["quantity"] == "reductions"}
+
+
+def judge(
+    study: StudyConfig, tables: Mapping[str, pd.DataFrame], reductions: pd.DataFrame
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Judge all claims.
 
     Parameters
     ----------
-    cells : cells with the model of the claims
-    estimates : files with the estimates of these cells
-    leveling : mapping with max_tilt_gon and attitudes
-    **rest : as in `Evidence`
+    study : StudyConfig, with `sensitivity`
+    tables : mapping of name to DataFrame, those of `TABLES`
+    reductions : DataFrame, see `accelstudy.study.claims.reductions`
+
+    Returns
+    -------
+    claims : DataFrame, with `COLUMNS`: those of the paper, then those of this project
+    by_scheme : DataFrame, with `SCHEME_COLUMNS`
     """
-    found = {}
-    for cell in cells:
-        if not cell.estimability.estimable:
-            continue
-        tilt = cell_tilt_error(cell, leveling)
-        control = Control.of(cell, tilt)
-        replicates = read_replicates(estimates, cell, control)
-        if replicates is not None:
-            statistics = Statistics.of(cell, replicates, control, tilt)
-            found[cell.scheme, cell.approach] = _Calibrations(cell, statistics, control, replicates)
-    ratios: dict[tuple[str, str], Controlled] = {}
-    for scheme in schemes_with_both(found):
-        pair = found[scheme, "gravity"], found[scheme, "robot"]
-        if all(each.statistics.redundancy > 0 and each.statistics.converged for each in pair):
-            for effect in pair[0].statistics.followed.effects:
-                ratios[scheme, effect] = _ratio(*pair, effect)
-    return Evidence(
-        statistics={key: each.statistics for key, each in found.items()},
-        ratios=ratios,
-        cells={key: each.cell for key, each in found.items()},
-        **rest,
-    )
-
-
-class _Calibrations(NamedTuple):
-    """The calibrations of a cell."""
-
-    cell: Cell
-    statistics: Statistics
-    control: Control | None
-    replicates: Replicates
-
-
-def _ratio(gravity: _Calibrations, robot: _Calibrations, effect: str) -> Controlled:
-    """Ratio of the sigma of an effect, robot-aided over gravity-based, of independent sessions.
-
-    Calibrations are paired by their number.
-    """
-    n = min(gravity.statistics.converged, robot.statistics.converged)
-    above, linear_above = _sigmas(robot, effect)
-    below, linear_below = _sigmas(gravity, effect)
-    ratio = above[:n] / below[:n]
-    numerator, denominator = robot.control, gravity.control
-    if numerator is None or denominator is None:
-        return Controlled(Sample(ratio), n)
-    linear = linear_above[:n] / linear_below[:n]
-
-    def known(probabilities: Array) -> Array:
-        return numerator.ratio_quantiles(denominator, effect, probabilities)
-
-    apart = apart_by_quantile(ratio - linear, linear, known(EDGES))
-    return Controlled(
-        Sample(ratio), n, linear=Sample(linear), known=known(PROBABILITIES), apart=apart
-    )
-
-
-def _sigmas(of: _Calibrations, effect: str) -> tuple[Array, Array]:
-    """Sigma of an effect in the calibrations that converged, and by linear theory."""
-    followed, (simulated, linear) = of.statistics.followed, of.replicates
-    column = followed.keys.index((EFFECT, effect))
-    own = followed.values(simulated)[:, column]
-    if linear is None:
-        return own, own
-    return own, followed.values(linear)[simulated.converged, column]
-
-
-def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
-    """Page (HTML, self-contained) with all claims and their verdicts."""
-    from accelstudy.pages import render  # which shows numbers as here
-
-    papers, own = _papers_and_own(claims)
-    return render(
-        "study/claims/page.html.j2",
-        claims=papers,
-        own=own,
-        schemes=by_scheme.to_dict("records"),
-        next_steps=[
-            ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
-            ("Run it", f"snakemake --cores 2 --configfile {SWEEP}"),
-        ],
-    )
-
-
-def claims_markdown(claims: pd.DataFrame) -> str:
-    """The claims as tables in Markdown, one row each: those of the paper, then of this project."""
-    papers, own = _papers_and_own(claims)
-    lines = [
-        "| section | claim | paper | ours (95 % interval) | verdict | |",
-        "|---|---|---|---|---|---|",
+    evidence, rows = Evidence(study, tables, reductions, pd.DataFrame()), claim_table()
+    parts = [
+        getattr(quantities, row["quantity"])(evidence, row["of"]).assign(
+            claim=row["claim"], paper=float(row["paper"])
+        )
+        for row in rows["by_scheme"]
     ]
-    for row in papers:
-        paper = "–" if math.isnan(row["paper"]) else f"{number(row['paper'])}{_unit(row)}"
-        lines.append(f"| {row['section']} | {row['statement']} | {paper} | {_judged(row)}")
-    if own:
-        lines += ["", "| claim of this project | found (95 % interval) | verdict | |"]
-        lines += ["|---|---|---|---|"]
-        lines += [f"| {row['statement']} | {_judged(row)}" for row in own]
-    return "\n".join(lines) + "\n"
+    by_scheme = pd.concat(parts, ignore_index=True)[list(SCHEME_COLUMNS)]
+    evidence = Evidence(study, tables, reductions, by_scheme)
+    claims = [judge_claim(row, evidence) for row in rows["paper"]]
+    if knows_all(study):
+        beyond = beyond_linear_theory(tables["cells"], tables["summary"])
+        claims += judge_simulation(beyond, study.sigma_force)
+    return pd.DataFrame(claims).reindex(columns=list(COLUMNS)), by_scheme
 
 
-def _papers_and_own(claims: pd.DataFrame) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
-    """Claims of the paper, and those of this project, which are of no section."""
-    of_paper = claims["section"] != ""
-    return claims[of_paper].to_dict("records"), claims[~of_paper].to_dict("records")
+def judge_claim(claim: Mapping[str, Any], evidence: Evidence) -> dict[str, Any]:
+    """Judge a claim of the paper; return its row."""
+    ((name, arguments),) = claim["quantity"].items()
+    ours: Numbers = {"paper": float(claim.get("paper", "nan")), "low": np.nan, "high": np.nan}
+    ours |= getattr(quantities, name)(evidence, **arguments)
+    return {
+        **{key: claim[key] for key in ("claim", "section", "statement", "unit")},
+        "paper": ours["paper"],
+        **{"ours": ours["value"], "ci95_low": ours["low"], "ci95_high": ours["high"]},
+        "verdict": _verdict(claim.get("rule"), ours),
+        "sentence": _Sentence().format(claim["sentence"], **ours),
+        **{key: ours[key] for key in ("single_low", "single_high", "percentile") if key in ours},
+    }
 
 
-def _judged(row: Mapping[Any, Any]) -> str:
-    """Number, verdict and sentence, as the last cells of a row in Markdown."""
-    spread = interval(row["ci95_low"], row["ci95_high"])
-    ours = f"{number(row['ours'])}{_unit(row)}" + (f" ({spread})" if spread else "")
-    return f"{ours} | **{row['verdict']}** | {row['sentence']} |"
+def _verdict(rule: str | None, ours: Numbers) -> str:
+    """Verdict by a rule such as "off at most 0.5 or outside at most 0"."""
+    if rule is None:
+        return SLIP
+    paper, nothing = ours["paper"], np.nan
+
+    def outside(low: str, high: str) -> float:
+        low_end, high_end = ours.get(low, nothing), ours.get(high, nothing)
+        return float(np.maximum(np.maximum(low_end - paper, paper - high_end), 0))
+
+    distances = {
+        "off": round(abs(ours["value"] - paper), 3),
+        "outside": outside("low", "high"),
+        "outside_single": outside("single_low", "single_high"),
+    }
+    for condition in rule.split(" or "):
+        name, *relation, limit = condition.split()
+        if RELATIONS[" ".join(relation)]({**distances, **ours}[name], float(limit)):
+            return REPRODUCED
+    return NOT_REPRODUCED
 
 
-def _unit(row: Mapping[Any, Any]) -> str:
-    return "" if row["unit"] in ("1", "ratio") else f" {row['unit']}"
+class _Sentence(Formatter):
+    """A text with numbers, whose minus is a minus and no hyphen."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        text = str(super().format_field(value, format_spec))
+        return text if isinstance(value, str) else text.replace("-", "−")
+
+
+# --- what simulation adds ------------------------------------------------------------------------
+
+
+def judge_simulation(beyond: pd.DataFrame, sigma: float) -> list[dict[str, Any]]:
+    """Judge what simulation adds, for each approach, by all models and schemes at one noise.
+
+    Parameters
+    ----------
+    beyond : DataFrame, see `accelstudy.study.beyond_linear_theory`
+    sigma : float, noise of the sensor, m/s²
+    """
+    rows = beyond[beyond["sensor_sigma_mps2"] == sigma]
+    return [
+        _judge_approach(claim, rows[rows["approach"] == approach], approach, sigma)
+        for claim in claim_table()["project"]
+        for approach in sorted(set(rows["approach"]))
+    ]
+
+
+def _judge_approach(
+    claim: Mapping[str, Any], rows: pd.DataFrame, approach: str, sigma: float
+) -> dict[str, Any]:
+    """Judge a claim by the rows of an approach: by the largest number of each set-up.
+
+    It holds if the interval of each set-up says so, and does not if that of one denies it.
+    """
+    column = "bias" if claim["quantity"] == "bias" else "excess"
+    size, half = rows[column].abs(), rows[f"{column}_half"]
+    numbers = rows.assign(size=size, low=(size - half).clip(lower=0), high=size + half)
+    of_setup = numbers.groupby(["model", "scheme"], observed=True, sort=False)
+    setups = of_setup[["size", "low", "high"]].max().reset_index()
+    for end in ("size", "low", "high"):
+        percent = 100 * setups[end]
+        noisy = claim["quantity"] == "noise"
+        setups[end] = noise_when_off(1.0, setups[end]) if noisy else percent
+    # The end of its interval at which a set-up may still be right, and that at which it surely is.
+    if "most" in claim:
+        fails, holds = setups["low"] > claim["most"], setups["high"] < claim["most"]
+        worst, bound = setups[["size", "low", "high"]].max(), "at most"
+    else:
+        fails, holds = setups["low"] < claim["least"], setups["high"] > claim["least"]
+        worst, bound = setups[["size", "low", "high"]].min(), "at least"
+    undecided = ~fails & ~holds
+    low, high = sorted((worst["low"], worst["high"]))
+    unit = " times" if claim["unit"] == "ratio" else f" {claim['unit']}"
+
+    def named(chosen: pd.DataFrame) -> str:
+        names = [
+            f"{row['scheme']} with {row['model']} ({number(row['size'])}{unit})"
+            for row in chosen.to_dict("records")
+        ]
+        return ", ".join([*names[:MOST], *([f"{len(names) - MOST} more"] if names[MOST:] else [])])
+
+    parts, all_of = [], counted(len(setups), "set-up")
+    if fails.any():
+        parts.append(f"Not so in {fails.sum()} of {all_of}: {named(setups[fails])}.")
+    if undecided.any():
+        some = counted(int(undecided.sum()), "set-up")
+        parts.append(f"Not decided in {some}: {named(setups[undecided])}.")
+    others = setups[holds].groupby("model", observed=True, sort=False)["high"]
+    if holds.any():
+        where = "Elsewhere" if parts else f"In {all_of}"
+        limits = others.max() if "most" in claim else others.min()
+        each = (f"{number(value)}{unit} with {model}" for model, value in limits.items())
+        parts.append(f"{where} {bound} {', '.join(each)}.")
+    statement = f"by {approach}, at a noise of {sigma * 1000:g} mm/s², {claim['statement']}"
+    return {
+        "claim": f"{claim['claim']}-{approach}",
+        **{"section": "", "statement": statement, "unit": claim["unit"], "paper": np.nan},
+        **{"ours": float(worst["size"]), "ci95_low": low, "ci95_high": high},
+        "verdict": FAILS if fails.any() else OPEN if undecided.any() else HOLDS,
+        "sentence": " ".join(parts),
+    }
