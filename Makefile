@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -39,6 +39,13 @@ env: $(READY) ## make the environment, from locked versions, in .venv
 
 test: lint ## check and test the package
 	$(TEST)
+
+# Of all parts in tests/golden, or of PART; `make test` compares those that take a minute together.
+golden: $(READY) ## compare what commands and studies tell with what is kept of them
+	CORES=$(CORES) python tests/helpers/golden.py $(PART)
+
+golden-renew: $(READY) ## keep what they tell now, of one part: make golden-renew PART=first
+	CORES=$(CORES) python tests/helpers/golden.py --renew $(PART)
 
 # Apart from `make test`, as measuring takes as long as all tests.
 coverage: $(READY) ## test the package, and list the lines that no test runs

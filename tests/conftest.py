@@ -14,7 +14,7 @@ os.environ.pop("ACCELSTUDY_ANGLE_UNIT", None)
 
 LONGEST = (
     "test_campaign_batch.py", "test_plan.py", "test_workflow.py", "test_every_path.py",
-    "test_optimal.py", "test_walk.py", "test_examples.py", "test_hidden_documents.py",
+    "test_optimal.py", "test_golden.py", "test_examples.py", "test_hidden_documents.py",
     "test_diagnosis.py", "test_designs.py", "test_diagnosis_workflow.py", "test_any_model.py",
 )  # fmt: skip
 """The longest first."""

@@ -1,4 +1,4 @@
-"""Measured data from the command line: calibrate, apply, export, check-sigmas."""
+"""Measured data from the command line: calibrate and apply; the golden set has all they write."""
 
 import json
 import re
@@ -47,26 +47,18 @@ def content_of(folder, name="calibration.json"):
 
 
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
-def test_calibrate_writes_everything(calibrations, approach):
-    result, out = calibrations[approach]
+def test_calibrate_finds_the_truth(calibrations, approach):
+    _, out = calibrations[approach]
     content = content_of(out)
     errors = [(p["value"] - TRUTH.get(p["name"], 0)) / p["sigma"] for p in content["parameters"]]
     assert np.abs(errors).max() < 4.5
     assert content["redundancy"] == (15 if approach == "gravity" else 63)
     assert content["quality"]["global_test"]["accepted"]
-    assert content["quality"]["verdict"] in result.output
     positions = pd.read_parquet(out / "positions.parquet")
     assert positions["redundancy"].sum() == pytest.approx(content["redundancy"])
     rms = np.sqrt(np.mean(positions["norm_residual_mps2"] ** 2))
     assert content["rms_norm_residual_mps2"] == pytest.approx(rms)
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert content["quality"]["verdict"] in text_of(page)
-    assert "✓ ACCEPTED" in text_of(page)
-    assert page.count("<svg") == 2
-    assert_sound(page)
-    for name in ("residuals", "correlations"):
-        assert (out / f"figures/{name}.png").stat().st_size > 1000
-    assert not list(out.rglob("*.part"))
+    assert_sound((out / "report.html").read_text(encoding="utf-8"))
 
 
 def test_degrees_on_the_page_and_gon_in_the_file(campaign, tmp_path):
@@ -273,26 +265,10 @@ def test_a_bad_log_is_one_line(calibrations, tmp_path):
     assert log.read_text(encoding="utf-8") == "1,2,9\n"
 
 
-@pytest.mark.parametrize("form", ["json", "yaml", "c", "matrix", "px4", "ros"])
-def test_export_prints(calibrations, form):
-    result = succeed("export", calibrations["gravity"][1] / "calibration.json", "--form", form)
-    assert len(result.output.splitlines()) >= 3
-
-
-def test_check_sigmas(campaign):
-    result = succeed("check-sigmas", campaign, "--replicates", 200)
-    assert "alpha_zx" in result.output
-
-
-@pytest.mark.parametrize("arguments", [
-    ["calibrate", "nowhere", "--out", "out"],
-    ["export", "nowhere.json"],
-    ["check-sigmas", "nowhere"],
-])  # fmt: skip
-def test_what_is_not_there_is_one_line(arguments, tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", ["calibrate", "export", "check-sigmas"])
+def test_what_is_not_there_is_one_line(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    line = refusal(*arguments)
-    assert "nowhere" in line
+    assert "nowhere" in refusal(command, "nowhere", *(["--out", "out"] * (command == "calibrate")))
     assert not list(tmp_path.iterdir())
 
 

@@ -1,9 +1,8 @@
-"""What scripts rely on: --quiet, both streams, the exit status, and what is suggested."""
+"""What commands suggest to type next runs, and writes where nothing else is."""
 
 import re
 import shlex
 import shutil
-from contextlib import chdir
 from html import unescape
 from pathlib import Path
 
@@ -13,107 +12,21 @@ from calling import succeed
 from matplotlib.figure import Figure
 
 from accelstudy.basics import suggested
-from accelstudy.commands.main import main
 from accelstudy.schemes import get_scheme
-
-STATES = {
-    "accepted": (),
-    "rejected": ("--effect", "quadratic_scale", "--size", 5),
-    "cannot tell": ("--sigma-unknown",),
-    "implausible": ("--gross", "row_order(first=3, second=4)"),
-}
-"""What makes a calibration such."""
-READ = ("log.csv", "--columns", "fx=0,fy=1,fz=2", "--rate", 50)
-EPOCHS = ("plain", "later", "latest")
-RESULTS = {
-    "import": (*READ, "--no-figure", "--out", "log"),
-    "simulate-campaign": ("--out", "again"),
-    "apply": ("plain/calibration.json", *READ, "--out", "leveled.csv"),
-    "check-sigmas": ("accepted", "--replicates", 2),
-    "advise": ("accepted", "--tilt-accuracy", "10mgon", "--tilt-range", "30gon"),
-    "data-sheet": ("accepted", "--out", "sheet.yaml"),
-    "design": ("--positions", 6, "--starts", 1, "--model", "bias", "--attitudes", "cube", "--out",
-               "a.yaml"),
-    "schemes": ("faces-6",),
-    "effects": (),
-    "public": (),
-    "calibrate": ("accepted", "--out", "plain"),
-    "lot": ("accepted", "rejected", "--out", "lot"),
-    "compare": ("plain/calibration.json", "plain/calibration.json", "--out", "compared"),
-    "history": (*(f"{name}/calibration.json" for name in EPOCHS), "--date", "2024-01-01", "--date",
-                "2024-07-01", "--date", "2025-01-01", "--out", "years"),
-}  # fmt: skip
-"""Arguments of commands that have --quiet."""
-HAVE = {
-    "import": r"^campaign: log \(20 positions\)$",
-    "simulate-campaign": r"^campaign: again \(24 positions\)$",
-    "apply": r"^3000 of 3000 rows leveled: leveled.csv$", "check-sigmas": "sd_empirical",
-    "advise": "tilt accuracy: roll", "data-sheet": "^sigma of the mean of a position: 2 mm/s²$",
-    "design": "roll/gon", "schemes": "faces-6", "effects": "^warm_up: ", "public": "^xsens-mti: ",
-    "calibrate": "^ACCEPTED: ", "compare": "^UNCHANGED: ", "history": "^(UN)?CHANGED: ",
-    "lot": "is missing",
-}  # fmt: skip
-"""What its result has."""
 
 UNDRAWN = "accelstudy.campaign.calibration.output.residual_figure", lambda *_: Figure()
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A folder with a campaign of each state, and a log; its name has a space."""
-    folder = tmp_path_factory.mktemp("my work")
+@pytest.fixture
+def made(tmp_path_factory, monkeypatch):
+    """A folder whose name has a space, with a campaign that is accepted, one that is not, a log."""
     rng, holds = np.random.default_rng(1), np.repeat(get_scheme("fibonacci-20").directions, 150, 0)
     readings = -9.80665 * holds + 0.005 * rng.standard_normal(holds.shape)
-    with chdir(folder), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(*UNDRAWN)
-        np.savetxt("log.csv", readings, "%.5f", delimiter=",")
-        for state, options in STATES.items():
-            succeed("simulate-campaign", "--out", state, *options)
-        for seed, epoch in enumerate(EPOCHS, 11):
-            again = (*STATES["accepted"], "--seed", seed, "--truth", f"{epoch}.yaml")
-            succeed("simulate-campaign", "--out", f"of-{epoch}", *again)
-            succeed("calibrate", f"of-{epoch}", "--out", epoch)
-    return folder
-
-
-@pytest.fixture
-def here(made, monkeypatch):
-    monkeypatch.chdir(made)
+    monkeypatch.chdir(tmp_path_factory.mktemp("my work"))
     monkeypatch.setattr(*UNDRAWN)
-
-
-def quiet(command, *arguments):
-    """What a command prints with --quiet: a part of what it prints without, and all warnings."""
-    force = ["--force"] if "force" in {p.name for p in main.commands[command].params} else []
-    without, with_it = (succeed(command, *arguments, *force, *more) for more in ((), ("--quiet",)))
-    assert with_it.stderr == without.stderr
-    assert all(line.startswith("warning: ") for line in without.stderr.splitlines())
-    whole = iter(without.stdout.splitlines())
-    assert all(line in whole for line in with_it.stdout.splitlines())
-    return with_it.stdout
-
-
-def test_each_command_with_the_option_is_tested():
-    """Those of diagnose and plan take longer, and are tested with all else that they say."""
-    has = {n for n, c in main.commands.items() if "quiet" in {p.name for p in c.params}}
-    assert has == {*RESULTS, "diagnose", "plan"}
-
-
-@pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("command", RESULTS)
-def test_quiet_leaves_the_result(command):
-    assert re.search(HAVE[command], quiet(command, *RESULTS[command]), re.MULTILINE)
-
-
-@pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("state", STATES)
-def test_quiet_leaves_the_verdict_of_a_calibration(state):
-    verdict = quiet("calibrate", state, "--approach", "robot", "--out", f"{state}-calibrated")
-    assert verdict.startswith(f"{state.upper()}: ")
-    assert verdict.count("\n") == 1
-
-
-# --- suggestions ---------------------------------------------------------------------------------
+    np.savetxt("log.csv", readings, "%.5f", delimiter=",")
+    succeed("simulate-campaign", "--out", "accepted")
+    succeed("simulate-campaign", "--out", "rejected", "--effect", "quadratic_scale", "--size", 5)
 
 
 def suggestions(text):
@@ -159,7 +72,7 @@ def test_what_is_suggested_writes_into_no_campaign(tmp_path, monkeypatch, typed)
     assert not [*source.rglob("calibration.json")]
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("made")
 def test_all_that_is_suggested_runs_from_the_log_to_the_last_page(monkeypatch):
     """Two sensors of one log, with the files where the user has them."""
     shutil.copytree("rejected", "imu/left")

@@ -20,7 +20,7 @@ import pytest
 import yaml
 from places import ROOT
 from recorded import write_bag
-from walk import page_commands
+from transcript import commands_of_page
 
 from accelstudy.basics.units import GON
 from accelstudy.files.tables import read_origin, read_table
@@ -83,6 +83,16 @@ def test_it_is_the_installed_package(shell, environment):
     assert Path(shell(where).strip()).is_relative_to(environment)
 
 
+def test_the_package_has_all_its_files(environment):
+    (site,) = environment.glob("lib/python*/site-packages/accelstudy")
+    for folder in ("accelstudy", "config", "profiles", "workflow"):
+        within = site if folder == "accelstudy" else site / "shipped" / folder
+        for path in (ROOT / folder).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert (within / path.relative_to(ROOT / folder)).read_bytes() == path.read_bytes()
+    assert (site / "py.typed").is_file()
+
+
 # --- a geodesist with a table and a CSV ----------------------------------------------------------
 
 NOISE = 0.005
@@ -108,7 +118,7 @@ def write_log(path, directions):
 
 def test_a_geodesist_levels_a_log(shell):
     """By the commands of the page, with the best positions and gravity as it tells to give it."""
-    typed = page_commands(ROOT / "docs" / "start" / "geodesist.md")
+    typed = commands_of_page((ROOT / "docs/start/geodesist.md").read_text(encoding="utf-8"))
     commands = [line for line in typed if line.startswith("accelstudy ")]
     design, imported, calibrate, apply, advise = commands
     shell(design)

@@ -1,0 +1,143 @@
+"""What is kept in this folder still comes out, and a change is told by file and line.
+
+Here the quick parts; `make golden` compares all of them.
+"""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from golden import compare, kept_of, same_number
+from golden_parts import PARTS, QUICK
+from places import ROOT
+from transcript import commands_of_page, masked
+
+from accelstudy.commands.main import main
+
+
+@pytest.mark.parametrize("part", QUICK)
+def test_what_is_kept_still_comes_out(part):
+    script = [sys.executable, ROOT / "tests/helpers/golden.py", part]
+    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True)
+    said = f"{done.stdout}{done.stderr}"
+    assert not done.returncode, f"{said}\n`make golden-renew PART={part}` keeps what comes now"
+
+
+# --- what is kept --------------------------------------------------------------------------------
+
+
+def test_each_part_is_kept_and_3_mb_are_enough():
+    sizes = {part: sum(map(len, kept_of(part).values())) for part in PARTS}
+    assert all(sizes.values())
+    assert sum(sizes.values()) < 3e6
+
+
+def test_no_command_of_a_page_fails():
+    for part in PARTS.keys() - {"quiet"}:  # three of these are to fail
+        for name, text in kept_of(part).items():
+            assert not re.findall("^=== .*\nexit status .*", text, re.M), f"{part}/{name}"
+
+
+def test_each_help_has_an_example():
+    texts = kept_of("help")
+    assert texts.keys() == {"accelstudy", *main.commands}
+    for command in main.commands:
+        assert re.search(rf"Example:\n +accelstudy {command}\b", texts[command]), command
+
+
+def test_each_command_with_quiet_is_kept():
+    """That of plan takes longer, and is tested with all else that it says."""
+    has = {n for n, c in main.commands.items() if "quiet" in {p.name for p in c.params}} - {"plan"}
+    text = kept_of("quiet")["quiet"]
+    assert {*re.findall("^=== accelstudy ([a-z-]+).* --quiet", text, re.M)} == has
+
+
+def test_the_first_example_of_a_log_needs_no_columns():
+    """Those by number come second; both are the same log, so nothing else differs."""
+    steps = kept_of("first")["README"].split("\n=== ")
+    first, second = (step for step in steps if step.startswith("accelstudy import "))
+    assert first.startswith("accelstudy import calibration.csv --out my-campaign\n")
+    assert "--columns fx=0" in second
+    holds = [re.search("^> holds: .*", text, re.M)[0] for text in (first, second)]
+    assert holds[0] == holds[1]
+    assert holds[0].startswith("> holds: 24, ")
+    recognised = re.search("^> (columns: .*)", first, re.M)[1]
+    assert f"\n{recognised}\n" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+# --- comparing -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("0.1234567890123", "0.1234567890124", True),  # 1e-12 of its size
+        ("1.00000000001e5", "100000.000002", True),
+        ("0.1234567890", "0.1234567894", False),  # 3e-9
+        ("-3e-17", "2.5e-16", True),  # rounding of zero
+        ("3e-12", "2e-12", False),
+        ("-0.00", "0.00", True),
+        ("0.123456", "0.123457", True),  # printed with six digits: one in the last
+        ("0.123456", "0.123458", False),
+        ("9.99999", "10.0000", True),
+        ("0.12346", "0.123461", True),  # a zero at the end is not printed
+        ("9.88", "9.87", False),  # too few digits
+        ("−9.88", "9.88", False),
+        ("24", "25", False),
+        ("123456", "123457", False),  # whole numbers are counted
+    ],
+)
+def test_numbers_that_are_the_same(one, other, same):
+    assert same_number(one, other) == same
+
+
+KEPT = "ACCEPTED: p = 0.96\n  b_x = 0.10263162904837\nlast\n"
+
+
+@pytest.mark.parametrize(
+    ("now", "lines"),
+    [
+        (KEPT.replace("4837", "4839"), []),
+        (KEPT.replace("b_x = ", "b_x =   "), []),  # numbers of other widths
+        (KEPT.replace("\n  b", "\n b"), [2]),
+        (KEPT.replace("0.102", "0.103"), [2]),
+        (KEPT.replace("ACCEPTED", "REJECTED"), [1]),
+        (KEPT + "more\n", [4]),
+        (KEPT.replace("last\n", ""), [3]),
+        ("first\n" + KEPT, [1]),
+        ("", [1, 2, 3]),
+    ],
+)
+def test_a_difference_is_told_by_its_line(now, lines):
+    differences, merged = compare(KEPT, now)
+    assert [each.line for each in differences] == lines
+    assert merged == (now if lines else KEPT)  # renewing changes no line that agrees
+
+
+def test_a_difference_shows_both_lines_and_how_far_a_number_moved():
+    ((one,), _) = compare("b_x = 0.50 ± 0.01\n", "b_x = 0.55 ± 0.01\n")
+    assert str(one) == "1\n  expected b_x = 0.50 ± 0.01\n  got      b_x = 0.55 ± 0.01"
+    assert one.change == pytest.approx(0.05 / 0.55)
+    ((other,), _) = compare("ACCEPTED 0.50\n", "REJECTED 0.55\n")
+    assert other.change is None
+
+
+# --- what readers type ---------------------------------------------------------------------------
+
+
+def test_what_depends_on_the_place_is_masked(tmp_path):
+    text = f"{tmp_path}/log.csv of {ROOT}, 0.12345678901234567 and 0.5"
+    assert masked(text, tmp_path) == "FOLDER/log.csv of ROOT, 0.123456789012 and 0.5"
+
+
+def test_commands_of_a_page_are_those_that_a_reader_types():
+    typed = ["accelstudy a --out \\", "  b   # why", "for i in 1 2; do", "  accelstudy c", "done"]
+    block = "".join(f"    {line}\n" for line in typed)
+    python = "import accelstudy\n\nprint(1)\n"
+    fences = f"```sh\nnot this\n```\n\n```python\n{python}```\n"
+    assert commands_of_page(f"Type\n\n{block}\nfor\n\n    printed\n\n{fences}") == [
+        "accelstudy a --out b",
+        "for i in 1 2; do accelstudy c; done",
+        python,
+    ]
