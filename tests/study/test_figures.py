@@ -21,13 +21,12 @@ from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
     captions,
     draw,
-    draw_figures,
     figure_names,
     figure_tables,
     get_figure,
     register,
-    render,
     total_effects,
+    write_figure,
 )
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
@@ -121,18 +120,21 @@ def test_every_figure_has_a_title_and_a_caption_that_a_report_can_show(paper):
 
 def test_a_figure_of_a_table_that_there_is_not_is_refused():
     with pytest.raises(ValueError, match="figure 'mine': no such tables: summaries"):
-        register("mine", "Mine", "", tables=("summary", "summaries"))
+        register("mine", tables=("summary", "summaries"))
 
 
 # One of each kind: a map, lines, a matrix, points.
 @pytest.mark.parametrize("name", ["figure-4", "figure-6", "leveling-overview", "closed-forms"])
-def test_svg_and_png_are_the_same_bytes_each_time(name, tables, paper, tmp_path):
-    for folder in ("first", "second"):
-        render(name, tables, paper, tmp_path / folder / "a.svg", tmp_path / folder / "a.png")
-    for kind in ("svg", "png"):
-        first, second = (tmp_path / f / f"a.{kind}" for f in ("first", "second"))
-        assert first.read_bytes() == second.read_bytes()
-    assert not list(tmp_path.rglob("*.part"))
+def test_a_figure_is_written_with_its_caption_in_the_same_bytes_each_time(
+    name, tables, paper, tmp_path
+):
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        write_figure(name, tables, paper, folder)
+    written = {path.name: path.read_bytes() for path in (tmp_path / "first").iterdir()}
+    assert sorted(written) == [f"{name}.{kind}" for kind in ("png", "rst", "svg")]
+    for path in (tmp_path / "second").iterdir():
+        assert path.read_bytes() == written[path.name]
+    assert written[f"{name}.rst"].decode() == captions([name], paper)[name] + "\n"
 
 
 @pytest.mark.parametrize("name", sorted(set(ALL) - {"figure-8", "closed-forms"}))
@@ -410,17 +412,11 @@ def test_an_unknown_figure_is_an_input_error_that_names_a_near_one():
 
 
 def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
-    tables["summary"].to_parquet(tmp_path / "summary.parquet")
-    tables["quantiles"].iloc[:, :3].to_parquet(tmp_path / "quantiles.parquet")
-    paths = {name: tmp_path / f"{name}.parquet" for name in ("summary", "quantiles")}
+    damaged = {**tables, "quantiles": tables["quantiles"].iloc[:, :3]}
     with pytest.raises(KeyError) as error:
-        draw_figures(paper, captions(["closed-forms", "figure-7"], paper), paths, tmp_path)
-    (note,) = error.value.__notes__
-    assert note.startswith("The figure 'figure-7' could not be drawn")
-    assert "closed-forms and figure-7" in note
-    assert {path.name for path in tmp_path.glob("*.??[gt]")} == {
-        f"closed-forms.{kind}" for kind in ("svg", "png", "rst")
-    }
+        write_figure("figure-7", damaged, paper, tmp_path)
+    assert error.value.__notes__ == ["The figure 'figure-7' could not be drawn."]
+    assert not any(tmp_path.iterdir())
 
 
 IMPORTED = """\

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
 from accelstudy.drawing.style import group_label, group_of, in_order, shown, symbol
-from accelstudy.study.figures.base import Tables
 from accelstudy.study.figures.factors import NOISES, Factor
+from accelstudy.study.figures.registry import Tables
 
 ANGLES = ("roll", "pitch")
 QUANTITIES = {

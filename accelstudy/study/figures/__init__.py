@@ -4,15 +4,18 @@ To add one, write a module next to this file with a function under `register`.
 """
 
 from accelstudy.basics.registry import import_modules
-from accelstudy.study.figures.base import (
+from accelstudy.study.figures.registry import (
     FigureEntry,
     Tables,
+    angle_unit,
+    captions,
+    draw,
     figure_names,
     figure_tables,
     get_figure,
     register,
+    write_figure,
 )
-from accelstudy.study.figures.rendering import angle_unit, captions, draw, draw_figures, render
 
 __all__ = [
     "FigureEntry",
@@ -20,12 +23,11 @@ __all__ = [
     "angle_unit",
     "captions",
     "draw",
-    "draw_figures",
     "figure_names",
     "figure_tables",
     "get_figure",
     "register",
-    "render",
+    "write_figure",
 ]
 
 # A module registers its figures when it is imported.

@@ -7,7 +7,6 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.units import display_unit, unit_label
 from accelstudy.drawing.style import (
@@ -28,7 +27,6 @@ from accelstudy.drawing.style import (
     spread,
 )
 from accelstudy.schemes import get_scheme
-from accelstudy.study.figures.base import Tables, register
 from accelstudy.study.figures.factors import (
     FACTORS,
     POSITIONS,
@@ -39,11 +37,14 @@ from accelstudy.study.figures.factors import (
     levels_text,
     varies,
 )
+from accelstudy.study.figures.panels import Array, Panel, by_cell, key, panels
+from accelstudy.study.figures.registry import Tables, register
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     from accelstudy.study.config import StudyConfig
 
@@ -78,58 +79,57 @@ FAILED_STYLES: dict[str, Style] = {
     "not estimable": {"linestyle": "", "marker": "x", "markersize": 4},
     "none converged": {"linestyle": "", "marker": "+", "markersize": 6},
 }
+SOME = "some did not converge"
 
 
 def over_factor(tables: Tables, study: StudyConfig, factor: Factor) -> Figure:
     """Panels for each group of parameters and for the tilt error, over one factor."""
-    return _draw(tables, factor, blocks(study, factor))
-
-
-for _factor in FACTORS:
-    register(
-        f"sweep-{_factor.name}",
-        f"Standard deviations and tilt error over the {_factor.title}",
-        CAPTION,
-        tables=("cells", "summary", "leveling"),
-        when=partial(varies, factor=_factor),
-        note=partial(factor_note, factor=_factor),
-    )(partial(over_factor, factor=_factor))
-
-
-def _draw(tables: Tables, factor: Factor, swept: list[Block]) -> Figure:
-    parts = [part for block in swept for part in _parts(block)]
+    parts = [part for block in blocks(study, factor) for part in _parts(block)]
     left_out, parts = len(parts[MOST_BLOCKS:]), parts[:MOST_BLOCKS]
-    drawn = [_values(block, tables) for block in parts]
+    drawn = [block_table(block, tables, factor) for block in parts]
     names = [[*in_order(set(rows["group"]) - set(TILTS)), *TILTS] for rows in drawn]
-    heights = [16 + ROW_MM * -(-len(groups) // _columns(groups)) for groups in names]
+    columns = [4 if len(groups) == 4 else 3 for groups in names]
+    heights = [16 + ROW_MM * -(-len(g) // n) for g, n in zip(names, columns, strict=True)]
     fig = new_figure(FULL, sum(heights) + (5 if left_out else 0))
     subfigures = fig.subfigures(len(parts), 1, height_ratios=heights, squeeze=False)[:, 0]
     unit = "" if factor is POSITIONS else f"/ {unit_label(display_unit(factor.unit))}"
-    label = " ".join(filter(None, [factor.title, factor.symbol, unit]))
-    panels: dict[tuple[str, str], list[Axes]] = {}
-    for part, block, rows, groups in zip(subfigures, parts, drawn, names, strict=True):
-        columns = _columns(groups)
-        axes = part.subplots(-(-len(groups) // columns), columns, squeeze=False).ravel()
-        for ax in axes[len(groups) :]:
-            ax.set_axis_off()
-        lowest = axes[max(0, len(groups) - columns) : len(groups)]
-        for ax, group in zip(axes, groups, strict=False):
-            _draw_panel(ax, rows[rows["group"] == group], factor, block.series)
-            ax.set_title(f"tilt error, {group}" if group in TILTS else group_label(group))
-            ax.set_xlabel(label if ax in lowest else "")
-            panels.setdefault((block.series[0][0], group), []).append(ax)
+    xlabel = " ".join(filter(None, [factor.title, factor.symbol, unit]))
+    sd = "sd, |bias|" if factor.column == SYSTEMATIC else "sd"
+    alike: dict[tuple[str, str], list[Axes]] = {}
+    for part, block, rows, groups, n in zip(subfigures, parts, drawn, names, columns, strict=True):
+        row = []
+        for k, group in enumerate(groups):
+            its = rows[rows["group"] == group]
+            what = "rms" if group in TILTS else sd
+            title = f"tilt error, {group}" if group in TILTS else group_label(group)
+            lowest = k >= len(groups) - n
+            labels = xlabel if lowest else "", f"{what} / {its['unit'].iloc[0]}"
+            row.append(Panel(its, title, *labels))
+        grid = [row[i : i + n] for i in range(0, len(row), n)]
+        axes = panels(grid, _draw_panel, figure=part)[1]
+        for group, ax in zip(groups, axes.flat, strict=False):
+            alike.setdefault((block.series[0][0], group), []).append(ax)
         part.suptitle(_title(block, factor), fontsize=8)
-        _add_legend(part, rows, block.series, factor)
-    failed = any(marks.any() for rows in drawn for marks in _failures(rows).values())
-    for drawn_alike in panels.values():
-        _same_y(drawn_alike, failed)
+        handles = _handles(rows, block, factor)
+        ncols = legend_columns([str(handle.get_label()) for handle in handles])
+        part.legend(handles=handles, loc="outside lower center", ncols=ncols, handlelength=3)
+    failed = any(rows["state"].isin(FAILED_STYLES).any() for rows in drawn)
+    for each in alike.values():
+        _same_y(each, failed)
     if left_out:
         fig.text(0, 0, f"{left_out} more blocks are not drawn; their numbers are in the tables.")
     return fig
 
 
-def _columns(groups: list[str]) -> int:
-    return 4 if len(groups) == 4 else 3
+for _factor in FACTORS:
+    register(
+        f"sweep-{_factor.name}",
+        title=f"Standard deviations and tilt error over the {_factor.title}",
+        caption=CAPTION,
+        tables=("cells", "summary", "leveling"),
+        when=partial(varies, factor=_factor),
+        note=partial(factor_note, factor=_factor),
+    )(partial(over_factor, factor=_factor))
 
 
 def _parts(block: Block) -> list[Block]:
@@ -146,30 +146,48 @@ def _parts(block: Block) -> list[Block]:
     ]
 
 
-def _values(block: Block, tables: Tables) -> pd.DataFrame:
-    """One row per cell and group: mean sd or rms tilt error, rms bias, and what failed."""
+def block_table(block: Block, tables: Tables, factor: Factor) -> pd.DataFrame:
+    """One row per cell and group: mean sd or rms tilt error as shown, bias, and what failed.
+
+    `x` is the factor as shown (NaN of an approach that does not use it), `series` the number of the
+    line, and `bias` NaN where it is not drawn.
+    """
     import pandas as pd
 
     summary, leveling = tables["summary"], tables["leveling"]
     counts = tables["cells"][["cell", "estimable", "n_converged", "n_replicates"]]
-    cells = block.cells[["cell", "model", "subject", "approach", "x"]].merge(counts, on="cell")
+    cells = block.cells[["cell", "approach", "x"]].merge(counts, on="cell")
+    converged, estimable = cells["n_converged"], cells["estimable"].to_numpy(bool)
+    some = converged < cells["n_replicates"]
+    state = np.where(~estimable, "not estimable", np.where(some, SOME, ""))
+    cells = cells.assign(
+        x=factor.shown(cells["x"]),
+        series=[block.series.index(item) for item in block.series_of_cells],
+        state=np.where(estimable & (converged == 0), "none converged", state),
+    )
     certain = (summary["bias_ci95_low"] > 0) | (summary["bias_ci95_high"] < 0)
     parameters = summary.assign(
         group=[group_of(name) for name in summary["parameter"]],
         significant=certain & (summary["bias"].abs() > SMALLEST_BIAS * summary["sd_empirical"]),
         squared=summary["bias"] ** 2,
     )
-    groups = parameters.groupby(["cell", "group", "unit"], sort=False, as_index=False).agg(
-        value=("sd_empirical", "mean"),
-        squared=("squared", "mean"),
-        significant=("significant", "all"),
-    )
-    biases = [groups.assign(bias=groups.pop("squared") ** 0.5)]
+    mean = {"sd_empirical": "mean", "squared": "mean", "significant": "all"}
+    groups = parameters.groupby(["cell", "group", "unit"], sort=False).agg(mean).reset_index()
+    drawn = groups["significant"].astype(bool) & (factor.column == SYSTEMATIC)
+    bias = np.sqrt(groups["squared"]).where(drawn)
+    groups = groups.assign(value=groups["sd_empirical"], bias=bias)
+    parts = [groups[["cell", "group", "unit", "value", "bias"]]]
     for angle in TILTS:
-        rms = leveling.set_index("cell")[f"{angle}_rms_mgon"] if len(leveling) else pd.Series()
-        tilt = pd.DataFrame({"cell": cells["cell"], "value": cells["cell"].map(rms).astype(float)})
-        biases.append(tilt.assign(group=angle, unit="mgon", significant=False))
-    return cells.merge(pd.concat(biases, ignore_index=True), on="cell")
+        value = cells["cell"].map(by_cell(leveling, f"{angle}_rms_mgon")).astype(float)
+        tilt = cells[["cell"]].assign(group=angle, unit="mgon", value=value, bias=np.nan)
+        parts.append(tilt)
+    table = cells.merge(pd.concat(parts, ignore_index=True), on="cell")
+    for unit in table["unit"].unique():
+        rows, label = table["unit"] == unit, shown([], unit)[1]
+        for column in ("value", "bias"):
+            table.loc[rows, column] = shown(table.loc[rows, column], unit)[0]
+        table.loc[rows, "unit"] = label
+    return table.assign(value=table["value"].where(table["value"] > 0))
 
 
 def _title(block: Block, factor: Factor) -> str:
@@ -184,77 +202,51 @@ def _scheme_title(scheme: str, factor: Factor) -> str:
     return scheme if factor is POSITIONS else get_scheme(scheme).title
 
 
-def _series_names(series: list[tuple[str, str]], factor: Factor) -> list[str]:
-    """Names of the series of a block, without the part in its title."""
-    models, schemes = (set(names) for names in zip(*series, strict=True))
-    return [
-        ", ".join(
-            ([model_title(model)] if len(models) > 1 else [])
-            + ([_scheme_title(scheme, factor)] if len(schemes) > 1 else [])
-        )
-        for model, scheme in series
-    ]
-
-
-def _draw_panel(
-    ax: Axes, rows: pd.DataFrame, factor: Factor, series: list[tuple[str, str]]
-) -> None:
-    group, unit = rows["group"].iloc[0], rows["unit"].iloc[0]
-    for (*name, approach), members in rows.groupby(["model", "subject", "approach"], sort=False):
-        i = series.index((str(name[0]), str(name[1])))
+def _draw_panel(ax: Axes, rows: pd.DataFrame) -> None:
+    """Draw a line for each series and approach."""
+    for (series, approach), members in rows.groupby(["series", "approach"], sort=False):
+        i = int(str(series))
         style = {**_series_style(i), "color": approach_colour(str(approach))}
-        _draw_series(ax, members.sort_values("x"), factor, style, height=TOP - 0.07 * i)
-    if rows["value"].gt(0).any():
+        _draw_series(ax, members.sort_values("x"), style, height=TOP - 0.07 * i)
+    if rows["value"].notna().any():
         ax.set_yscale("log")
     else:
-        say_empty(ax, "no standard deviation" if rows["estimable"].any() else "no estimable cell")
+        none = (rows["state"] == "not estimable").all()
+        say_empty(ax, "no estimable cell" if none else "no standard deviation")
         ax.set_yticks([])
-    what = "rms" if group in TILTS else "sd, |bias|" if factor.column == SYSTEMATIC else "sd"
-    ax.set_ylabel(f"{what} / {shown([], unit)[1]}")
-    _scale_x(ax, np.unique(factor.shown(rows["x"].dropna())))
+    _scale_x(ax, np.unique(rows["x"].dropna()))
 
 
-def _draw_series(ax: Axes, rows: pd.DataFrame, factor: Factor, style: Style, height: float) -> None:
+def _draw_series(ax: Axes, rows: pd.DataFrame, style: Style, height: float) -> None:
     """Line of one series and approach; crosses at `height`, a share of the panel, where it fails.
 
     Series without a robot are drawn as a line across, as they do not depend on its noise.
     """
-    unit = rows["unit"].iloc[0]
-    x, (y, _) = factor.shown(rows["x"]), shown(rows["value"], unit)
-    failures = _failures(rows)
+    x, y = rows["x"].to_numpy(float), rows["value"].to_numpy(float)
+    across = ax.get_xaxis_transform()
     if np.isnan(x).all():
-        if (y > 0).all():
+        if np.isfinite(y).all():
             ax.axhline(y[0], **{**style, "marker": ""}, linewidth=0.8)
-        x, across = np.array([0.98]), ax.transAxes
+        x, across = np.full(len(x), 0.98), ax.transAxes
     else:
-        across = ax.get_xaxis_transform()
-        ax.plot(x, np.where(y > 0, y, np.nan), **style)
-        some = rows["n_converged"].between(1, rows["n_replicates"] - 1).to_numpy() & (y > 0)
+        ax.plot(x, y, **style)
+        some = rows["state"] == SOME
         ax.plot(x[some], y[some], **{**style, "linestyle": ""}, markerfacecolor="white")
-        seen = rows["significant"].to_numpy(bool)
-        if factor.column == SYSTEMATIC and seen.any():
-            bias, _ = shown(rows["bias"], unit)
-            ax.plot(x[seen], bias[seen], color=style["color"], **BIAS_STYLE)
-    for label, failed in failures.items():
-        if failed.any():
-            heights = np.full(failed.sum(), height)
-            mark = {**style, "linestyle": "", "transform": across, "clip_on": False}
-            ax.plot(x[failed], heights, **{**mark, "alpha": 0.35})
-            ax.plot(x[failed], heights, **{**mark, **FAILED_STYLES[label]})
-
-
-def _failures(rows: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
-    """Which cells of a series cannot be estimated, and in which no calibration converged."""
-    estimable = rows["estimable"].to_numpy(bool)
-    none = estimable & (rows["n_converged"] == 0).to_numpy()
-    return dict(zip(FAILED_STYLES, (~estimable, none), strict=True))
+        seen = rows["bias"].notna()
+        if seen.any():
+            ax.plot(x[seen], rows["bias"][seen], color=style["color"], **BIAS_STYLE)
+    for state, cross in FAILED_STYLES.items():
+        failed = x[rows["state"] == state]
+        mark = {**style, "linestyle": "", "transform": across, "clip_on": False}
+        for one in ({**mark, "alpha": 0.35}, {**mark, **cross}) if len(failed) else ():
+            ax.plot(failed, np.full(len(failed), height), **one)
 
 
 def _series_style(i: int) -> Style:
     return {"linestyle": LINES[i], "marker": MARKERS[i], "markersize": 3}
 
 
-def _scale_x(ax: Axes, x: NDArray[np.float64]) -> None:
+def _scale_x(ax: Axes, x: Array) -> None:
     """Logarithmic axis, linear about zero if zero is among the values, with ticks at the values."""
     from matplotlib.ticker import NullLocator
 
@@ -288,24 +280,18 @@ def _same_y(axes: list[Axes], failed: bool) -> None:
         log_ticks(ax.yaxis, low, high)
 
 
-def _add_legend(
-    part: SubFigure, rows: pd.DataFrame, series: list[tuple[str, str]], factor: Factor
-) -> None:
-    from matplotlib.lines import Line2D
-
+def _handles(rows: pd.DataFrame, block: Block, factor: Factor) -> list[Line2D]:
+    """Entries of the legend of a block."""
     handles = approach_handles(dict.fromkeys(rows["approach"]), marker="", linestyle="-")
-    if len(series) > 1:
-        handles += [
-            Line2D([], [], color=INK, label=name, **_series_style(i))
-            for i, name in enumerate(_series_names(series, factor))
-        ]
+    models, schemes = (set(names) for names in zip(*block.series, strict=True))
+    for i, (model, scheme) in enumerate(block.series if len(block.series) > 1 else ()):
+        name = [model_title(model)] if len(models) > 1 else []
+        name += [_scheme_title(scheme, factor)] if len(schemes) > 1 else []
+        handles.append(key(", ".join(name), color=INK, **_series_style(i)))
     if factor.column == SYSTEMATIC:
-        handles.append(Line2D([], [], color=INK, label="|bias|, if significant", **BIAS_STYLE))
-    for label, failed in _failures(rows).items():
-        if failed.any():
-            handles.append(Line2D([], [], color=INK, label=label, **FAILED_STYLES[label]))
-    if rows["n_converged"].between(1, rows["n_replicates"] - 1).any():
-        some: Style = {"linestyle": "", "marker": "o", "markerfacecolor": "white", "color": INK}
-        handles.append(Line2D([], [], **some, label="some did not converge"))
-    columns = legend_columns([str(handle.get_label()) for handle in handles])
-    part.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=3)
+        handles.append(key("|bias|, if significant", color=INK, **BIAS_STYLE))
+    some: Style = {"linestyle": "", "marker": "o", "markerfacecolor": "white"}
+    for state, style in {**FAILED_STYLES, SOME: some}.items():
+        if (rows["state"] == state).any():
+            handles.append(key(state, color=INK, **style))
+    return handles

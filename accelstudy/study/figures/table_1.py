@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from accelstudy.approaches import approach_names
 from accelstudy.drawing.style import (
-    FULL,
-    INK,
     Style,
     approach_colour,
     approach_handles,
-    approach_marker,
     group_label,
     group_of,
     in_order,
-    new_figure,
     say_empty,
     shown,
     spread,
 )
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import PRESETS, Preset, get_model
-from accelstudy.study.figures.base import Tables, register
+from accelstudy.study.figures.panels import DARK, Panel, by_cell, key, panels, points
+from accelstudy.study.figures.registry import Tables, register
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,68 +34,81 @@ ROW_MM = 9.5
 CROSS_AT = 0.9
 """Place of the cross for parameters that cannot be estimated, as a share of the panel's width."""
 PALE = 0.3
+TILT = "tilt"
 
 
 @register(
     "table-1",
-    "Table 1: published calibrations and what they determine",
-    """
+    category="Paper",
+    tables=("summary", "leveling"),
+    when=lambda study: study.presets is not None,
+)
+def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
+    """Table 1: published calibrations and what they determine.
+
     The calibrations of the paper's Table 1, each with its own model and positions: mean empirical
     standard deviation of each group of parameters, and the rms error of roll that the calibration
     leaves, with their numbers. A cross stands where a group cannot be estimated; it is pale where
     only other parameters of the model prevent the calibration. Gravity alone cannot determine the
     cross-axis angles. The simulated sensor of a row has the effects of its model, unless the study
     says otherwise; compare tilt errors between models with this in mind.
-    """,
-    category="Paper",
-    tables=("summary", "leveling"),
-    when=lambda study: study.presets is not None,
-)
-def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
-    """A row for each preset, a column for each group of parameters and one for the tilt error."""
-    from matplotlib.lines import Line2D
-
+    """
     assert study.presets is not None
-    approaches = _spelled_out(study.presets.approaches)
-    summary = tables["summary"]
-    summary = summary.assign(group=[group_of(name) for name in summary["parameter"]])
-    cells = {_cell(preset, approach) for preset in PRESETS for approach in approaches}
-    summary = summary[summary["cell"].isin(cells) & (summary["group"] != "gravity")]
-    groups = in_order(summary["group"])
-    fig = new_figure(FULL, 30 + ROW_MM * len(PRESETS))
-    axes = fig.subplots(1, len(groups) + 1, sharey=True, squeeze=False)[0]
-    for ax, group in zip(axes, groups, strict=False):
-        rows = summary[summary["group"] == group]
-        _draw_group(ax, rows, approaches)
-        ax.set_title(group_label(group).replace("non-orthogonality", "non-orthogo-\nnality"))
-        ax.set_xlabel(f"sd / {shown([], rows['unit'].iloc[0])[1]}")
-    _draw_tilt(axes[-1], tables["leveling"], summary, approaches)
-    for ax in axes:
-        _finish(ax)
-    axes[0].set_ylim(len(PRESETS) - 0.5, -0.5)
-    axes[0].set_yticks(range(len(PRESETS)), [_row_label(preset) for preset in PRESETS])
-    cross: Style = {"linestyle": "", "marker": "x", "color": INK}
-    fig.legend(
-        handles=[
-            *approach_handles(approaches),
-            Line2D([], [], **cross, label="not estimable"),
-            Line2D([], [], **cross, alpha=PALE, label="estimable, but other parameters are not"),
-            Line2D([], [], linestyle="", marker="$–$", color="#999999", label="not in the model"),
-        ],
-        loc="outside lower center",
-        ncols=5,
-        handletextpad=0.2,
-        columnspacing=1.2,
-    )
+    named = study.presets.approaches
+    approaches = list(approach_names()) if named == ["all"] else named
+    table = preset_table(tables, approaches)
+    row = []
+    for group in [*in_order(set(table["group"]) - {TILT}), TILT]:
+        its = table[table["group"] == group]
+        label, quantity = group_label(group), "sd / "
+        label = label.replace("non-orthogonality", "non-orthogo-\nnality")
+        if group == TILT:
+            label, quantity = "tilt error\n(roll, rms)", ""
+        unit = its["unit"].iloc[0] if len(its) else ""
+        row.append(Panel(its, label, f"{quantity}{unit}"))
+    fig, axes = panels([row], _draw_column, 30 + ROW_MM * len(PRESETS), sharey=True)
+    axes[0, 0].set_ylim(len(PRESETS) - 0.5, -0.5)
+    axes[0, 0].set_yticks(range(len(PRESETS)), map(_row_label, PRESETS))
+    cross: Style = {**DARK, "marker": "x"}
+    handles = [
+        *approach_handles(approaches),
+        key("not estimable", **cross),
+        key("estimable, but other parameters are not", **cross, alpha=PALE),
+        key("not in the model", linestyle="", marker="$–$", color="#999999"),
+    ]
+    spacing: Style = {"ncols": 5, "handletextpad": 0.2, "columnspacing": 1.2}
+    fig.legend(handles=handles, loc="outside lower center", **spacing)
     return fig
 
 
-def _spelled_out(approaches: list[str]) -> list[str]:
-    return list(approach_names()) if approaches == ["all"] else approaches
+def preset_table(tables: Tables, approaches: list[str]) -> pd.DataFrame:
+    """Mean sd of each group, and the tilt error, of each preset that was run, as shown.
 
+    `value` is NaN where there is none; `pale` then says that only other parameters prevent it.
+    """
+    import pandas as pd
 
-def _cell(preset: Preset, approach: str) -> str:
-    return f"{preset.model}/{preset.scheme}/{approach}"
+    summary = tables["summary"].assign(group=tables["summary"]["parameter"].map(group_of))
+    tilt = by_cell(tables["leveling"], "roll_rms_mgon")
+    rows = []
+    for place, preset in enumerate(PRESETS):
+        offsets = np.linspace(-0.17, 0.17, len(approaches))
+        for approach, offset in zip(approaches, offsets, strict=True):
+            cell = f"{preset.model}/{preset.scheme}/{approach}"
+            its = summary[(summary["cell"] == cell) & (summary["group"] != "gravity")]
+            labels = {"place": place, "y": place + offset, "approach": approach}
+            for group, members in its.groupby("group"):
+                value, unit = shown(members["sd_empirical"], members["unit"].iloc[0])
+                pale = bool(members["estimable"].all())
+                labels_of = {**labels, "group": group, "unit": unit, "pale": pale}
+                rows.append({**labels_of, "value": float(value.mean())})
+            if len(its):
+                value, unit = shown([tilt.get(cell, np.nan)], "mgon")
+                labels_of = {**labels, "group": TILT, "unit": unit, "pale": False}
+                rows.append({**labels_of, "value": float(value[0])})
+    columns = ["place", "y", "approach", "group", "unit", "pale", "value"]
+    table = pd.DataFrame(rows, columns=columns)
+    return table.assign(value=table["value"].where(table["value"] > 0))
 
 
 def _row_label(preset: Preset) -> str:
@@ -108,91 +116,31 @@ def _row_label(preset: Preset) -> str:
     return f"{preset.source}\n{n} parameters, {get_scheme(preset.scheme).title}"
 
 
-def _places(approaches: list[str]) -> dict[str, float]:
-    """Vertical offset of each approach within a row."""
-    return dict(zip(approaches, np.linspace(-0.17, 0.17, len(approaches)), strict=True))
-
-
-def _draw_group(ax: Axes, rows: pd.DataFrame, approaches: list[str]) -> None:
-    marks = []
-    for y, preset in enumerate(PRESETS):
-        drawn = False
-        for approach, offset in _places(approaches).items():
-            parameters = rows[rows["cell"] == _cell(preset, approach)]
-            if parameters.empty:
-                continue
-            drawn = True
-            values, _ = shown(parameters["sd_empirical"], parameters["unit"].iloc[0])
-            pale = bool(parameters["estimable"].all())
-            marks.append(_Mark(approach, y + offset, values.mean(), pale))
-        if not drawn:
-            _dash(ax, y)
-    _draw_marks(ax, marks)
-
-
-def _draw_tilt(
-    ax: Axes, leveling: pd.DataFrame, summary: pd.DataFrame, approaches: list[str]
-) -> None:
-    ax.set_title("tilt error\n(roll, rms)")
-    ax.set_xlabel(shown([], "mgon")[1])
-    errors = {} if leveling.empty else leveling.set_index("cell")["roll_rms_mgon"].to_dict()
-    rms = dict(zip(errors, shown(list(errors.values()), "mgon")[0], strict=True))
-    run = set(summary["cell"])
-    marks = []
-    for y, preset in enumerate(PRESETS):
-        for approach, offset in _places(approaches).items():
-            cell = _cell(preset, approach)
-            if cell in run:
-                marks.append(_Mark(approach, y + offset, rms.get(cell, np.nan)))
-    _draw_marks(ax, marks)
-
-
-@dataclass(frozen=True)
-class _Mark:
-    """A standard deviation in a row; NaN or 0 where there is none, then pale or not."""
-
-    approach: str
-    y: float
-    value: float
-    pale: bool = False
-
-    @property
-    def known(self) -> bool:
-        return bool(np.isfinite(self.value) and self.value > 0)
-
-
-def _draw_marks(ax: Axes, marks: list[_Mark]) -> None:
-    """Markers and numbers at standard deviations, or crosses where there are none."""
-    for (approach, known, pale), group in groupby(sorted(marks, key=_alike), key=_alike):
-        members = list(group)
-        colour, y = approach_colour(approach), [mark.y for mark in members]
-        if not known:
-            ax.plot(
-                np.full(len(members), CROSS_AT),
-                y,
-                "x",
-                color=colour,
-                transform=ax.get_yaxis_transform(),
-                alpha=PALE if pale else 1,
-            )
-            continue
-        ax.plot([mark.value for mark in members], y, approach_marker(approach), color=colour)
-        for mark in members:
-            ax.annotate(
-                _number(mark.value),
-                (mark.value, mark.y),
-                (4, 0),
-                textcoords="offset points",
-                color=colour,
-                va="center",
-                fontsize=6.5,
-                in_layout=False,
-            )
-
-
-def _alike(mark: _Mark) -> tuple[str, bool, bool]:
-    """Marks that are alike are one artist, which is faster to draw."""
-    return mark.approach, mark.known, mark.pale and not mark.known
+def _draw_column(ax: Axes, rows: pd.DataFrame) -> None:
+    """Markers and numbers at standard deviations, crosses where there are none."""
+    across = ax.get_yaxis_transform()
+    known = rows["value"].notna()
+    points(ax, rows[known], "value")
+    text: Style = {"textcoords": "offset points", "va": "center", "fontsize": 6.5}
+    for row in rows[known].to_dict("records"):
+        place, colour = (row["value"], row["y"]), approach_colour(row["approach"])
+        number = _number(row["value"])
+        ax.annotate(number, place, (4, 0), color=colour, in_layout=False, **text)
+    for pale, failed in rows[~known].groupby("pale"):
+        crosses: Style = {"marker": "x", "transform": across, "alpha": PALE if pale else 1}
+        points(ax, failed.assign(x=CROSS_AT), **crosses)
+    for y in set(range(len(PRESETS))) - set(rows["place"]):
+        style: Style = {"color": "#999999", "ha": "center", "va": "center", "in_layout": False}
+        ax.text(0.5, y, "–", transform=across, **style)
+    ax.grid(False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    between: Style = {"transform": across, "colors": "#EEEEEE", "zorder": 0, "linewidth": 0.6}
+    ax.hlines(np.arange(len(PRESETS) - 1) + 0.5, 0, 1, **between)
+    if known.any():
+        _log_axis(ax, rows["value"].min() / 1.5, rows["value"].max() * 1.5)
+    else:
+        ax.set_xticks([])
+        say_empty(ax)
 
 
 def _number(value: float) -> str:
@@ -201,41 +149,15 @@ def _number(value: float) -> str:
     return f"{value:.{decimals if value < 100 else 0}f}"
 
 
-def _dash(ax: Axes, y: int) -> None:
-    ax.text(
-        0.5,
-        y,
-        "–",
-        transform=ax.get_yaxis_transform(),
-        color="#999999",
-        ha="center",
-        va="center",
-        in_layout=False,
-    )
-
-
-def _finish(ax: Axes) -> None:
+def _log_axis(ax: Axes, low: float, high: float) -> None:
     """Logarithmic axis about the values, with room for their numbers and for the crosses."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    values = np.concatenate(
-        [np.asarray(line.get_xdata(), float) for line in ax.get_lines() if line.get_marker() != "x"]
-        or [np.empty(0)]
-    )
-    ax.grid(False, axis="y")
-    ax.tick_params(axis="y", length=0)
-    between: Style = {"transform": ax.get_yaxis_transform(), "colors": "#EEEEEE", "zorder": 0}
-    ax.hlines(np.arange(len(PRESETS) - 1) + 0.5, 0, 1, linewidth=0.6, **between)
-    if len(values) == 0:
-        ax.set_xticks([])
-        say_empty(ax)
-        return
-    low, high = values.min() / 1.5, values.max() * 1.5
     ax.set_xscale("log")
     ax.set_xlim(low, high * (high / low) ** 0.55)
     low, high = ax.get_xlim()
     ticks = np.asarray(LogLocator(subs=(1, 2, 5)).tick_values(low, high))
-    shown = ticks[(ticks >= low) & (ticks <= high)]
-    shown = shown[spread(np.log(shown) / np.log(high / low), 0.38)]
-    ax.set_xticks(shown, [f"{value:g}" for value in shown])
+    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    ticks = ticks[spread(np.log(ticks) / np.log(high / low), 0.38)]
+    ax.set_xticks(ticks, [f"{value:g}" for value in ticks])
     ax.xaxis.set_minor_locator(NullLocator())

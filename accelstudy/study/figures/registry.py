@@ -1,13 +1,16 @@
-"""What a figure of a study is, and the registry of figures."""
+"""What a figure of a study is, the registry of figures, and how they are drawn and written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from inspect import cleandoc
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from accelstudy.basics.registry import Registry
+from accelstudy.basics.units import angle_note, angles_in, attitude_unit
+from accelstudy.files.outputs import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,9 +59,9 @@ class FigureEntry:
 
 def register(
     name: str,
-    title: str,
-    caption: str,
     *,
+    title: str = "",
+    caption: str = "",
     category: str = "Study",
     tables: tuple[str, ...] = (),
     when: Callable[[StudyConfig], bool] = lambda study: True,
@@ -67,6 +70,7 @@ def register(
 ) -> Callable[[Draw], Draw]:
     """Register the function that draws a figure; parameters as in `FigureEntry`.
 
+    The first line of its docstring is the title and the rest the caption, unless they are given.
     The workflow imports all figures whenever it starts. So Matplotlib and pandas are imported
     within functions.
 
@@ -79,8 +83,9 @@ def register(
         raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
 
     def decorate(draw: Draw) -> Draw:
-        text = cleandoc(caption)
-        entry = FigureEntry(name, title, text, draw, category, tables, when, note, angles)
+        head, _, text = cleandoc(draw.__doc__ or "").partition("\n\n")
+        said = title or head.rstrip("."), cleandoc(caption) or text
+        entry = FigureEntry(name, *said, draw, category, tables, when, note, angles)
         _REGISTRY.add(name, entry)
         return draw
 
@@ -106,3 +111,55 @@ def figure_names(study: StudyConfig | None = None) -> tuple[str, ...]:
 def figure_tables(*names: str) -> tuple[str, ...]:
     """Names of the tables that some figures need."""
     return tuple(dict.fromkeys(table for name in names for table in get_figure(name).tables))
+
+
+def angle_unit(study: StudyConfig) -> str:
+    """Unit of angles in figures: that of the study or, where it names none, of the user."""
+    return study.angle_unit or attitude_unit()
+
+
+def captions(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
+    """Captions of figures by their names, with the notes on this study."""
+    texts = {}
+    with angles_in(angle_unit(study)):
+        for figure in map(get_figure, names):
+            unit = f"{angle_note()}." if figure.angles else ""
+            notes = " ".join(filter(None, [figure.note(study), unit]))
+            texts[figure.name] = "\n".join(filter(None, [figure.caption, notes]))
+    return texts
+
+
+def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    name : str
+    tables : mapping of table name to table, at least those of `figure_tables`
+    study : StudyConfig
+    """
+    import matplotlib as mpl
+
+    from accelstudy.drawing.style import STYLE
+
+    with mpl.rc_context(STYLE), angles_in(angle_unit(study)):  # type: ignore[arg-type]
+        return get_figure(name).draw(tables, study)
+
+
+def write_figure(name: str, tables: Tables, study: StudyConfig, folder: str | Path) -> None:
+    """Draw a figure, and write it into a folder under its name: as SVG, as PNG, and its caption.
+
+    Each file is whole or not there at all, and the same tables give the same bytes. Parameters as
+    in `draw`; an error that arises names the figure.
+    """
+    from accelstudy.drawing.saving import save
+    from accelstudy.drawing.style import DPI
+
+    svg, png, rst = (Path(folder, f"{name}.{kind}") for kind in ("svg", "png", "rst"))
+    try:
+        save(draw(name, tables, study), svg, png, get_figure(name).title, DPI)
+    except Exception as error:
+        error.add_note(f"The figure {name!r} could not be drawn.")
+        raise
+    with whole_file(rst) as path:
+        path.write_text(f"{captions([name], study)[name]}\n", encoding="utf-8")
