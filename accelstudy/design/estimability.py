@@ -22,6 +22,11 @@ Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
 """Singular values of the scaled design matrix below this fraction of the largest count as zero."""
+ABOVE_NOISE = 3.0
+"""How far a combination of parameters must show above what the noise of readings makes of it. Where
+positions do not determine it, it shows by noise alone, at about 1 whatever the noise is."""
+INVOLVED = 0.1
+"""Share of a parameter in a combination from which on that combination hides it."""
 ROUNDING = 1e-14
 """Columns of the design matrix shorter than this fraction of the longest count as zero."""
 
@@ -77,11 +82,16 @@ def estimability(
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
     known: Known | None = None,
+    forces: Array | None = None,
+    blur: float = 0.0,
 ) -> Estimability:
     """Work out what a scheme determines, before any simulation.
 
     Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
     is near-singular for every real sensor. The cofactors are taken at `parameters`.
+
+    Noise gives any readings full rank. So of readings a combination of parameters counts as
+    determined only if it shows by `ABOVE_NOISE` times what the noise adds to the design matrix.
 
     Parameters
     ----------
@@ -94,13 +104,23 @@ def estimability(
     hold : HoldConditions, optional
         What a session knows of its positions beyond their directions (temperature, time, …).
     known : mapping, optional, what is known of parameters a priori, as in `Observations`
+    forces : (n, 3) array, m/s², optional
+        Noisy readings in place of the directions, corrected up to a linear map: their lengths
+        count, as unit vectors would have the sensor's errors in their directions.
+    blur : float, m/s², noise of these readings
     """
     known = known or {}
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
-    a = _design(scheme.directions, model, approach, noise, ideal, gravity, hold, known)
-    rank, condition, free = rank_of(a)
+    directions = scheme.directions if forces is None else -forces / gravity
+    given = (model, approach, noise, ideal, gravity, hold, known)
+    a = _design(directions, *given)
+    rank, condition, free = exact = rank_of(a)
+    if forces is not None:
+        shifts = blur / gravity * np.eye(3)
+        changes = np.concatenate([_design(directions + shift, *given) - a for shift in shifts])
+        rank, condition, free = rank_of(a, ABOVE_NOISE * changes)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
     cofactors = np.full((len(names), len(names)), np.nan)
@@ -111,6 +131,7 @@ def estimability(
         reason = (
             f"rank {rank} of {len(names)}: {', '.join(not_estimable)} cannot be told apart by "
             + (f"the {approach.name} approach in any scheme" if blind else "these positions")
+            + (f" with a noise of {1e3 * blur:.2g} mm/s²" if rank < exact[0] else "")
         )
     else:
         if parameters is not None:
@@ -155,19 +176,33 @@ def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: floa
     return rank_of(a)[0] < a.shape[1]
 
 
-def rank_of(a: Array) -> tuple[int, float, NDArray[np.bool_]]:
-    """Rank and condition of a design matrix, and which columns its null space involves."""
-    if not np.isfinite(a).all():
-        return 0, np.inf, np.ones(a.shape[1], dtype=bool)
+def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[np.bool_]]:
+    """Rank and condition of a design matrix, and which columns its null space involves.
+
+    Parameters
+    ----------
+    a : (m, u) array, A
+    least : (k, u) array, D, optional
+        A combination w of columns counts only where |A w| > |D w|. These are generalised singular
+        values, which do not depend on the units of the parameters.
+    """
+    u = a.shape[1]
+    least = np.zeros((0, u)) if least is None else least
+    if not (np.isfinite(a).all() and np.isfinite(least).all()):
+        return 0, np.inf, np.ones(u, dtype=bool)
     length = np.linalg.norm(a, axis=0)
     longest = length.max() or 1.0
     # A column of rounding errors must stay short: scaled to unit length it would count.
-    scaled = a / np.where(length > ROUNDING * longest, length, longest)
-    # The whole null space is wanted, also of a matrix with fewer rows than columns. R of a QR
-    # decomposition has the same null space, and saves a matrix of all conditions by all conditions.
-    triangle = np.linalg.qr(scaled, mode="r") if len(scaled) > len(length) else scaled
-    _, values, vt = np.linalg.svd(triangle, full_matrices=True)
-    rank = int(np.count_nonzero(values > SINGULAR * values[0]))
-    complete = rank == a.shape[1]
-    condition = float(values[0] / values[-1]) if complete else np.inf
-    return rank, condition, np.linalg.norm(vt[rank:], axis=0) > 1e-3
+    unit = 1 / np.where(length > ROUNDING * longest, length, longest)
+    # R of a QR decomposition has the same null space, and saves a matrix of all conditions by all
+    # conditions.
+    triangle = np.linalg.qr(a * unit, mode="r") if len(a) > u else a * unit
+    values = np.linalg.svd(triangle, compute_uv=False)
+    floor = np.concatenate([least * unit, SINGULAR * (values[0] or 1.0) * np.eye(u)])
+    back = np.linalg.inv(np.linalg.qr(floor, mode="r"))
+    # The whole null space is wanted, also of a matrix with fewer rows than columns.
+    _, ratios, vt = np.linalg.svd(triangle @ back, full_matrices=True)
+    rank = int(np.count_nonzero(ratios > 1))
+    condition = float(values[0] / values[-1]) if rank == u else np.inf
+    null, _ = np.linalg.qr(back @ vt[rank:].T)
+    return rank, condition, np.linalg.norm(null, axis=1) > INVOLVED

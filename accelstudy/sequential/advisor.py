@@ -20,6 +20,7 @@ from accelstudy.campaign.calibration.fit import (
     check_campaign,
     fit_campaign,
     initial_values,
+    sigma_to_show_above,
 )
 from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.session import Campaign
@@ -279,7 +280,8 @@ class Advisor:
         vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size]
         if vague or not campaign.n_positions:
             return tuple(vague)
-        theory = campaign_estimability(campaign, self.model, self.approach)
+        noise = sigma_to_show_above(campaign)
+        theory = campaign_estimability(campaign, self.model, self.approach, noise)
         return tuple(name for name in theory.not_estimable if name in names)
 
     def _vague(self, recursion: Recursion) -> tuple[str, ...]:

@@ -222,5 +222,37 @@ def test_repeats_of_too_few_attitudes_are_told():
     """Noise makes the design regular, but six attitudes hold no nine parameters."""
     settings = CampaignSettings(scheme="faces-6", repeats=3, approach="gravity")
     campaign, _ = simulate_campaign(settings)
-    with pytest.raises(InputError, match=r"18 positions hardly determine it .* more attitudes"):
+    with pytest.raises(InputError, match=r"18 positions do not determine .* rank 6 of 9: .*alpha"):
         fit_campaign(campaign, NINE, GRAVITY)
+
+
+GOLDEN = (1 + 5**0.5) / 2
+AXES = np.array([[0, 1, GOLDEN], [0, 1, -GOLDEN], [1, GOLDEN, 0], [1, -GOLDEN, 0], [GOLDEN, 0, 1]])
+DODECAHEDRON = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
+"""Nine faces on five axes: five sums and three biases, so eight of nine parameters."""
+
+
+@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize(("sigma", "repeats"), [(2e-5, 1), (2e-3, 1), (2e-2, 1), (2e-3, 4)])
+def test_the_noise_of_readings_gives_no_rank(sigma, repeats, stated):
+    """Neither the noise nor the scales and angles of a sensor make eight parameters nine."""
+    sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
+    ideal = -9.80665 * np.repeat(DODECAHEDRON, repeats, axis=0) @ sensor.T + [0.12, -0.08, 0.2]
+    rng, numbers = np.random.default_rng(36), np.arange(len(ideal))
+    for _ in range(50):
+        forces = ideal + sigma * rng.standard_normal(ideal.shape)
+        read = Campaign("read", numbers, forces, 9.80665, sigma_force=sigma if stated else None)
+        with pytest.raises(InputError, match=r"rank 8 of 9: .*s_x, s_y, s_z"):
+            fit_campaign(read, NINE, GRAVITY)
+
+
+def test_what_shows_weakly_but_above_the_noise_is_determined():
+    """A tenth position, two degrees beside the first: hardly, but with sigmas that hold."""
+    faces = np.concatenate([DODECAHEDRON, DODECAHEDRON[:1] + np.array([0.03, 0.03, 0])])
+    faces /= np.linalg.norm(faces, axis=1)[:, None]
+    forces = -9.80665 * faces * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2]
+    forces += 2e-4 * np.random.default_rng(36).standard_normal(forces.shape)
+    read = Campaign("read", np.arange(10), forces, 9.80665, sigma_force=2e-4)
+    fit = fit_campaign(read, NINE, GRAVITY)
+    off = fit.parameters[:6] - [0.12, -0.08, 0.2, 0.004, -0.003, 0.006]
+    assert np.all(np.abs(off) < 4 * fit.sigma[:6])

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from calling import succeed
+from calling import refusal, succeed
 from page_helpers import text_of
 
 import accelstudy as acs
@@ -42,6 +42,18 @@ def written(folder, directions, seed, outside=None):
     text = "\n".join(["position,fx,fy,fz", *rows, ""])
     (folder / "positions.csv").write_text(text, encoding="utf-8")
     return folder
+
+
+def test_nine_positions_of_rank_eight(tmp_path):
+    """Some draws of the noise made them nine, with scales of 100 000 ppm."""
+    campaign = written(tmp_path / "nine", NINE, seed=24)
+    says = "rank 8 of 9: s_x, s_y, s_z"
+    assert says in refusal("calibrate", campaign, "--out", tmp_path / "calibrated")
+    assert says in refusal("diagnose", campaign, "--out", tmp_path / "diagnosis")
+    assert says in refusal("effects", "--campaign", campaign)
+    said = succeed("advise", campaign, "--tilt-accuracy", "5mgon").output
+    assert "not determined yet" in said
+    assert "CAN STOP" not in said.upper()
 
 
 def test_the_approach_follows_the_campaign_and_is_said(tmp_path):

@@ -38,6 +38,9 @@ not converge."""
 
 UNIT_SIGMA = 1e-3
 """m/s², stands in for an unknown sigma; only sigmas a posteriori have a meaning then."""
+CHEAP_SIGMA = 1e-2
+"""m/s², of the means of a cheap sensor: what positions must determine a model by where neither the
+campaign nor residuals tell the noise."""
 
 
 @dataclass(frozen=True)
@@ -287,12 +290,7 @@ def fit_campaign(
     approach = approach or usual_approach(campaign)
     check_campaign(campaign, model, approach)
     start_of = partial(initial_values, forces=campaign.forces, gravity=campaign.gravity)
-    theory = campaign_estimability(campaign, model, approach)
-    if not theory.estimable:
-        raise InputError(
-            f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
-            f"{model.name!r}: {theory.reason}"
-        )
+    theory = _determined(campaign, model, approach)
     observed = replace(campaign_observations(campaign), initial=start_of(model))
     adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0] and (unfit := not_affine(model)):
@@ -304,6 +302,7 @@ def fit_campaign(
         observed = replace(observed, initial=model.vector(values))
         adjustment = calibrate(model, approach, observed)
     if not adjustment.converged[0]:
+        _determined(campaign, model, approach, sigma_to_show_above(campaign))
         raise InputError(
             f"{campaign.name}: the adjustment of the model {model.name!r} does not converge; "
             f"{_cause(campaign, theory, diagnosing)}"
@@ -318,13 +317,37 @@ def fit_campaign(
             adjustment = calibrate(model, approach, observed)
             if adjustment.converged[0]:
                 fit = replace(fit, observed=observed, adjustment=adjustment)
+    blur = sigma_to_show_above(campaign)
+    if adjustment.redundancy > 0:
+        # A stated noise may be too large; where residuals are larger, an effect may be missing.
+        seen = fit.sigma_position
+        blur = max(seen, UNIT_SIGMA) if campaign.sigma_force is None else min(seen, blur)
+    _determined(campaign, model, approach, blur)
     return fit
 
 
-def campaign_estimability(
-    campaign: Campaign, model: SensorModel, approach: Approach
+def sigma_to_show_above(campaign: Campaign) -> float:
+    """Noise of a mean by which positions must determine a model, without residuals, m/s²."""
+    return CHEAP_SIGMA if campaign.sigma_force is None else campaign.sigma_force
+
+
+def _determined(
+    campaign: Campaign, model: SensorModel, approach: Approach, blur: float = 0.0
 ) -> Estimability:
-    """Say what the positions of a campaign determine."""
+    """Say what the positions determine, or raise `InputError` if that is not the model."""
+    theory = campaign_estimability(campaign, model, approach, blur)
+    if not theory.estimable:
+        raise InputError(
+            f"{campaign.name}: {campaign.n_positions} positions do not determine the model "
+            f"{model.name!r}: {theory.reason}"
+        )
+    return theory
+
+
+def campaign_estimability(
+    campaign: Campaign, model: SensorModel, approach: Approach, blur: float = 0.0
+) -> Estimability:
+    """Say what the positions of a campaign determine, above a noise of its means in m/s²."""
     start = initial_values(model, campaign.forces, campaign.gravity)
     rough = model.correct(campaign.forces, start, campaign.gravity, campaign.hold)
     return estimability(
@@ -335,6 +358,8 @@ def campaign_estimability(
         gravity=campaign.gravity,
         hold=campaign.hold,
         known=_known(campaign),
+        forces=rough if blur else None,
+        blur=blur,
     )
 
 
