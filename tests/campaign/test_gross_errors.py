@@ -15,8 +15,12 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.gross_errors.axis_error import SIGNED_PERMUTATIONS
 from accelstudy.campaign.gross_errors.recognition import recognise
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.leveling.angles import angles_of
+from accelstudy.schemes import get_scheme
+from accelstudy.sensors.conversion import Conversion
 from accelstudy.sensors.models import get_model
 
 CLEAN, _ = simulate_campaign(CampaignSettings(n_samples=50, yaw="random"))
@@ -236,6 +240,39 @@ def test_a_table_that_slipped_by_a_row_is_put_back(designs):
     found = recognise(exchanged(right, rows, np.roll(rows, 1)), ROBOT)
     assert found.reason.endswith(" and 40 more are exchanged")
     assert np.abs(found.mended.forces - right.forces).max() < 0.06
+
+
+COUNTS = {
+    "scales and offsets": ([0.005, 0.0065, 0.0055], [2600.0, 1500.0, 2010.0]),
+    "scales": ([0.003, 0.006, 0.0045], [0.0, 0.0, 0.0]),
+    "offsets": ([0.005, 0.005, 0.005], [2600.0, 1500.0, 2010.0]),
+}
+
+
+@pytest.mark.parametrize("differ", COUNTS)
+@pytest.mark.parametrize("columns", [(1, 0, 2), (2, 1, 0), (1, 2, 0)])
+def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ, columns):
+    """It ended in "does not converge", or in scales that are wrong by 30 %."""
+    nominal = Conversion(*map(np.array, COUNTS[differ]))
+    ideal = -9.80665 * get_scheme("faces-edges-corners-26").directions
+    noise = 0.002 * np.random.default_rng(36).standard_normal(ideal.shape)
+    forces = ideal * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
+    counts = nominal.from_si(forces)[:, columns]
+    read = Campaign(
+        **{"name": "counts", "positions": np.arange(1, 27), "forces": nominal.to_si(counts)},
+        **{"gravity": 9.80665, "sigma_force": 0.002, "unit": "counts", "nominal": nominal},
+        **{"angles": angles_of(ideal), "sigma_angle": 5e-5},
+    )
+    found = recognise(read, ROBOT)
+    assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
+    np.testing.assert_allclose(found.mended.forces, forces, atol=1e-12)
+    # Readings in counts are converted, and then turned, as those of the campaign were.
+    again = found.mended.nominal.to_si(counts) @ found.matrix.T
+    np.testing.assert_allclose(again, forces, atol=1e-12)
+    fit = fit_campaign(found.mended, get_model("bias-scale-nonorthogonality"))
+    np.testing.assert_allclose(
+        fit.parameters[:6], [0.12, -0.08, 0.2, 0.004, -0.003, 0.006], atol=2e-3
+    )
 
 
 def test_what_does_not_show_is_not_recognised(designs):

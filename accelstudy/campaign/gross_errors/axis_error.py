@@ -22,6 +22,7 @@ from accelstudy.campaign.gross_errors.base import (
 )
 from accelstudy.campaign.gross_errors.real_sensor import RealSensor, attitude_forces
 from accelstudy.campaign.session import Campaign
+from accelstudy.sensors.conversion import Conversion
 
 SIGNED_PERMUTATIONS = tuple(
     tuple(sign * axis for sign, axis in zip(signs, axes, strict=True))
@@ -70,17 +71,19 @@ class AxisError(GrossError):
         if sensor.expected is None:
             return
         ideal = attitude_forces(campaign)
-        # An ideal sensor with any bias is near enough to compare all 48 quickly.
-        misses = {}
+        # An ideal sensor with any bias is near enough to compare all quickly.
+        tried, misses = [], []
         for axes in SIGNED_PERMUTATIONS:
-            error = campaign.forces @ _matrix(axes) - ideal
-            distance = np.linalg.norm(error - np.median(error, axis=0), axis=1)
-            misses[axes] = float(np.mean(np.minimum(distance, campaign.gravity)))
-        least = min(misses.values())
-        near = [axes for axes in SIGNED_PERMUTATIONS[1:] if misses[axes] < NEAR * least]
-        for axes in sorted(near, key=_changes):
-            matrix = _matrix(axes).T
-            yield Mending(_reason(matrix), _turned(campaign, matrix), matrix)
+            for mended, reason, matrix in _undone(campaign, _matrix(axes).T):
+                error = mended.forces - ideal
+                bias = np.median(error, axis=0)
+                distance = np.linalg.norm(error - bias, axis=1)
+                misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
+                tried.append((_changes(axes), float(np.linalg.norm(bias)), reason, mended, matrix))
+        near = [one for one, miss in zip(tried, misses, strict=True) if miss < NEAR * min(misses)]
+        for _, _, reason, mended, matrix in sorted(near, key=lambda one: one[:2]):
+            if reason:
+                yield Mending(reason, mended, matrix)
         assert campaign.angles is not None
         exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
         yield Mending("roll and pitch of the robot are exchanged", exchanged)
@@ -97,6 +100,25 @@ def _turned(campaign: Campaign, matrix: Array) -> Campaign:
     """Return the campaign with f → P f; columns are reordered, not summed, so no digit changes."""
     axes = np.argmax(np.abs(matrix), axis=1)
     return with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
+
+
+def _undone(campaign: Campaign, matrix: Array) -> Iterator[tuple[Campaign, str, Array]]:
+    """Undo an exchange of axes, and one of columns of counts, before nominal scales and offsets.
+
+    Yields the mended campaign, what was wrong, and the matrix that turns forces as they were read.
+    """
+    reason = _reason(matrix) if np.any(matrix != np.eye(3)) else ""
+    yield _turned(campaign, matrix), reason, matrix
+    if (nominal := campaign.nominal) is None or not reason:
+        return
+    # Counts P r, read with S and o, were r: S (r − o) = S P S⁻¹ · S (P⁻¹ r − P⁻¹ o).
+    scaled = matrix * nominal.scale[:, None] / nominal.scale
+    offset = np.abs(matrix).T @ nominal.offset
+    if np.allclose(scaled, matrix) and np.array_equal(offset, nominal.offset):
+        return
+    moved = campaign.forces + (nominal.offset - offset) * nominal.scale
+    read = replace(campaign, forces=moved, nominal=Conversion(nominal.scale, offset))
+    yield _turned(read, scaled), f"{reason}, in the counts, before `scale` and `offset`", scaled
 
 
 def _changes(shown: Sequence[float]) -> tuple[int, int]:
