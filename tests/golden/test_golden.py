@@ -33,10 +33,11 @@ def test_each_part_is_kept_and_3_mb_are_enough():
     assert sum(sizes.values()) < 3e6
 
 
-def test_no_command_of_a_page_fails():
+def test_no_command_of_a_page_fails_and_no_picture_is_old():
     for part in PARTS.keys() - {"quiet"}:  # three of these are to fail
         for name, text in kept_of(part).items():
             assert not re.findall("^=== .*\nexit status .*", text, re.M), f"{part}/{name}"
+            assert "not as its tutorial shows it" not in text, f"{part}/{name}; `make pictures`"
 
 
 def test_each_help_has_an_example():

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import yaml
+from example_helpers import EXAMPLES, FIGURES, SHOWN
 from places import DATA, ROOT
 from transcript import Shell, commands_of_page, commands_of_script, rows_text, table_text
 
 Texts = Iterator[tuple[str, str]]
 """Names of texts, and what is kept of each."""
-DOCS, EXAMPLES, GOLDEN = ROOT / "docs", ROOT / "examples", ROOT / "tests/golden"
+GOLDEN = ROOT / "tests/golden"
 
 # --- commands of pages ---------------------------------------------------------------------------
 
@@ -134,11 +135,17 @@ def helps(folder) -> Texts:
 
 
 def tutorials(folder, names) -> Texts:
-    """The commands of tutorials, each in a folder with the files of its example."""
+    """The commands of tutorials, each in a folder of its example, and whether figures are new."""
+    from pictures import same_picture
+
     for name in names:
         shutil.copytree(EXAMPLES / name, folder / name)
         commands = commands_of_script((EXAMPLES / name / "commands.sh").read_text("utf-8"))
-        yield name, Shell(folder / name).transcript(commands)
+        said = Shell(folder / name).transcript(commands)
+        for figure in FIGURES.get(name, ()):
+            same = same_picture(folder / name / figure, SHOWN / name / Path(figure).name)
+            said += f"{figure}: {'as' if same else 'not as'} its tutorial shows it\n"
+        yield name, said
 
 
 def plans(folder) -> Texts:
