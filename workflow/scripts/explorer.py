@@ -1,5 +1,6 @@
 from pathlib import Path
 
+from accelstudy.files.tables import read_table
 from accelstudy.jobs.job import job
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.explorer.page import write_explorer
@@ -9,7 +10,7 @@ with job(snakemake):
     paths = {name: figures / f"{name}.svg" for name in snakemake.params.figures}
     write_explorer(
         StudyConfig.model_validate(snakemake.config),
-        dict(snakemake.input.items()),
+        {name: read_table(path) for name, path in snakemake.input.items()},
         snakemake.output[0],
         {name: str(snakemake.report_href(path)) for name, path in paths.items()},
     )

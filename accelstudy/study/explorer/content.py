@@ -1,7 +1,7 @@
 """What an explorer shows of a study, from its tables: set-ups, their parameters, correlations.
 
-A set-up is a cell of the study. Each is a table with numbers in the units that people see; `packed`
-makes it a text that the page's script reads again.
+A set-up is a cell of the study. Each function returns a table with numbers in the units that people
+see; `packed` makes them a text that the page's script reads again.
 """
 
 from __future__ import annotations
@@ -10,46 +10,36 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
-from accelstudy.drawing.style import group_label, group_of, in_order, shown, symbol
-from accelstudy.study.figures.factors import NOISES, Factor
+from accelstudy.drawing.style import group_label, group_of, in_order, model_title, shown, symbol
+from accelstudy.schemes import get_scheme
+from accelstudy.study.figures.factors import NOISES, Factor, family
+from accelstudy.study.figures.panels import by_cell
 from accelstudy.study.figures.registry import Tables
 
 ANGLES = ("roll", "pitch")
-QUANTITIES = {
-    "truth": "truth",
-    "bias": "bias",
-    "bias_low": "bias_ci95_low",
-    "bias_high": "bias_ci95_high",
-    "empirical": "sd_empirical",
-    "posteriori": "sd_posteriori_mean",
-    "posteriori_low": "posteriori_low",
-    "posteriori_high": "posteriori_high",
-    "linear": "sd_linear",
-    "closed": "sd_closed_form",
-    "ratio": "sd_ratio",
-    "ratio_low": "sd_ratio_ci95_low",
-    "ratio_high": "sd_ratio_ci95_high",
-    "coverage": "coverage_95",
-    "coverage_low": "coverage_95_low",
-    "coverage_high": "coverage_95_high",
+_ENDS = ("", "_low", "_high")
+IN_UNITS = {
+    **{"truth": "truth", "bias": "bias"},
+    **{"bias_low": "bias_ci95_low", "bias_high": "bias_ci95_high"},
+    **{"empirical": "sd_empirical", "posteriori": "sd_posteriori_mean"},
+    **{"linear": "sd_linear", "closed": "sd_closed_form"},
 }
-"""What is shown of each parameter, and its column in the summary; the central 95 % of the sds a
-posteriori are in the quantiles."""
+"""What is shown of each parameter in its unit, and its column in the summary."""
+SHARES = {
+    **{f"ratio{end}": (f"sd_ratio{'_ci95' if end else ''}{end}", 1) for end in _ENDS},
+    **{f"coverage{end}": (f"coverage_95{end}", 100) for end in _ENDS},
+}
+"""What is shown without a unit or in %, its column in the summary, and the factor."""
 _PLAIN = {
-    "alpha": "α",
-    "delta": "δ",
-    "varepsilon": "ε",
-    "theta": "θ",
-    "phi": "φ",
-    "perp": "⊥",
-    "pm": "±",
+    **{"alpha": "α", "delta": "δ", "varepsilon": "ε", "theta": "θ", "phi": "φ"},
+    **{"perp": "⊥", "pm": "±"},
 }
 
 
@@ -59,88 +49,84 @@ def plain(parameter: str) -> str:
     return re.sub(r"[${}]", "", text)
 
 
-def packed(table: pd.DataFrame) -> str:
-    """Write the columns of a table as JSON, gzipped, in base 64; numbers with four digits."""
-    columns = {name: column.tolist() for name, column in table.items()}
-    for name in table.select_dtypes("float"):
-        columns[name] = [None if v != v else float(f"{v:.4g}") for v in columns[name]]
+def packed(content: Mapping[str, Any]) -> str:
+    """Write JSON, gzipped, in base 64; tables by their columns, their numbers with four digits."""
+
+    def columns(value: Any) -> Any:
+        if not isinstance(value, pd.DataFrame):
+            raise TypeError(value)
+        lists = {str(name): column.tolist() for name, column in value.items()}
+        for name in value.select_dtypes("float"):
+            key = str(name)
+            lists[key] = [None if v != v else float(f"{v:.4g}") for v in lists[key]]
+        return lists
+
     # Infinite is what is too large for a number of JSON.
-    text = json.dumps(columns, ensure_ascii=False).replace("Infinity", "1e999")
+    text = json.dumps(content, ensure_ascii=False, default=columns).replace("Infinity", "1e999")
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
-def varied(cells: pd.DataFrame) -> list[Factor]:
-    """Noises of which a study has more than one level."""
-    return [factor for factor in NOISES if len(cells[factor.column].dropna().unique()) > 1]
+def noise_levels(cells: pd.DataFrame) -> dict[Factor, pd.Series]:
+    """Levels of each noise as shown; NaN where there is none, as of a robot by gravity alone."""
+    uses_robot = np.array([get_approach(name).uses_angles for name in cells["approach"]])
+    cells = cells.assign(robot_sigma_mgon=cells["robot_sigma_mgon"].where(uses_robot))
+    return {
+        factor: pd.Series([float(f"{x:.6g}") for x in factor.shown(cells[factor.column])])
+        for factor in NOISES
+    }
 
 
-def levels(cells: pd.DataFrame, factor: Factor) -> NDArray[np.float64]:
-    """Levels of a factor as shown; NaN where a set-up does without, as gravity without a robot."""
-    values = factor.shown(cells[factor.column])
-    return np.array([float(f"{value:.6g}") for value in values])
-
-
-def without_robot(cells: pd.DataFrame) -> pd.DataFrame:
-    """Cells with NaN for the noise of a robot where none is used, not 0."""
-    used = np.array([get_approach(name).uses_angles for name in cells["approach"]])
-    return cells.assign(robot_sigma_mgon=cells["robot_sigma_mgon"].where(used))
-
-
-def setups(
-    cells: pd.DataFrame, tables: Tables, figures: Sequence[Sequence[str]]
-) -> tuple[pd.DataFrame, list[dict[str, str]]]:
-    """Set-ups, a row each.
-
-    Parameters
-    ----------
-    cells : DataFrame, of `without_robot`
-    tables : mapping of name to DataFrame
-    figures : for each cell the names of figures that show it
-
-    Returns
-    -------
-    DataFrame : model, scheme and approach by their number, in the order in which they come
-    list of dict : label and unit of each group of parameters, whose sds are in `sd-0`, `sd-1`, ...
-    """
+def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str, tuple[str, str]]]:
+    """Set-ups, a row each; and what is in its columns `sd-0`, `sd-1`, ...: a title and a unit."""
     some, all_of = cells["n_converged"], cells["n_replicates"]
     failed = np.select([~cells["estimable"], some == 0], ["not estimable", "none converged"], "")
     share = some.astype(str) + " of " + all_of.astype(str) + " converged"
-    table = {
-        **{key: pd.factorize(cells[key])[0] for key in ("model", "scheme", "approach")},
-        "n": cells["n_positions"],
-        "failed": failed,
-        "state": np.select(
-            [failed != "", some == all_of], [failed, "all converged"], share.astype(object)
-        ),
-        "reason": cells["reason"],
-        "figures": [" ".join(names) for names in figures],
-        "redundancy": cells["redundancy"],
-        "condition": cells["condition"].astype(float),
-        "replicates": all_of,
-        "converged": some,
-        **{factor.name: levels(cells, factor) for factor in varied(cells)},
-    }
-    tilt = pd.DataFrame(_tilt(cells, tables))
-    ends = tilt[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
-    sds = _sds_of_groups(cells, tables["summary"])
-    table |= {**tilt, "least": ends.min(axis=1), "most": ends.max(axis=1)}
-    table |= {f"sd-{i}": values for i, (_, _, values) in enumerate(sds)}
-    return pd.DataFrame(table), [{"label": label, "unit": unit} for label, unit, _ in sds]
+    state = np.where(some == all_of, "all converged", share.astype(object))
+    noises = {f.name: x for f, x in noise_levels(cells).items() if len(x.dropna().unique()) > 1}
+    table = pd.DataFrame(
+        {
+            "cell": cells["cell"].astype(str),
+            "model": [model_title(name) for name in cells["model"]],
+            "scheme": [get_scheme(name).title for name in cells["scheme"]],
+            "approach": cells["approach"].astype(str),
+            "family": [family(name) for name in cells["scheme"]],
+            "n": cells["n_positions"],
+            "failed": failed,
+            "state": np.where(failed != "", failed, state),
+            **cells[["reason", "redundancy"]],
+            "condition": cells["condition"].astype(float),
+            "replicates": all_of,
+            "converged": some,
+            **noises,
+            **_tilt(cells, tables),
+        }
+    )
+    ends = table[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
+    table = table.assign(least=ends.min(axis=1), most=ends.max(axis=1))
+    titles: dict[str, tuple[str, str]] = {}
+    summary = tables["summary"].assign(group=tables["summary"]["parameter"].map(group_of))
+    for group in in_order(summary["group"]):
+        for unit, rows in summary[summary["group"] == group].groupby("unit", sort=False):
+            key, mean = f"sd-{len(titles)}", rows.groupby("cell")["sd_empirical"].mean()
+            table[key], label = shown(cells["cell"].map(mean).to_numpy(float), str(unit))
+            titles[key] = f"sd of {group_label(group)}", label
+    return table, titles
 
 
-def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, NDArray[np.float64]]:
+def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, np.ndarray]:
     """Tilt error of each cell: rms, central 95 %, and what 95 % stay below, singly and in both."""
-    leveling, quantiles = tables["leveling"].set_index("cell"), tables["quantiles"]
-    quantiles = quantiles[quantiles["quantity"] == "tilt"]
-    errors = {}
+    quantiles = tables["quantiles"][tables["quantiles"]["quantity"] == "tilt"]
+    columns = {"both_q95": by_cell(tables["leveling"], "both_rms_q95_mgon")}
     for angle in ANGLES:
         for name, column in (("rms", "rms"), ("q95", "rms_q95")):
-            errors[f"{angle}_{name}"] = cells["cell"].map(leveling[f"{angle}_{column}_mgon"])
+            columns[f"{angle}_{name}"] = by_cell(tables["leveling"], f"{angle}_{column}_mgon")
         for name, probability in (("low", 0.025), ("high", 0.975)):
             rows = _at(quantiles[quantiles["name"] == angle], probability)
-            errors[f"{angle}_{name}"] = cells["cell"].map(rows.set_index("cell")["value"])
-    errors["both_q95"] = cells["cell"].map(leveling["both_rms_q95_mgon"])
-    return {name: shown(values.to_numpy(float), "mgon")[0] for name, values in errors.items()}
+            columns[f"{angle}_{name}"] = by_cell(rows, "value")
+    return {
+        name: shown(cells["cell"].map(column).astype(float), "mgon")[0]
+        for name, column in columns.items()
+    }
 
 
 def _at(quantiles: pd.DataFrame, probability: float) -> pd.DataFrame:
@@ -148,45 +134,28 @@ def _at(quantiles: pd.DataFrame, probability: float) -> pd.DataFrame:
     return quantiles[np.isclose(quantiles["probability"].astype(float), probability)]
 
 
-def _sds_of_groups(
-    cells: pd.DataFrame, summary: pd.DataFrame
-) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Label, unit and mean empirical sd of each group of parameters, in each cell."""
-    table = summary.assign(group=summary["parameter"].map(group_of))
-    sds = []
-    for group in in_order(table["group"]):
-        members = table[table["group"] == group]
-        for unit, rows in members.groupby("unit", sort=False):
-            mean = rows.groupby("cell")["sd_empirical"].mean()
-            values, shown_unit = shown(cells["cell"].map(mean).to_numpy(float), str(unit))
-            sds.append((group_label(group), shown_unit, values))
-    return sds
-
-
 def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
-    """Parameters of cells, a row each: `i`, the number of its cell, and all of `QUANTITIES`."""
+    """Parameters of cells, a row each: `i`, the number of its cell, its unit, and its numbers."""
+    summary = _of(cells, tables["summary"])
     quantiles = tables["quantiles"]
     quantiles = quantiles[quantiles["quantity"] == "sd_posteriori"]
-    keys = ["cell", "parameter"]
-    summary = _of(cells, tables["summary"])
+    values = summary[list(IN_UNITS.values())].astype(float).set_axis([*IN_UNITS], axis=1)
     for name, probability in (("posteriori_low", 0.025), ("posteriori_high", 0.975)):
         ends = _at(quantiles, probability).set_index(["cell", "name"])["value"].astype(float)
-        summary = summary.join(ends.rename_axis(keys).rename(name), on=keys)
-    values = summary[list(QUANTITIES.values())].astype(float)
-    values.columns = pd.Index(QUANTITIES)
-    values.loc[:, [name for name in QUANTITIES if name.startswith("coverage")]] *= 100
-    in_units = [name for name in QUANTITIES if not name.startswith(("ratio", "coverage"))]
-    shown_unit = {}
-    for unit in summary["unit"].unique():
-        rows = summary["unit"] == unit
-        values.loc[rows, in_units], shown_unit[unit] = shown(values.loc[rows, in_units], unit)
+        ends = ends.rename_axis(["cell", "parameter"]).rename(name)
+        values[name] = summary.join(ends, on=["cell", "parameter"])[name]
+    units = summary["unit"].astype(str)
+    for unit in units.unique():
+        values.loc[units == unit] = shown(values[units == unit], unit)[0]
+    shares = {name: summary[column] * factor for name, (column, factor) in SHARES.items()}
     return pd.DataFrame(
         {
             "i": summary["i"],
             "parameter": [plain(name) for name in summary["parameter"]],
-            "unit": [shown_unit[unit] for unit in summary["unit"]],
+            "unit": [shown([], unit)[1] for unit in units],
             "failed": np.where(summary["estimable"], "", "not estimable"),
             **values,
+            **shares,
         }
     )
 
