@@ -146,9 +146,11 @@ def test_how_firmly_the_blocks_were_held():
 
 
 def test_where_the_residuals_of_white_noise_live():
-    location = diagnosed("xsens-mti", WHITE).location
-    for group in ("slow_time", "repeat", "direction"):
-        assert f"{100 * location[group]:.0f} % {GROUPS[group]}" in FLAT
+    d = diagnosed("xsens-mti", WHITE)
+    for group in ("slow_time", "direction"):
+        assert f"{100 * d.location[group]:.0f} % {GROUPS[group]}" in FLAT
+    slow, direction = (100 * d.location_by_chance[g] for g in ("slow_time", "direction"))
+    assert f"would be {slow:.0f} % and {direction:.0f} %" in FLAT
 
 
 def variances_taken(d):

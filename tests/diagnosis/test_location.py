@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, design, most, posed, shuffled, some_holds
+from scipy import stats
 
+from accelstudy.adjustment.quality import solve
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import consequences as location
 from accelstudy.diagnosis.decision.verdict import Finding
@@ -14,7 +18,9 @@ from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT, all_groups
+from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, all_groups, clusters
+from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.schemes import get_scheme
 
 CAMPAIGNS = {
     "few, by gravity": {"scheme": "fibonacci-15", "approach": "gravity", "effects": ("settling",)},
@@ -114,3 +120,33 @@ def test_a_share_is_that_of_the_excess(diagnoses):
         if group in full.location:
             share = (space.parts(residuals.z)[0] - space.dims[0]) / excess
             assert full.location[group] == pytest.approx(np.clip(share, 0, 1)), group
+
+
+def near(directions, degrees, rng):
+    """Directions turned by up to so many degrees each, evenly over the cap."""
+    across = rng.standard_normal(directions.shape)
+    across -= np.sum(across * directions, axis=1, keepdims=True) * directions
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    angle = np.radians(degrees) * np.sqrt(rng.random((len(directions), 1)))
+    return directions * np.cos(angle) + across * np.sin(angle)
+
+
+def test_repeats_by_hand_count_and_the_lack_of_fit_keeps_its_level():
+    """A person turns back to within two degrees."""
+    rng, values = np.random.default_rng(17), []
+    for _ in range(150):
+        first = near(get_scheme("faces-edges-18").directions, 5, rng)
+        taken = np.concatenate([first, near(first, 2, rng)])
+        forces = -9.80665 * taken * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2]
+        forces += 0.002 * rng.standard_normal(forces.shape)
+        measured = Campaign("by-hand", np.arange(36), forces, 9.80665, sigma_force=0.002)
+        fit = fit_campaign(measured, NINE, GRAVITY)
+        left = Residuals.of(solve(NINE, GRAVITY, fit.observed, fit.adjustment))
+        labels = clusters(forces)
+        assert len(np.unique(labels)) == 18
+        same = LackOfFit.of(left, labels)
+        r, in_common, freedom = left.redundancy, float(same.parts(left.z)[0]), int(same.dims[0])
+        of_repeats = float(left.z @ left.z) - in_common
+        ratio = in_common / freedom / (of_repeats / (r - freedom))
+        values.append(stats.f.sf(ratio, freedom, r - freedom))
+    assert stats.kstest(values, "uniform").pvalue > 0.001

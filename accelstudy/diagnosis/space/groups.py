@@ -17,8 +17,10 @@ from accelstudy.effects import HoldConditions, effect_names, get_effect
 
 Array = NDArray[np.float64]
 
-SAME_ATTITUDE = 0.01
-"""Positions closer than this (chord of unit vectors) repeat each other."""
+SAME_ATTITUDE = 0.05
+"""Positions closer than this (chord of unit vectors) repeat each other, as those do that a person
+turns back to by eye. What the model says of them may differ; of what it lacks, such as a square or
+a cube of the force, they differ by some percent of it, which the test of lack of fit can bear."""
 
 ROBOT = "robot_angles"
 """Group of the effects on what a robot reads, and of its base."""
