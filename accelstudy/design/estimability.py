@@ -25,8 +25,9 @@ SINGULAR = 1e-7
 ABOVE_NOISE = 3.0
 """How far a combination of parameters must show above what the noise of readings makes of it. Where
 positions do not determine it, it shows by noise alone, at about 1 whatever the noise is."""
-INVOLVED = 0.1
-"""Share of a parameter in a combination from which on that combination hides it."""
+INVOLVED, IN_NOISE = 1e-3, 0.1
+"""Share of a parameter in a combination from which on that combination hides it: of one that does
+not show at all, and of one that noise shows, and blurs."""
 ROUNDING = 1e-14
 """Columns of the design matrix shorter than this fraction of the longest count as zero."""
 
@@ -205,4 +206,5 @@ def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[n
     rank = int(np.count_nonzero(ratios > 1))
     condition = float(values[0] / values[-1]) if rank == u else np.inf
     null, _ = np.linalg.qr(back @ vt[rank:].T)
-    return rank, condition, np.linalg.norm(null, axis=1) > INVOLVED
+    share = IN_NOISE if len(least) else INVOLVED
+    return rank, condition, np.linalg.norm(null, axis=1) > share
