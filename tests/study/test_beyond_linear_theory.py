@@ -6,6 +6,7 @@ import pytest
 from study_helpers import NINE, grid, make_study, run_study
 
 from accelstudy.study.figures import draw, figure_names
+from accelstudy.study.figures.theory import largest_of_groups
 
 NAME = "beyond-linear-theory"
 SIGMA = 0.3
@@ -13,11 +14,12 @@ SIGMA = 0.3
 REPLICATES = 12_000
 
 
-def marks(figure, kind):
-    """Places of the marks of one kind in each panel, from left to right."""
+def numbers(tables, column):
+    """Numbers of each quantity, as they are drawn from left to right."""
+    table = largest_of_groups(tables)
     return [
-        [x for line in ax.get_lines() if line.get_marker() == kind for x in line.get_xdata()]
-        for ax in figure.axes
+        table[column][table["quantity"] == quantity].dropna().to_numpy()
+        for quantity in ("bias", "excess", "noise")
     ]
 
 
@@ -34,17 +36,18 @@ def tables(**columns):
 @pytest.mark.parametrize("empirical", [11.0, 9.0])
 def test_what_differs_from_zero_is_a_number_and_the_rest_a_limit(empirical):
     sds = [10, 10, 10, 10, empirical, 10.001]
-    figure = draw(NAME, tables(bias=[0, -1, 0.5, 0, 0, 0], sd_empirical=sds), make_study())
-    bias, excess, noise = marks(figure, "o")
+    made = tables(bias=[0, -1, 0.5, 0, 0, 0], sd_empirical=sds)
+    (bias,), (excess,), (noise,) = numbers(made, "size")
     size = abs((empirical / 10) ** 2 - 1)
-    np.testing.assert_allclose(bias, 0.1)  # of the biases, the largest
-    np.testing.assert_allclose(excess, size)  # of the scales
-    np.testing.assert_allclose(noise, 2 * np.sqrt(0.01 / size))  # mm/s²
+    assert bias == pytest.approx(0.1)  # of the biases, the largest
+    assert excess == pytest.approx(size)  # of the scales
+    assert noise == pytest.approx(2 * np.sqrt(0.01 / size))  # mm/s²
     # Six numbers a panel share the 5 %: 2.638 standard errors on either side.
-    at_most, limits, _ = marks(figure, "<")
-    np.testing.assert_allclose(at_most, 0.02638 / min(empirical, 10), rtol=1e-3)
-    np.testing.assert_allclose(limits, 2.638 * 2e-3, rtol=1e-3)
-    np.testing.assert_allclose(marks(figure, ">")[2], 2 * np.sqrt(0.01 / np.array(limits)))
+    (_, at_most), (limit, _), (least, _) = numbers(made, "limit")
+    assert at_most == pytest.approx(0.02638 / min(empirical, 10), rel=1e-3)
+    assert limit == pytest.approx(2.638 * 2e-3, rel=1e-3)
+    assert least == pytest.approx(2 * np.sqrt(0.01 / limit))
+    figure = draw(NAME, made, make_study())
     whites = [line for line in figure.axes[1].get_lines() if line.get_markerfacecolor() == "white"]
     assert sum(len(line.get_xdata()) for line in whites) == (empirical < 10)
 
@@ -65,8 +68,7 @@ def test_at_the_noise_that_it_shows_linear_theory_is_off_by_one_percent(tmp_path
         cells = grid(replicates=REPLICATES, approaches="gravity", sensor_sigma_mps2=sigma)
         return run_study(tmp_path / str(seed), grids=[cells], **keys)
 
-    figure = draw(NAME, simulated(2 * SIGMA, 1), make_study())
-    _, excess, noise = marks(figure, "o")
+    _, excess, noise = numbers(simulated(2 * SIGMA, 1), "size")
     rows = simulated(noise[-1] / 1000, 2)["summary"]
     rows = rows[rows["parameter"].str.startswith("alpha")]
     ratio = rows["sd_empirical"] / rows["sd_linear"]

@@ -16,7 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
 from accelstudy.files.tables import read_table
-from accelstudy.sensors.models import MODELS
+from accelstudy.sensors.models import MODELS, PRESETS, get_model
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
     captions,
@@ -28,7 +28,9 @@ from accelstudy.study.figures import (
     total_effects,
     write_figure,
 )
+from accelstudy.study.figures.calibrations import correlation_matrix, single_runs
 from accelstudy.study.figures.factors import FACTORS
+from accelstudy.study.figures.table_1 import preset_table
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
 PROVENANCE = {"config_hash": "test", "seed": 1}
@@ -243,10 +245,18 @@ def test_shapley_effects_name_what_overtakes(tables, paper):
     assert rings == [(50, pytest.approx(gained))]
 
 
-def test_numbers_stand_in_table_1(tables, paper):
-    drawn = draw("table-1", tables, paper)
-    written = {text.get_text() for ax in drawn.axes for text in ax.texts}
-    tilt = tables["leveling"].set_index("cell")["roll_rms_mgon"][f"{NINE}/fibonacci-36/robot"]
+def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):
+    cell = f"{NINE}/fibonacci-36/robot"
+    place = [(p.model, p.scheme) for p in PRESETS].index((NINE, "fibonacci-36"))
+    rows = preset_table(tables, ["gravity", "robot"])
+    rows = rows[(rows["place"] == place) & (rows["approach"] == "robot")]
+    value = rows.set_index("group")["value"]
+    summary = tables["summary"][tables["summary"]["cell"] == cell]
+    biases = summary[summary["parameter"].str.startswith("b_")]
+    assert value["bias"] == pytest.approx(biases["sd_empirical"].mean())
+    tilt = tables["leveling"].set_index("cell")["roll_rms_mgon"][cell]
+    assert value["tilt"] == pytest.approx(tilt)
+    written = {text.get_text() for ax in draw("table-1", tables, paper).axes for text in ax.texts}
     assert f"{tilt:.1f}" in written
 
 
@@ -261,32 +271,31 @@ def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables,
     assert "at tilts up to 50 gon" in drawn.axes[-1].get_ylabel()
 
 
-def test_figure_7_draws_the_mean_sd_and_the_first_simulation(tables, paper):
-    rows = tables["estimates"].astype({"cell": str})
-    rows = rows[(rows["parameter"] == "b_x") & (rows["cell"] == f"{NINE}/mclaren-24/gravity")]
-    rows = rows.assign(error=rows["estimate"] - rows["truth"])
-    of_cell = {"cell": f"{NINE}/mclaren-24/gravity", "unit": "mm/s^2"}
-    summary, quantiles = (
-        table[(table[list(of_cell)].astype(str) == pd.Series(of_cell)).all(axis=1)]
-        for table in (tables["summary"], tables["quantiles"])
+def test_figure_7_has_the_first_simulation_the_middle_of_all_and_the_mean_sd(tables, paper):
+    runs = single_runs(tables, paper).query("approach == 'gravity' and parameter == 'b_x'")
+    errors, sds = (rows.iloc[0] for _, rows in runs.groupby("quantity"))
+    of_cell = (
+        table[table["cell"].astype(str) == f"{NINE}/mclaren-24/gravity"]
+        for table in (tables["estimates"], tables["quantiles"], tables["summary"])
     )
-    (sigma,) = summary.loc[summary["parameter"] == "b_x", "sd_posteriori_mean"]
+    estimates, quantiles, summary = of_cell
+    first = estimates.query("parameter == 'b_x' and replicate == 0").iloc[0]
+    assert errors["first"] == pytest.approx(1e3 * (first["estimate"] - first["truth"]))
+    found = quantiles.query("name == 'b_x' and quantity == 'error'")
+    found = found[found["probability"].isin([0.025, 0.975])]["value"]
+    np.testing.assert_allclose(errors[["low", "high"]].astype(float), found)
+    mean = summary.set_index("parameter")["sd_posteriori_mean"]["b_x"]
+    assert sds["mean"] == pytest.approx(mean)
     axes = draw("figure-7", tables, paper).axes
-    bars = [patch.get_height() for patch in axes[1].patches]
-    assert sigma == pytest.approx(bars[0])
-    errors = [y for line in axes[0].get_lines() for y in np.atleast_1d(line.get_ydata())]
-    assert np.isclose(errors, 1e3 * rows.loc[rows["replicate"] == 0, "error"].iloc[0]).any()
-    ends = axes[0].collections[0].get_segments()[0][:, 1]
-    found = quantiles[(quantiles["quantity"] == "error") & (quantiles["name"] == "b_x")]
-    found = found[found["probability"].isin([0.025, 0.975])]
-    np.testing.assert_allclose(ends, found["value"])
+    assert sds["mean"] == pytest.approx(axes[1].patches[0].get_height())
 
 
-def test_figure_8_has_no_diagonal(tables, paper):
-    for ax in draw("figure-8", tables, paper).axes[:2]:
-        matrix = np.asarray(ax.images[0].get_array())
-        np.testing.assert_allclose(np.diag(matrix), 0, atol=1e-12)
-        assert matrix.shape == (9, 9)
+def test_figure_8_has_no_diagonal(tables):
+    names = get_model(NINE).parameter_names
+    matrix = correlation_matrix(tables["correlations"], f"{NINE}/mclaren-24/gravity", list(names))
+    assert matrix.shape == (9, 9)
+    np.testing.assert_allclose(np.diag(matrix), 0, atol=1e-12)
+    assert matrix[3, 4] == pytest.approx(0.25, abs=0.01)  # of the scales, in an isotropic scheme
 
 
 def test_what_cannot_be_estimated_is_marked(tables, paper):

@@ -1,6 +1,6 @@
 """Figures over what a study varies, for factorial configurations of any kind."""
 
-from itertools import chain, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from study_helpers import NINE, grid, make_study, run_study
 from accelstudy.basics.errors import InputError
 from accelstudy.study.figures import angle_unit, captions, draw, figure_names
 from accelstudy.study.figures.factors import FACTORS, blocks
+from accelstudy.study.figures.sweep import block_table
 
 SENSOR, ROBOT, GRAVITY_SD, GRAVITY_ERROR, POSITIONS = FACTORS
 FOUR = ["mclaren-24", "faces-edges-18", "fibonacci-30", "xsens-38"]
@@ -60,20 +61,23 @@ def test_each_factor_of_a_study_has_a_figure():
 
 def test_both_approaches_are_drawn_where_no_factor_has_its_default(factorial):
     study, tables = factorial
-    drawn = draw("sweep-sensor-noise", tables, study)
-    by_title = panels(drawn)
-    assert {"bias", "scale", "non-orthogonality"} < by_title.keys()
-    for name in ("bias", "tilt error, roll", "tilt error, pitch"):
-        of_approach = lines(by_title[name])
-        assert [len(its) for its in of_approach.values()] == [4, 4]
-        for line in chain(*of_approach.values()):
-            np.testing.assert_allclose(line.get_xdata(), [1, 5])
-            assert np.isfinite(line.get_ydata()).all()
+    (block,) = blocks(study, SENSOR)
+    table = block_table(block, tables, SENSOR)
+    assert set(table["group"]) == {"bias", "scale", "nonorthogonality", "roll", "pitch"}
+    series = table.groupby(["group", "series", "approach"])
+    assert series.ngroups == 5 * 4 * 2
+    for _, line in series:
+        np.testing.assert_allclose(line["x"], [1, 5])
+        assert np.isfinite(line["value"]).all()
     rows = tables["summary"]
     rows = rows[rows["cell"].str.startswith(f"{NINE}/xsens-38/robot/sensor_sigma_mps2=0.001/")]
     rows = rows[rows["cell"].str.endswith("=5") & rows["parameter"].str.startswith("b_")]
-    robot = lines(by_title["bias"])["#C2247A"]
-    assert np.isclose(robot[3].get_ydata()[0], rows["sd_empirical"].mean(), rtol=1e-12)
+    (at,) = table.query("group == 'bias' and series == 3 and approach == 'robot' and x == 1")[
+        "value"
+    ]
+    assert at == pytest.approx(rows["sd_empirical"].mean(), rel=1e-12)
+    robot = lines(panels(draw("sweep-sensor-noise", tables, study))["bias"])["#C2247A"]
+    assert robot[3].get_ydata()[0] == at
 
 
 def test_the_values_of_the_other_factors_are_stated(factorial):
