@@ -17,6 +17,7 @@ from study_helpers import NINE, grid, make_study, run_study
 from accelstudy.basics.units import angles_in
 from accelstudy.basics.wording import number
 from accelstudy.drawing.style import APPROACH_COLOURS, model_title
+from accelstudy.study.explorer import content
 from accelstudy.study.explorer import page as explorer
 from accelstudy.study.explorer.content import plain
 from accelstudy.study.explorer.page import explorer_page, write_explorer
@@ -181,12 +182,19 @@ def test_the_page_is_small_and_whole_and_the_same_again(page, study, tables):
     assert explorer_page(study, tables, {}) == page
 
 
+def test_models_and_schemes_of_the_same_title_are_told_apart(study, tables, monkeypatch):
+    monkeypatch.setattr(content, "model_title", lambda name: "mine")
+    rows = table_of(explorer_page(study, tables, {}), "setups")
+    assert list(rows["model"]) == [f"mine ({name})" for name in tables["cells"]["model"]]
+    assert set(rows["scheme"]) == {"24 McLaren", "12 icosahedron"}
+
+
 def test_angles_in_degrees(study, tables):
     with angles_in("deg"):
         page = explorer_page(study, tables, {})
-    content = study_of(page)
-    assert content["angle"] == "mdeg"
-    assert "mgon" not in content["units"]
+    read = study_of(page)
+    assert read["angle"] == "mdeg"
+    assert "mgon" not in read["units"]
     same(table_of(page, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
 
 

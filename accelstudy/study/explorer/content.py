@@ -10,7 +10,8 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -86,8 +87,8 @@ def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str,
     table = pd.DataFrame(
         {
             "cell": cells["cell"].astype(str),
-            "model": [model_title(name) for name in cells["model"]],
-            "scheme": [get_scheme(name).title for name in cells["scheme"]],
+            "model": _titles(cells["model"], model_title),
+            "scheme": _titles(cells["scheme"], lambda name: get_scheme(name).title),
             "approach": cells["approach"].astype(str),
             "family": [family(name) for name in cells["scheme"]],
             "n": cells["n_positions"],
@@ -111,6 +112,13 @@ def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str,
             table[key], label = shown(cells["cell"].map(mean).to_numpy(float), str(unit))
             titles[key] = f"sd of {group_label(group)}", label
     return table, titles
+
+
+def _titles(names: pd.Series, title: Callable[[str], str]) -> list[str]:
+    """Titles by which a reader chooses, with the name where several have the same."""
+    titles = {name: title(name) for name in names.unique()}
+    count = Counter(titles.values())
+    return [titles[n] if count[titles[n]] == 1 else f"{titles[n]} ({n})" for n in names]
 
 
 def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, np.ndarray]:
