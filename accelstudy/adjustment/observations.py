@@ -39,8 +39,6 @@ class Observations:
         unknown numbers that are 0 ± 1; None if the errors of the positions are independent
     angle_errors : function of angles (k, 2), rad, optional: `sigma_angle` and `common` in other
         attitudes; the adjustment does not use it
-    slope, sd_slope : (n, 3) arrays, m/s²/s, of the output within each position, and its standard
-        deviation, R = 1; the adjustment does not use them
     """
 
     forces: Array
@@ -54,8 +52,6 @@ class Observations:
     known: Known = field(default_factory=dict)
     common: Array | None = None
     angle_errors: AngleErrors | None = None
-    slope: Array | None = None
-    sd_slope: Array | None = None
 
     def take(self, positions: NDArray[np.int_]) -> Observations:
         """Return the sessions with some of their positions."""
@@ -71,8 +67,6 @@ class Observations:
             sigma_angle=chosen(self.sigma_angle),
             common=None if self.common is None else self.common[positions],
             hold=None if self.hold is None else self.hold.take(positions),
-            slope=None if self.slope is None else self.slope[positions],
-            sd_slope=None if self.sd_slope is None else self.sd_slope[positions],
         )
 
     def sessions(self, chosen: slice) -> Observations:

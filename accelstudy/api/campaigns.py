@@ -26,7 +26,6 @@ _QUANTITIES = {
     "sigma_angle": Given("rad", "", "Noise of the robot's angles."),
     "gravity": GRAVITY,
     "interval": Given("s", "", "Time between holds."),
-    "duration": Given("s", "", "Duration of a hold."),
 }
 _NAMES = ("effects", "noise_effects", "gross_errors")
 _TYPES = get_type_hints(CampaignSettings)

@@ -27,7 +27,7 @@ from accelstudy.campaign.checks import (
     check_robot,
     check_size,
 )
-from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.header import COLUMNS, COUNTING, FORMER, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
@@ -119,7 +119,7 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
 
 def ignored_in(columns: Columns, path: Path) -> list[str]:
     """Warnings about columns that the format does not know."""
-    unknown = [name for name in columns if name not in KNOWN]
+    unknown = [name for name in columns if name not in (*KNOWN, *FORMER)]
     if len(unknown) > MOST_NAMED:
         first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
         return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]

@@ -51,8 +51,6 @@ COLUMNS = {
     "forces": ("fx", "fy", "fz"),
     "n_samples": ("n_samples",),
     "sd": ("sd_fx", "sd_fy", "sd_fz"),
-    "slope": ("slope_fx", "slope_fy", "slope_fz"),
-    "sd_slope": ("sd_slope_fx", "sd_slope_fy", "sd_slope_fz"),
     "temperature": ("temperature_degC",),
     "angles": ("roll_robot_gon", "pitch_robot_gon"),
     "yaw": ("yaw_robot_gon",),
@@ -60,6 +58,8 @@ COLUMNS = {
 }
 """Attributes of a campaign and the columns that make them up, all of them or none."""
 KNOWN = tuple(name for names in COLUMNS.values() for name in names)
+FORMER = tuple(f"{what}_f{axis}" for what in ("slope", "sd_slope") for axis in "xyz")
+"""Columns of files that earlier versions wrote, and that are left out without a word."""
 COUNTING = ("positions", "n_samples")
 MOST = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
@@ -68,7 +68,6 @@ RANGES = {
     "positions": Range(1, 2**53),  # beyond which not every integer is a float
     "n_samples": Range(1, 2**53),
     "sd": Range(0.0, MOST),
-    "sd_slope": Range(0.0, MOST),
     "time": bounds.TIME,
     "temperature": bounds.TEMPERATURE,
     "vibration": bounds.VIBRATION,
@@ -231,7 +230,7 @@ class Header(Block):
         """Conversion of the columns of an attribute to SI."""
         if attribute in ("angles", "yaw"):
             return Conversion(np.array([GON]), np.zeros(1))
-        if attribute not in ("forces", "sd", "slope", "sd_slope"):
+        if attribute not in ("forces", "sd"):
             return Conversion(np.ones(1), np.zeros(1))
         if self.nominal is None:
             forces = conversion_of(self.unit)
@@ -239,6 +238,5 @@ class Header(Block):
             forces = Conversion(np.array(self.nominal.scale), np.array(self.nominal.offset))
         if attribute == "forces":
             return forces
-        # Differences have no offset, and sds no sign.
-        scale = forces.scale if attribute == "slope" else np.abs(forces.scale)
-        return Conversion(scale, np.zeros(3))
+        # Sds have neither an offset nor a sign.
+        return Conversion(np.abs(forces.scale), np.zeros(3))

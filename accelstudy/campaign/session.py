@@ -43,8 +43,6 @@ class Campaign:
     of_type : SensorType, optional, what other sensors of the type tell of this one
     n_samples : (n,) int array, optional
     sd : (n, 3) array, m/s², optional, sd of the samples within the holds
-    slope, sd_slope : (n, 3) arrays, m/s²/s, optional, slope of the samples within the holds, and
-        its standard deviation, autocorrelation included
     time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
     nominal : Conversion, of the three axes; with unit "counts" only
     full_range : float, m/s², optional, the sensor measures ± this
@@ -71,8 +69,6 @@ class Campaign:
     reference: ReferenceSensor | None = None
     n_samples: NDArray[np.int_] | None = None
     sd: Array | None = None
-    slope: Array | None = None
-    sd_slope: Array | None = None
     time: Array | None = None
     temperature: Array | None = None
     vibration: Array | None = None

@@ -24,13 +24,12 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose, get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import PROVIDES, HoldPlan
-from accelstudy.simulation.sessions import Noise, Session, session
+from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
 
-STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross", "slope")
+STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
 """What is drawn. Each has its own stream of random numbers, so that none changes another."""
 
 ORDERS = ("scheme", "random")
@@ -40,7 +39,6 @@ _RANGES = {
     "repeats": bounds.POSITIONS,
     "repeat_first": replace(bounds.POSITIONS, least=0),
     "n_samples": bounds.SAMPLES,
-    "duration": bounds.INTERVAL,
     "sigma": bounds.SIGMA_FORCE,
     "gravity": bounds.GRAVITY,
     "size": bounds.SIZE,
@@ -72,7 +70,6 @@ class CampaignSettings:
     gravity : float, m/s²
     interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
-    duration : float, s, of a hold, optional; adds the slopes of its samples, and their sds
     """
 
     name: str = "simulated"
@@ -97,7 +94,6 @@ class CampaignSettings:
     vibration: tuple[float, float] | None = None
     yaw: str = "none"
     n_samples: int | None = None
-    duration: float | None = None
 
     def __post_init__(self) -> None:
         if self.order not in ORDERS:
@@ -106,12 +102,6 @@ class CampaignSettings:
             if (value := getattr(self, key)) is not None:
                 allowed.check_key(key, value)
         bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
-        if self.duration is not None and self.n_samples is None:
-            raise InputError("duration: slopes need n_samples, too")
-        if self.duration is not None and self.duration > (self.interval or 0.0):
-            raise InputError(
-                f"duration: {self.duration:g} s are more than the interval between holds"
-            )
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
 
@@ -186,7 +176,6 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
         vibration=hold.vibration,
         yaw=hold.yaw if robot and settings.yaw != "none" else None,
         **_samples(settings, noise_effects, len(directions), rng["sd"]),
-        **_slopes(settings, model, parameters, ideal, noise_effects, rng["slope"]),
     )
     gross = []
     for spec in settings.gross_errors:
@@ -259,32 +248,6 @@ def _samples(
     sigma = settings.sigma * np.sqrt(n) * np.prod([e.within_hold for e in noise_effects], axis=0)
     scatter = np.sqrt(rng.chisquare(n - 1, (n_positions, 3)) / (n - 1))
     return {"n_samples": np.full(n_positions, n), "sd": sigma * scatter}
-
-
-def _slopes(
-    settings: CampaignSettings,
-    model: SensorModel,
-    parameters: Array,
-    ideal: Session,
-    noise_effects: Sequence[NoiseEffect],
-    rng: np.random.Generator,
-) -> dict[str, Any]:
-    """Slopes of the samples, and their sds: √12 σ over the duration of a hold, for white noise."""
-    if settings.duration is None:
-        return {}
-    # Up to the third order a fitted line has the slope between these two moments.
-    dt = np.sqrt(0.6) * settings.duration / 2
-    later, earlier = (
-        model.sense(ideal.f_b, parameters, settings.gravity, settings.holds.moved(ideal.hold, d))
-        for d in (dt, -dt)
-    )
-    within = np.prod([np.ones(3), *(e.within_hold for e in noise_effects)], axis=0)
-    sigma = np.sqrt(12.0) * settings.sigma * within / settings.duration
-    error = sigma * rng.standard_normal(ideal.forces.shape)
-    return {
-        "slope": (later - earlier) / (2 * dt) + error,
-        "sd_slope": np.broadcast_to(sigma, ideal.forces.shape),
-    }
 
 
 def _truth(

@@ -27,10 +27,16 @@ from accelstudy.commands.options import (
 _SECTIONS = {
     "What is written": ("out", "truth_path", "name", "seed"),
     "The sensor": ("model", "effects", "size", "noise_effects", "gross_errors"),
-    "Its noise": ("sigma", "sigma_unknown", "robot_sigma_mgon", "n_samples", "duration"),
+    "Its noise": ("sigma", "sigma_unknown", "robot_sigma_mgon", "n_samples"),
     "The holds": ("scheme", "repeats", "repeat_first", "order", "approach", "yaw"),
     "Their conditions": ("interval", "no_time", "temperature", "temperature_order", "vibration"),
 }
+
+
+def _no_slopes(context: click.Context, option: click.Parameter, value: str | None) -> None:
+    """Refuse an option of earlier versions."""
+    if value is not None:
+        raise InputError("--hold: no longer an option; campaigns have no slopes within holds")
 
 
 @click.command(
@@ -114,7 +120,7 @@ _SECTIONS = {
     type=int,
     help="Samples of a hold; adds columns on them.",
 )
-@click.option("--hold", "duration", type=float, help="Duration of a hold, s; adds slopes.")
+@click.option("--hold", hidden=True, expose_value=False, callback=_no_slopes)
 @force_option
 @quiet_option
 def simulate_campaign_command(

@@ -1,10 +1,7 @@
 """What follows from a finding: where it lives, what it changed, and what it is worth.
 
-Where it lives: the share of the excess χ² that each group of regressors takes up. A group of k
-regressors takes up k of r redundant conditions. Of residuals that have nothing to do with it, it
-has a part of Beta(k/2, (r − k)/2) by chance, k/r on average. Of an excess E above the noise, r + E
-in all, the group has nearly all if it has k + 0.9 E. Where chance often gives that, as it does
-where the redundancy or the excess is small, the share says nothing, and is not told.
+Where it lives: the posterior over coordinates and targets, if what is missing is a smooth function
+of one coordinate of the session, whether it has a name or not.
 
 What it changed: an effect with the signature S (whitened, by its parameters p) that a model with
 the design Ã lacks shifts the estimates of the model by −(ÃᵀÃ)⁻¹ Ãᵀ S p (omitted-variable bias).
@@ -20,23 +17,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.adjustment.quality import Solution, suspects
 from accelstudy.basics.progress import stage
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.assessment import SUSPECT
 from accelstudy.diagnosis.decision.learned import shares_of_places
-from accelstudy.diagnosis.decision.posterior import Posterior, of_effects
+from accelstudy.diagnosis.decision.posterior import of_effects
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
 from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT, REPEAT, ROBOT, all_groups
-from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
 from accelstudy.effects import HoldConditions
@@ -46,121 +39,13 @@ from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds
 
 Array = NDArray[np.float64]
 
-SINGLE = "single_position"
-"""Group of the one position that is most at odds with the others."""
-GROUPS = (
-    "direction", ROBOT, REPEAT, "slow_time", "temperature", "previous_position", SINGLE,
-)  # fmt: skip
-"""Groups of which every campaign is told whether it shows them."""
-ABSENT = {
-    "direction": "the model has all effects of the direction",
-    ROBOT: "gravity alone does not tell the angles of a robot",
-    REPEAT: "no attitude was measured twice",
-    "previous_position": "the campaign does not give the order of the positions",
-    SINGLE: "no position is checked by the others",
-}
-"""Why nothing is known of groups that need no column of a name."""
-NEARLY_ALL = 0.9
-"""Share that would seem to say where a pattern lives."""
-ROUNDING = 1e-6
-"""Excess per redundant condition that rounding errors may leave."""
-SELDOM = 0.05
-"""Probability with which any pattern may have such a share in one of the groups by chance."""
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where the residuals of a fit have more than noise.
-
-    Attributes
-    ----------
-    shares : dict of group to the share of the excess χ² in its space, in [0, 1], where it tells
-    by_chance : dict of these groups to the share that each has of any pattern, on average
-    untestable : dict of the other groups to the reason why nothing can be told of them
-    """
-
-    shares: dict[str, float]
-    by_chance: dict[str, float]
-    untestable: dict[str, str]
-
-
-def locate(problem: Problem, chance: Chance, finding: Finding, variance: float) -> Location:
-    """Say where the excess χ² above the noise lives.
-
-    The noise is the given one. Where none is given, it is what remains after what was found or, if
-    something unknown is missing, the least that any group of regressors leaves.
-
-    Parameters
-    ----------
-    problem : Problem
-    chance : Chance, residuals without any effect
-    finding : Finding
-    variance : float, of unit weight, after what was found
-    """
-    examined, residuals = problem.examined, problem.residuals
-    z, r = residuals.z, residuals.redundancy
-    if problem.evidence.level.known:
-        variance = 1.0
-    elif finding.verdict == "unknown":
-        spaces = [space for name, space in problem.groups.items() if name != LACK_OF_FIT]
-        left = [float((z @ z - space.parts(z)[0]) / (r - space.dims[0])) for space in spaces]
-        variance = min([variance, *left])
-    groups = {n: space for n, space in all_groups(examined).items() if n != LACK_OF_FIT}
-    excess, nearly_all = max(float(z @ z) / variance - r, 0.0), {}
-    expected = {name: float(space.dims[0]) for name, space in groups.items()}
-    usual = {name: k / r for name, k in expected.items()}
-    for name, k in expected.items():
-        part = (k + NEARLY_ALL * excess) / (r + excess)
-        by_chance = special.betainc((r - k) / 2, k / 2, 1 - part) if 0 < k < r else k >= r
-        nearly_all[name] = float(by_chance)
-    bumped = examined.candidates.get(OUTLIER)
-    if bumped is not None:
-        groups[SINGLE] = bumped
-
-        def largest_part(errors: Array) -> Array:
-            """Largest part of a single position, and all of them."""
-            return np.column_stack([bumped.parts(errors).max(axis=-1), np.sum(errors**2, axis=-1)])
-
-        largest, total = chance.statistic(residuals, largest_part).T
-        expected[SINGLE] = float(np.mean(largest))
-        usual[SINGLE] = float(np.mean(largest / total))
-        enough = (expected[SINGLE] + NEARLY_ALL * excess) / (r + excess)
-        nearly_all[SINGLE] = float(np.mean(largest >= enough * total))
-    untestable = {}
-    for name in dict.fromkeys((*GROUPS, *groups)):
-        if name not in groups:
-            untestable[name] = _absent(name, problem.frame.hold)
-        elif int(groups[name].dims.max()) == 0:
-            untestable[name] = "the parameters of the model absorb all of it"
-        elif excess < ROUNDING * r:
-            untestable[name] = "the residuals have no more than the noise that is assumed"
-        elif nearly_all[name] > SELDOM / len(groups):
-            untestable[name] = (
-                f"with a redundancy of {r} and residuals of this size, nearly all of any pattern "
-                "could be in it by chance"
-            )
-    shares = {}
-    for name, space in groups.items():
-        if name not in untestable:
-            part = float(space.parts(z).max()) / variance
-            shares[name] = float(np.clip((part - expected[name]) / excess, 0.0, 1.0))
-    return Location(shares, {name: usual[name] for name in shares}, untestable)
-
-
-def _absent(name: str, hold: HoldConditions) -> str:
-    """Say why a campaign does not have a group."""
-    columns = {"slow_time": hold.time, "temperature": hold.temperature}
-    if name not in columns:
-        return ABSENT[name]
-    column = name.removeprefix("slow_")
-    if columns[name] is None:
-        return f"the campaign gives no {column}"
-    return f"the {column} is the same in all positions"
+MISSING = ("named", "narrowed", "learned", "unknown")
+"""Verdicts by which the model lacks something."""
 
 
 @dataclass(frozen=True)
 class LikeShape:
-    """Where something without a name may live: a target that is a function of a coordinate.
+    """Where what is missing may live: a target that is a function of a coordinate.
 
     Attributes
     ----------
@@ -173,12 +58,17 @@ class LikeShape:
     posterior: float
 
 
-def like_shapes(problem: Problem, posterior: Posterior | None) -> tuple[LikeShape, ...]:
-    """Places of what has no name, most probable first, beside the effect that it comes with."""
-    told = () if posterior is None else posterior.credible_set
-    names = next((one.names for one in told if UNKNOWN in one.names), None)
-    shares = {} if names is None else shares_of_places(problem, names)
-    like = [LikeShape(*place, p) for place, p in shares.items()]
+def like_shapes(problem: Problem, finding: Finding) -> tuple[LikeShape, ...]:
+    """Places of what is missing, most probable first; none if nothing is.
+
+    They are those of all that is missing or, where the most probable explanation with something
+    unknown has effects with names, of what is beside these.
+    """
+    if finding.verdict not in MISSING:
+        return ()
+    told = finding.credible_set if finding.verdict in ("unknown", "learned") else ()
+    names = next((one.names for one in told if UNKNOWN in one.names), (UNKNOWN,))
+    like = [LikeShape(*place, p) for place, p in shares_of_places(problem, names).items()]
     return tuple(sorted(like, key=lambda one: -one.posterior))
 
 

@@ -26,8 +26,7 @@ from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms, smooth
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.residuals import VISIBLE
-from accelstudy.diagnosis.space.shapes import SURVIVES, Course, function_rows, less_its_mean
-from accelstudy.diagnosis.space.signatures import Moment
+from accelstudy.diagnosis.space.shapes import SURVIVES, function_rows, less_its_mean
 from accelstudy.effects.learned import ANGLES, OF_EACH, WAVES, Learned
 
 Array = NDArray[np.float64]
@@ -92,14 +91,13 @@ def ranked(frame: Frame, evidence: Evidence, effect: Learned, beside: Array) -> 
     return _Library(frame, evidence, effect, beside).ranking()
 
 
-def argument(frame: Frame, effect: Learned) -> Course:
-    """Return the coordinate of a learned effect as a function of the moment, (n, a)."""
+def argument(frame: Frame, effect: Learned) -> Array:
+    """Return the coordinate of a learned effect in the positions, (n, a)."""
     name = WAVES.get(effect.coordinate, effect.coordinate)
     if name in (*ANGLES, *OF_EACH, "temperature rate"):
         values = coordinate_values(effect, frame)
-        values = values if name in (*OF_EACH, "angle") else values[:, :1]
-        return lambda now: values
-    return lambda now: getattr(now, name)[:, None]
+        return values if name in (*OF_EACH, "angle") else values[:, :1]
+    return frame.hold.column(name)[:, None]
 
 
 class _Library:
@@ -108,8 +106,7 @@ class _Library:
     def __init__(self, frame: Frame, evidence: Evidence, effect: Learned, beside: Array) -> None:
         self.frame, self.evidence, self.effect, self.beside = frame, evidence, effect, beside
         self.z = frame.residuals.z - beside @ (beside.T @ frame.residuals.z)
-        self.at = argument(frame, effect)
-        self.c = self.at(Moment(frame.hold))
+        self.c = argument(frame, effect)
         self.components = TARGETS[effect.target].components
         self.everything: Choice = tuple(range(len(self.components)))
 
@@ -129,11 +126,7 @@ class _Library:
 
     def rows(self, form: Callable[[Array], Array]) -> tuple[Array, Array]:
         """What functions do to the conditions of unit weight, and to the residuals, (m, c, k)."""
-
-        def course(now: Moment) -> Array:
-            return form(self.at(now))
-
-        varying = partial(less_its_mean, course, form(self.c).mean(axis=0))
+        varying = less_its_mean(form(self.c))
         rows = function_rows(self.frame, self.effect.target, varying)
         left = self.frame.residuals.project(rows)
         left -= self.beside @ (self.beside.T @ left)

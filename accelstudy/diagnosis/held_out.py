@@ -310,7 +310,7 @@ def _on_the_part(
     part: Problem, split: LinearSplit, noise: Array, rng: np.random.Generator
 ) -> tuple[list[str], Array]:
     """What the fitted positions choose of noise (b, m), and the held-out statistic, (b,)."""
-    candidate, shape = _choices(part, split.residuals(part.residuals, noise, rng))
+    candidate, shape = _choices(part, split.residuals(part.residuals, noise))
     left, missed = split.beside(noise)
     variance = split.variances(left, part.evidence.level.known)
     names, values = tuple(part.field.candidates), np.zeros(len(noise))

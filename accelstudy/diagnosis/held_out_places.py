@@ -119,7 +119,7 @@ def simulated_places(
     if not len(learned):
         return nothing, nothing, np.zeros(0, dtype=bool)
     weights = np.exp(-_proposal(unknown, place, z[learned]))
-    z = split.residuals(part.residuals, noise[learned], rng)
+    z = split.residuals(part.residuals, noise[learned])
     logs = of_part.densities(part.evidence, of_part.parts(z), np.sum(z**2, axis=1))
     each = {
         one: log_sum(logs[:, [other == one for other in of_part.places]])
@@ -173,9 +173,9 @@ def _values(part: Problem, place: Place, z: Array, split: LinearSplit, noise: Ar
     best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)
     left, missed = split.beside(noise)
     variance = split.variances(left, part.evidence.level.known)
-    positions = split.frame.residuals.positions
+    residuals = split.frame.residuals
     for i, one in enumerate(shapes):
-        shown = positions.whitened(split.frame.signature(one.effect)) * one.effect.deviations
+        shown = residuals.whitened(split.frame.signature(one.effect)) * one.effect.deviations
         fitted, rest = split.beside(shown.T)
         inner = fitted @ fitted.T
         sizes = np.argmax(one.logs, axis=1)

@@ -28,7 +28,6 @@ from accelstudy.diagnosis.consequences import (
     leveling_rms,
     like_shapes,
     limits_of_others,
-    locate,
     marked_positions,
     parameter_changes,
     separating_positions,
@@ -54,7 +53,6 @@ from accelstudy.diagnosis.decision.verdict import (
 )
 from accelstudy.diagnosis.evidence.detection import SIMULATIONS, Chance, detect
 from accelstudy.diagnosis.held_out import measured_gap, predicted_gap
-from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.result import Diagnosis, Verdict, level_of_effects
 from accelstudy.diagnosis.shape import shape_of
 from accelstudy.sensors.plausibility import implausible_parameters
@@ -84,12 +82,9 @@ def diagnose(
     judged = _judged(campaign, model, approach, seed)
     verdict, problem, finding = judged.verdict, judged.problem, judged.finding
     base, final, variance = verdict.base, finding.frame.solution, verdict.unit_variance
-    ratio = relative_variance(final, base)
-    location = locate(problem, judged.chance, finding, variance * ratio)
     leveling = None
     if finding.chosen:
         leveling = leveling_rms(base, final, problem.frame.hold, variance)
-    nameless = verdict.verdict in ("unknown", "learned")
     marked = marked_positions(problem, sigma_holds(problem, problem.frame))
     u = verdict.extended.n_parameters
     sigma = np.sqrt(np.diag(final.cofactors)[:u] * variance)
@@ -98,12 +93,9 @@ def diagnose(
         **vars(verdict),
         certain=with_purity(finding.certain, problem.examined),
         open=finding.open,
-        groups=tuple(problem.groups),
-        location=location.shares,
-        location_by_chance=location.by_chance,
-        not_located=location.untestable,
+        repeated=problem.repeated,
         shape=shape_of(problem, finding, variance) if verdict.verdict == "learned" else None,
-        like=like_shapes(problem, finding.posterior) if nameless else (),
+        like=like_shapes(problem, finding),
         leveling=leveling,
         changes=parameter_changes(problem, finding, variance),
         upper_limits=limits_of_others(problem, finding, verdict.sigma_holds),
@@ -129,7 +121,6 @@ class _Judged:
 
     verdict: Verdict
     problem: Problem
-    chance: Chance
     finding: Finding
 
 
@@ -228,6 +219,5 @@ def _judged(
             recognised=recognised,
         ),
         problem,
-        chance,
         finding,
     )

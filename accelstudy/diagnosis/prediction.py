@@ -227,13 +227,13 @@ class LinearSplit:
         fitted, held = (
             (part[:, None] * c + np.arange(c)).ravel() for part in (self.fitted, self.held)
         )
-        last = np.arange(n * c, len(self.frame.residuals.positions.design))
+        last = np.arange(n * c, len(self.frame.residuals.design))
         return np.concatenate([fitted, last]), held
 
     @cached_property
     def designs(self) -> tuple[Array, Array]:
         """Ã of either part."""
-        design = self.frame.residuals.positions.design
+        design = self.frame.residuals.design
         return design[self.rows[0]], design[self.rows[1]]
 
     @cached_property
@@ -256,17 +256,15 @@ class LinearSplit:
             errors[:, self.rows[1]] - estimates @ b.T,
         )
 
-    def residuals(self, part: Residuals, errors: Array, rng: np.random.Generator) -> Array:
-        """Residuals of the fit to the fitted part, with slopes of noise, (b, ...).
+    def residuals(self, part: Residuals, errors: Array) -> Array:
+        """Residuals of the fit to the fitted part, (b, ...).
 
         Parameters
         ----------
         part : Residuals, of the fitted part
         errors : (b, m) array, of all positions
-        rng : Generator
         """
-        slopes = rng.standard_normal((len(errors), part.slopes))
-        return part.project(np.concatenate([errors[:, self.rows[0]], slopes], axis=1).T).T
+        return part.project(errors[:, self.rows[0]].T).T
 
     def variances(self, left: Array, known: bool) -> Array:
         """Variance of unit weight, (b,), by what is left of the fitted part; 1 if it is known."""
@@ -303,7 +301,7 @@ class LinearSplit:
         hypotheses : shapes of one effect
         """
         effects = [one.effect for one in hypotheses if one.effect is not None]
-        shown = self.frame.residuals.positions.whitened(self.frame.signatures(effects))
+        shown = self.frame.residuals.whitened(self.frame.signatures(effects))
         matrices = []
         columns = np.split(shown, len(effects), axis=1)
         for one, column in zip(hypotheses, columns, strict=True):

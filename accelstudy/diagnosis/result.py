@@ -142,12 +142,9 @@ class Diagnosis(Verdict):
     certain : tuple of Part, what is missing whatever else is open
     open : tuple of Explanation, what may be missing beside that, most probable first; one without
         names stands for nothing
-    groups : tuple of str, groups of regressors that the campaign can show
-    location : dict of group to the share of the excess χ², where it tells
-    location_by_chance : dict of these groups to the share that any pattern has on average
-    not_located : dict of the other groups to the reason why nothing can be told of them
+    repeated : bool, whether attitudes were measured repeatedly
     shape : LearnedShape or None, the function that was learned
-    like : tuple of LikeShape, where something without a name may live, most probable first
+    like : tuple of LikeShape, where what is missing may live, most probable first
     leveling : (float, float), tilt error without and with what was found, rad, or None
     changes : tuple of Change, of the parameters of the base model by effects that were added
     upper_limits : tuple of UpperLimit, of the effects that were not found
@@ -158,10 +155,7 @@ class Diagnosis(Verdict):
 
     certain: tuple[Part, ...]
     open: tuple[Explanation, ...]
-    groups: tuple[str, ...]
-    location: Mapping[str, float]
-    location_by_chance: Mapping[str, float]
-    not_located: Mapping[str, str]
+    repeated: bool
     shape: LearnedShape | None
     like: tuple[LikeShape, ...]
     leveling: tuple[float, float] | None

@@ -14,7 +14,6 @@ from accelstudy.diagnosis.forms import TARGETS
 from accelstudy.diagnosis.formulas import Ranking, argument, ranked
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.shapes import function_rows
-from accelstudy.diagnosis.space.signatures import Moment
 from accelstudy.effects.learned import Learned
 
 Array = NDArray[np.float64]
@@ -75,7 +74,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     assert isinstance(effect, Learned)
     beside = space_of(others, len(problem.residuals.z))
     ranking = ranked(problem.frame, problem.evidence, effect, beside)
-    at = argument(frame, effect)(Moment(frame.hold))
+    at = argument(frame, effect)
     grid = np.linspace(at.min(), at.max(), POINTS)
     names = list(solution.model.parameter_names)
     own = [names.index(parameter.name) for parameter in effect.parameters]
@@ -108,7 +107,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
 def _left(frame: Frame, effect: Learned, variance: float) -> tuple[Array, Array]:
     """What each position leaves of h by its residuals, and the noise of that, (n, c) each."""
     n, conditions = frame.residuals.whitening.shape[:2]
-    rows = function_rows(frame, effect.target, lambda now: np.ones((n, 1, 1)), rates=False)
+    rows = function_rows(frame, effect.target, np.ones((n, 1, 1)))
     seen = rows[: n * conditions].reshape(n, conditions, -1)
     errors = frame.residuals.errors[: n * conditions].reshape(n, conditions, 1)
     square = np.maximum(np.sum(seen**2, axis=1), np.finfo(float).tiny)

@@ -13,7 +13,6 @@ class AxisNonPerpendicularity(Effect):
 
     name = "axis_nonperpendicularity"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (Parameter("k_perp", "rad", r"$k_\perp$"),)
     equation = "δφ = k tan θ"
     typical = (0.1e-3, 0.5e-3)

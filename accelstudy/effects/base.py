@@ -33,6 +33,8 @@ from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
 from accelstudy.symbolic.tracing import symbolic, symbols
 
+COURSES = ("slow change in time", "temperature")
+"""Families of effects that change with time or temperature."""
 USUAL = (1e-4, 1e-3)
 """Parts of g by which an effect of typical size changes a reading."""
 
@@ -71,7 +73,6 @@ class Effect(WithSettings):
     ----------
     name : str, canonical
     family : str, what it has in common with effects that are easily mistaken for it
-    group : str, of effects that a diagnosis compares to say where a cause lies; may be empty
     parameters : tuple of Parameter
     takes : tuple of Setting, the settings that it takes
     equation : str, what is added, for people; by default written from the methods
@@ -87,7 +88,6 @@ class Effect(WithSettings):
     """
 
     kind = "effect"
-    group: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]]
     part: ClassVar[Literal["sensor", "rig"]] = "sensor"
     drifts: ClassVar[bool] = False
@@ -96,6 +96,11 @@ class Effect(WithSettings):
     partial: ClassVar[bool] = False
     informed: ClassVar[bool] = False
     sudden: ClassVar[bool] = False
+
+    @property
+    def is_course(self) -> bool:
+        """Whether the sensor changes with time or temperature by it, whatever the attitude."""
+        return self.part == "sensor" and (self.family in COURSES or self.sudden)
 
     @property
     def equation(self) -> str:

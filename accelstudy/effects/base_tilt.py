@@ -13,7 +13,6 @@ class BaseTilt(Effect):
 
     name = "base_tilt"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (Parameter("tilt_a", "rad", "$a$"), Parameter("tilt_b", "rad", "$b$"))
     equation = "C(φ, θ, ψ) [a, b, 0]ᵀ g"
     typical = (0.1e-3, 1e-3)

@@ -9,7 +9,6 @@ class BiasDrift(Effect):
 
     name = "bias_drift"
     family = "slow change in time"
-    group = "slow_time"
     parameters = per_axis("d", "m/s^2/s", "d_%")
     equation = "d_i t"
     typical = (0.3e-6, 3e-6)

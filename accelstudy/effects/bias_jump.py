@@ -14,7 +14,6 @@ class BiasJump(Effect):
 
     name = "bias_jump"
     family = "sudden change"
-    group = "slow_time"
     parameters = per_axis("c", "m/s^2", "c_%")
     takes = (Setting("t", "s", 600.0),)
     sudden = True

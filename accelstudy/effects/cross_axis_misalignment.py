@@ -13,7 +13,6 @@ class CrossAxisMisalignment(Effect):
 
     name = "cross_axis_misalignment"
     family = "alignment of the axes"
-    group = "direction"
     parameters = (
         Parameter("alpha_xz", "rad", r"$\alpha_{xz}$"),
         Parameter("alpha_xy", "rad", r"$\alpha_{xy}$"),

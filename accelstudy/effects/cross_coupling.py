@@ -10,7 +10,6 @@ class CrossCoupling(Effect):
 
     name = "cross_coupling"
     family = "even nonlinearity"
-    group = "direction"
     parameters = tuple(
         Parameter(f"k_{i}{j}", "1", f"$k_{{{i}{j}}}$") for i in AXES for j in AXES if i != j
     )

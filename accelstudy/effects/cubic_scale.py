@@ -9,7 +9,6 @@ class CubicScale(Effect):
 
     name = "cubic_scale"
     family = "odd nonlinearity"
-    group = "direction"
     parameters = per_axis("k3", "1", "k_{3%}")
     equation = "k_i f_i³ / g²"
     typical = (100e-6, 1000e-6)

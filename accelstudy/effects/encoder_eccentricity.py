@@ -13,7 +13,6 @@ class EncoderEccentricity(Effect):
 
     name = "encoder_eccentricity"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (
         Parameter("A_roll", "rad", r"$A_\phi$"),
         Parameter("B_roll", "rad", r"$B_\phi$"),

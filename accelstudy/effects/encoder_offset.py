@@ -9,7 +9,6 @@ class EncoderOffset(Effect):
 
     name = "encoder_offset"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (
         Parameter("c_roll", "rad", r"$c_\phi$"),
         Parameter("c_pitch", "rad", r"$c_\theta$"),

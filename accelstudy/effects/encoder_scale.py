@@ -9,7 +9,6 @@ class EncoderScale(Effect):
 
     name = "encoder_scale"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (
         Parameter("k_roll", "1", r"$k_\phi$"),
         Parameter("k_pitch", "1", r"$k_\theta$"),

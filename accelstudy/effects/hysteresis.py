@@ -9,7 +9,6 @@ class Hysteresis(Effect):
 
     name = "hysteresis"
     family = "memory of the previous position"
-    group = "previous_position"
     parameters = per_axis("h", "m/s^2", "h_%")
     equation = "h_i sign(f_i − f_prev,i)"
     typical = (0.5e-3, 5e-3)

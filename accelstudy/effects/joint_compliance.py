@@ -14,7 +14,6 @@ class JointCompliance(Effect):
 
     name = "joint_compliance"
     family = "attitude of the rig"
-    group = "robot_angles"
     parameters = (
         Parameter("c_joint_roll", "rad", r"$c_{j\phi}$"),
         Parameter("c_joint_pitch", "rad", r"$c_{j\theta}$"),

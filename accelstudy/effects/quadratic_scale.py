@@ -9,7 +9,6 @@ class QuadraticScale(Effect):
 
     name = "quadratic_scale"
     family = "even nonlinearity"
-    group = "direction"
     parameters = per_axis("k2", "1", "k_{2%}")
     equation = "k_i f_i² / g"
     typical = (100e-6, 2500e-6)

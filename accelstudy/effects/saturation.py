@@ -26,7 +26,6 @@ class Saturation(Effect):
 
     name = "saturation"
     family = "odd nonlinearity"
-    group = "direction"
     parameters = per_axis("k_sat", "1", "k_{s%}")
     takes = (Setting("knee", "m/s^2", 0.95 * STANDARD_GRAVITY, above=0, smooth=True),)
     equation = "−k_i sign(f_i) max(0, |f_i| − c)"

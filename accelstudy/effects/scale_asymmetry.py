@@ -9,7 +9,6 @@ class ScaleAsymmetry(Effect):
 
     name = "scale_asymmetry"
     family = "even nonlinearity"
-    group = "direction"
     parameters = per_axis("k_abs", "1", "k_{\\pm %}")
     equation = "k_i |f_i|"
     typical = (100e-6, 500e-6)

@@ -9,7 +9,6 @@ class Settling(Effect):
 
     name = "settling"
     family = "memory of the previous position"
-    group = "previous_position"
     parameters = (Parameter("k_settling", "1", "$k_{set}$"),)
     equation = "k (f_prev − f)"
     typical = (10e-6, 1000e-6)

@@ -20,7 +20,6 @@ class ThermalBias(Effect):
 
     name = "thermal_bias"
     family = "temperature"
-    group = "temperature"
     parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
     takes = (Setting("tau", "s", 0.0, above=0, smooth=True, none=0.0),)
     typical = (0.5e-3, 7e-3)

@@ -10,7 +10,6 @@ class ThermalCurve(Effect):
 
     name = "thermal_curve"
     family = "temperature"
-    group = "temperature"
     parameters = per_axis("b_TT", "m/s^2/K^2", "b_{TT%}")
     equation = "b_TT,i (T − T0)²"
     typical = (0.1e-3, 0.5e-3)

@@ -10,7 +10,6 @@ class ThermalScale(Effect):
 
     name = "thermal_scale"
     family = "temperature"
-    group = "temperature"
     parameters = per_axis("s_T", "1/K", "s_{T%}")
     equation = "s_T,i (T − T0) f_i"
     typical = (10e-6, 200e-6)

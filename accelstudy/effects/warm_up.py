@@ -12,7 +12,6 @@ class WarmUp(Effect):
 
     name = "warm_up"
     family = "slow change in time"
-    group = "slow_time"
     parameters = per_axis("w", "m/s^2", "w_%")
     takes = (Setting("tau", "s", 600.0, above=0, smooth=True),)
     equation = "w_i exp(−t/τ)"

@@ -174,7 +174,7 @@ def sensor_evidence(
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
-    z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals.positions
+    z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
     if noise is not None:
@@ -248,7 +248,7 @@ def mean_sensor(
     }
     angle = None if first.sigma_angle is None else first.sigma_angle / np.sqrt(n)
     mean = replace(
-        first, name="mean of the lot", sd=None, n_samples=None, slope=None, sd_slope=None,
+        first, name="mean of the lot", sd=None, n_samples=None,
         sigma_force=sigma, sigma_angle=angle, **columns,
     )  # fmt: skip
     return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)

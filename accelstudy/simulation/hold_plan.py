@@ -77,19 +77,6 @@ class HoldPlan:
             yaw=self._rng(2).uniform(-np.pi, np.pi, n) if self.yaw == "random" else np.zeros(n),
         )
 
-    def moved(self, hold: HoldConditions, dt: float) -> HoldConditions:
-        """Return the conditions `dt` seconds later, within the same holds.
-
-        A temperature that rises linearly rises within the holds too; any other stays as it is.
-        """
-        assert hold.time is not None
-        temperature = hold.temperature
-        if temperature is not None and self.temperature_order == "linear":
-            span = max(float(np.ptp(hold.time)), dt)
-            temperature = temperature + dt / span * (temperature[-1] - temperature[0])
-        same = hold.take(np.arange(len(hold.time)))  # with the course of the whole session
-        return replace(same, time=hold.time + dt, temperature=temperature)
-
     def use(self, forces: Array, n: int) -> HoldConditions:
         """Return the conditions in which a sensor is used after a calibration in n positions.
 

@@ -12,8 +12,6 @@ HERE = Path(__file__).parent
 UNITS = {
     "forces": "unit",
     "sd": "unit",
-    "slope": "unit/s",
-    "sd_slope": "unit/s",
     "time": "s",
     "temperature": "°C",
     "angles": "gon",
@@ -27,8 +25,6 @@ MEANINGS = {
     "forces": "mean specific force of the hold, in sensor axes",
     "n_samples": "samples in the hold",
     "sd": "standard deviations of the samples within the hold",
-    "slope": "slopes of the samples within the hold",
-    "sd_slope": "standard deviations of the slopes",
     "temperature": "mean temperature",
     "angles": "attitude that the robot tells, or a reference",
     "yaw": "yaw that the robot tells; 0 if absent",

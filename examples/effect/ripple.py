@@ -13,7 +13,6 @@ class Ripple(Effect):
 
     name = "ripple"
     family = "odd nonlinearity"
-    group = "direction"
     parameters = per_axis("a_ripple", "m/s^2", "a_%")
     takes = (Setting("period", "m/s^2", 8.0, above=0, smooth=True),)
     equation = "a_i sin(2π f_i / P)"

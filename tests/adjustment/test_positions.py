@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from accelstudy.diagnosis.space.groups import clusters, groups
 from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, SIGMA, draw
 
 from accelstudy.adjustment import calibrate, calibration
@@ -29,7 +30,6 @@ from accelstudy.diagnosis.evidence.noise_models import LENGTHS, quadratic_forms,
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.groups import clusters, groups
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 

@@ -254,7 +254,6 @@ OPTIONS = [
     *("--name", "--seed", "--scheme", "--repeats", "--repeat-first", "--order", "--approach"),
     *("--model", "--effect", "--size", "--noise-effect", "--gross", "--sigma", "--interval"),
     *("--robot-sigma-mgon", "--temperature", "--vibration", "--yaw", "--samples-per-hold"),
-    "--hold",
 ]
 
 

@@ -42,7 +42,6 @@ def test_each_block_is_a_position_without_a_time(tmp_path, samples):
     np.testing.assert_allclose(campaign.sd, blocks.std(axis=1, ddof=1), rtol=1e-6)
     assert (campaign.n_samples == SIZE).all()
     assert campaign.time is None
-    assert campaign.slope is None
     assert np.diff(campaign.temperature) == pytest.approx(10 / COUNT, rel=0.01)
     # White noise: one mean has σ/√40, by the Allan deviation to some 20 %.
     assert campaign.sigma_force == pytest.approx(SIGMA / np.sqrt(SIZE), rel=0.3)
@@ -54,7 +53,6 @@ def test_a_column_of_time_tells_that_of_the_blocks(tmp_path, samples):
     path = write(tmp_path, samples, time=time)
     campaign, _ = import_log(path, ImportSettings(**SETTINGS))
     assert np.diff(campaign.time) == pytest.approx(60.0)
-    assert campaign.slope is not None
 
 
 def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):

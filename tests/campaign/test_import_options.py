@@ -12,11 +12,9 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.allan import allan_moments, slope_sigmas
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import open_log
-from accelstudy.campaign.importing.segments import Moments
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
@@ -101,7 +99,6 @@ def test_frames(tmp_path, turned, unit):
     expected, _ = import_log(write(tmp_path / "plain", forces), ImportSettings(rate_hz=100))
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-9)
     np.testing.assert_allclose(found.sd, expected.sd, rtol=1e-9)
-    np.testing.assert_allclose(found.slope, expected.slope, atol=1e-9)
     assert found.log.frame == "flu"
     if unit == "counts":
         np.testing.assert_array_equal(found.nominal.scale, [0.001, -0.002, -0.003])
@@ -177,53 +174,6 @@ def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, opti
     assert message in line
     assert "campaign.yaml" not in line
     assert not (tmp_path / "out").exists()
-
-
-# --- Slopes --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("colour", ["white", "flicker"])
-def test_slopes_are_as_well_known_as_they_say(tmp_path, colour):
-    forces, edges = session(seed=4, holds=24, sigma=0.0, still=500)
-    rng = np.random.default_rng(2)
-    noise = rng.standard_normal(forces.shape)
-    if colour == "flicker":
-        frequency = np.fft.rfftfreq(len(forces))
-        frequency[0] = 1
-        spectrum = np.fft.rfft(noise, axis=0) / np.sqrt(frequency)[:, None]
-        noise = np.fft.irfft(spectrum, len(forces), axis=0) + noise
-    drift = np.zeros_like(forces)
-    for start, end in edges:
-        drift[start:end] = 0.002 * np.arange(end - start)[:, None] / RATE
-    campaign, _ = import_log(
-        write(tmp_path, forces + 0.01 * noise + drift), ImportSettings(rate_hz=RATE)
-    )
-    z = (campaign.slope - 0.002) / campaign.sd_slope
-    assert np.std(z) == pytest.approx(1, abs=0.25)
-    assert abs(np.mean(z)) < 3 / np.sqrt(z.size)
-
-
-def test_the_slope_of_a_long_hold_is_no_better_known_than_it_is():
-    """Flicker noise does not fall any further in a long first hold among short ones."""
-    first = []
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        ends = np.cumsum([2400, *[200] * 23])
-        frequency = np.maximum(np.fft.rfftfreq(ends[-1]), 1 / ends[-1])
-        spectrum = np.fft.rfft(rng.standard_normal((ends[-1], 3)), axis=0)
-        flicker = np.fft.irfft(spectrum / np.sqrt(frequency)[:, None], ends[-1], axis=0)
-        samples = rng.standard_normal(flicker.shape) + 0.1 * flicker
-        slopes, residuals, n_samples, variances = [], [], [], []
-        for forces in np.split(samples, ends[:-1]):
-            time = np.arange(len(forces)) / RATE
-            moments = Moments.of(np.column_stack([time, forces]))
-            slopes.append(moments.products[0, 1:] / moments.products[0, 0])
-            line = (time - time.mean())[:, None] * slopes[-1]
-            residuals.append((allan_moments(forces - line),))
-            n_samples.append(len(forces))
-            variances.append(np.var(forces, axis=0, ddof=1))
-        first.append(slopes[0] / slope_sigmas(residuals, n_samples, variances, 1 / RATE)[0])
-    assert np.sqrt(np.mean(np.square(first))) < 2
 
 
 # --- What was never still ------------------------------------------------------------------------

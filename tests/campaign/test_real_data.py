@@ -15,7 +15,7 @@ from accelstudy.basics.wording import amount, number, probability, words
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words import GROUPS, verdict_lines
+from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
@@ -143,14 +143,6 @@ def test_how_firmly_the_blocks_were_held():
     assert f"the 20 quietest by {number(correlated[order[:20]].mean())}" in FLAT
     accuracy = import_log(path, import_settings("ck-explorer"))[1].accuracy
     assert f"Allan deviation, {number(accuracy.ratio)} times" in FLAT
-
-
-def test_where_the_residuals_of_white_noise_live():
-    d = diagnosed("xsens-mti", WHITE)
-    for group in ("slow_time", "direction"):
-        assert f"{100 * d.location[group]:.0f} % {GROUPS[group]}" in FLAT
-    slow, direction = (100 * d.location_by_chance[g] for g in ("slow_time", "direction"))
-    assert f"would be {slow:.0f} % and {direction:.0f} %" in FLAT
 
 
 def variances_taken(d):

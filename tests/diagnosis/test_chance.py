@@ -5,17 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.space.residuals import Residuals, SlopeRows
+from accelstudy.diagnosis.space.residuals import Residuals
 
 
 def test_no_random_number_is_drawn_twice():
-    """Positions, slopes and effects have streams of their own, all of one seed."""
-    n, slopes, sets = 12, 3, 50
-    design = np.eye(n, 2)  # takes up two conditions and leaves the others as they were drawn
+    """Positions, priors and effects have streams of their own, all of one seed."""
+    n, priors, sets = 12, 3, 50
+    design = np.eye(n + priors, 2)  # takes up two conditions, and leaves the others
     one = np.ones((n, 1, 1))
-    residuals = Residuals(design, np.zeros(n), one, one, np.ones((n, 1))).with_slopes(
-        SlopeRows(np.zeros((slopes, n, 3)), np.zeros((slopes, 2)), np.zeros(slopes))
-    )
+    residuals = Residuals(design, np.zeros(n + priors), one, one, np.ones((n, 1)))
     chance = Chance(np.random.SeedSequence(1), n, sets)
     effects = SimpleNamespace(with_effects=lambda errors, rng: rng.standard_normal(errors.shape))
     plain = np.concatenate(list(chance.errors(residuals)))
@@ -24,5 +22,5 @@ def test_no_random_number_is_drawn_twice():
         np.concatenate(list(chance.errors_with_effects(residuals, effects)))[sets // 2 :],
     ]
     left = np.concatenate(drawn)[:, 2:]
-    assert left.shape == (sets + sets // 2, n + slopes - 2)
+    assert left.shape == (sets + sets // 2, n + priors - 2)
     assert len(np.unique(left)) == left.size

@@ -77,7 +77,7 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     fit = refit(part.frame.solution, [weighed(part).best["quadratic_scale"]])
     rest = first.observed.take(split.held)
     gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
-    left, missed = split.beside(problem.residuals.positions.errors[None])
+    left, missed = split.beside(problem.residuals.errors[None])
     change = split.corrections(weighed(problem).best["quadratic_scale"], left)
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)

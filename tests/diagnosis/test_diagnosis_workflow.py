@@ -50,7 +50,7 @@ def test_all_is_made(made):
         "calibration.json", "diagnosis.json", "report.html", "model.yaml", "positions.parquet",
         "loop.parquet", "figures",
     }  # fmt: skip
-    for name in ("evidence", "gap", "location", "loop", "residuals"):
+    for name in ("evidence", "gap", "location", "residuals"):
         assert (diagnosis / "figures" / f"{name}.svg").stat().st_size > 1000
         assert (diagnosis / "figures" / f"{name}.png").stat().st_size > 1000
     assert {path.name for path in (results / "campaign").iterdir()} >= {

@@ -17,7 +17,7 @@ from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.pipeline import judge
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
 from accelstudy.diagnosis.result import level_of_effects
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
+from accelstudy.diagnosis.space.repeats import lack_of_fit
 from accelstudy.pages import lines
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
@@ -43,7 +43,9 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
     examined, rng = designs[approach], np.random.default_rng([1, 2])
     residuals = examined.frame.residuals
-    field = Field(examined.candidates, examined.frame, groups(examined).get(LACK_OF_FIT))
+    field = Field(
+        examined.candidates, examined.frame, lack_of_fit(residuals, examined.frame.forces)
+    )
     evidence = Evidence(level, residuals.redundancy)
     rates, seen, weights = [], [], []
     for seed in range(RUNS):

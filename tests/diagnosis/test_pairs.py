@@ -97,47 +97,6 @@ def test_of_many_positions_those_that_explain_most_are_paired(problem, monkeypat
     assert_same(all_pairs(*problem), one_by_one(shapes, residuals, evidence, places))
 
 
-def density_of_three(three, residuals, evidence):
-    """Log density with three shapes; None where no position is seen beside the two others."""
-    z, bases = residuals.z, [h.basis for h in three]
-    dims = sum(h.dim for h in three)
-
-    def seen(one, other):
-        return 1 - np.linalg.svd(one.T @ other, compute_uv=False)[0] ** 2 > APART
-
-    orders = [((0, 1), 2), ((0, 2), 1), ((1, 2), 0)][: 2 if three[0].effect else 3]
-    together = [
-        np.linalg.qr(np.concatenate([bases[i] for i in two], axis=1))[0] for two, _ in orders
-    ]
-    if dims >= residuals.redundancy or not any(
-        seen(bases[i], bases[j]) and seen(bases[k], both)
-        for ((i, j), k), both in zip(orders, together, strict=True)
-    ):
-        return None
-    basis = np.linalg.qr(np.concatenate(bases, axis=1))[0]
-    return evidence.of_spaces(np.array([np.sum((basis.T @ z) ** 2)]), [dims], z @ z)[0]
-
-
-def test_two_and_three_bumps_beside_what_is_paired(problem, monkeypatch):
-    """If all pairs are gone on from, it is the mean over all sets of positions."""
-    shapes, residuals, evidence = problem
-    for name in ("FIRST", "STRONGEST"):
-        monkeypatch.setattr(hypotheses, name, 10**6)
-    three = [together for together in all_pairs(*problem) if len(together.best) == 3]
-    made = {together.best[0].name: together for together in three}
-    bumps = shapes[OUTLIER]
-    ((effect,), n) = shapes["scale_asymmetry"], len(bumps)
-    for name, sets, order in (
-        ("scale_asymmetry", [(effect, *two) for two in combinations(bumps, 2)], 2 / n**2),
-        (OUTLIER, [*combinations(bumps, 3)], 6 / n**3),
-    ):
-        logs = [density_of_three(three, residuals, evidence) for three in sets]
-        total = np.logaddexp.reduce([log for log in logs if log is not None]) + np.log(order)
-        assert made[name].log_density == pytest.approx(total, abs=1e-6)
-        best = sets[max(range(len(sets)), key=lambda i: -np.inf if logs[i] is None else logs[i])]
-        assert {h.place for h in made[name].best} == {h.place for h in best}
-
-
 def test_one_candidate_makes_no_pair(problem):
     shapes, residuals, evidence = problem
     assert all_pairs({"warm_up": shapes["warm_up"]}, residuals, evidence) == []

@@ -15,7 +15,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.decision.statement import family_of
-from accelstudy.diagnosis.report.words import GROUPS
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
 from accelstudy.effects.hold_conditions import STILL
 from accelstudy.effects.saturation import ROUND
@@ -101,10 +100,6 @@ def test_what_is_easily_confused_is_of_one_family():
     assert family_of("coloured_noise", "heavy_tails") == "noise"
     for apart in (("thermal_bias", "warm_up"), ("bias_drift", "unknown"), ("unknown",), ()):
         assert not family_of(*apart)
-
-
-def test_location_counts_an_effect_in_one_of_the_groups_that_people_read_of():
-    assert {get_effect(name).group for name in effect_names()} - {""} <= set(GROUPS)
 
 
 @EACH

@@ -167,29 +167,6 @@ def test_sds_within_the_holds():
     np.testing.assert_allclose(noisy.sd / quiet.sd, [[1, 1, 2]] * 24, rtol=1e-12)
 
 
-def test_slopes_within_the_holds():
-    """They are the rates of the effects of time, with the noise of a line through the samples."""
-    settings = {
-        **{"n_samples": 25, "duration": 40.0, "sigma": 0.003, "temperature": (20, 40)},
-        "effects": ("warm_up(tau=300): 0.5, 0, 0", "thermal_bias: 0, 0.1, 0"),
-    }
-    drawn = [simulate(seed=s, **settings)[0] for s in range(10)]
-    time = drawn[0].time
-    # Of e^(−t/τ) over a hold, beside its derivative in the middle: 1 + (T/τ)²/40.
-    settling = -0.5 / 300 * np.exp(-time / 300) * (1 + (40 / 300) ** 2 / 40)
-    warming = np.full(len(time), 0.1 * 20 / time[-1])
-    expected = np.column_stack([settling, warming, 0 * time])
-    z = [(c.slope - expected) / c.sd_slope for c in drawn]
-    assert stats.kstest(np.ravel(z), "norm").pvalue > 1e-4
-    np.testing.assert_allclose(drawn[0].sd_slope, np.sqrt(12) * 0.003 / 40)
-    ordered = simulate(**settings | {"temperature_order": "ABBA", "sigma": 1e-6})[0]
-    np.testing.assert_allclose(ordered.slope[:, 1], 0, atol=1e-6)
-    assert (
-        drawn[0].forces.tolist()
-        == simulate(seed=0, **settings | {"duration": None})[0].forces.tolist()
-    )
-
-
 # --- the command ---------------------------------------------------------------------------------
 
 
@@ -235,8 +212,7 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
     (["--yaw", "some"], "unknown yaw 'some'"),
     (["--samples-per-hold", "1"], "n_samples: must be from 2 to 1000000000, not 1"),
-    (["--hold", "30"], "duration: slopes need n_samples, too"),
-    (["--hold", "90", "--samples-per-hold", "9"], "90 s are more than the interval between"),
+    (["--hold", "30"], "--hold: no longer an option; campaigns have no slopes within holds"),
     (["--scheme", "mclaren-25"], "unknown scheme"),
     (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
 ])  # fmt: skip

@@ -206,7 +206,7 @@ def least_sigma(campaign: Campaign, approach: Approach) -> float:
 
 def campaign_observations(campaign: Campaign) -> Observations:
     """Observations of a campaign for the adjustment, R = 1."""
-    noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
+    noise = campaign_noise(campaign)
     errors = angle_errors(campaign)
     sigma_angle: float | Array = noise.sigma_angle
     common = None
@@ -222,9 +222,6 @@ def campaign_observations(campaign: Campaign) -> Observations:
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        # If the noise of the means is unknown, slopes have no weight relative to them.
-        slope=campaign.slope if stated else None,
-        sd_slope=campaign.sd_slope if stated else None,
         known=_known(campaign),
     )
 

@@ -150,7 +150,7 @@ class ParameterFile:
                 "mgon; --form c holds all"
             )
         for effect in self.calibration.model.effects:
-            tau = effect.settings.get("tau") if effect.group == "temperature" else None
+            tau = effect.settings.get("tau") if effect.family == "temperature" else None
             if self.warms and tau:
                 yield (
                     f"{self.program} has no lag behind a thermometer: {effect.name} with one of "

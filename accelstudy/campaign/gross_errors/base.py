@@ -25,7 +25,7 @@ EVERYWHERE = 0
 SINGLE = (1, 2)
 """Ranks of errors in all positions alike, and of errors in single positions. Exchanged rows are
 looked for first: a row that was not exchanged may still be wrong by itself."""
-READINGS = {"forces": False, "sd": True, "slope": False, "sd_slope": True}
+READINGS = {"forces": False, "sd": True}
 """Columns of what the sensor reads, and whether they are sds, which have no sign."""
 
 

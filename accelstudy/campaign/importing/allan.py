@@ -1,4 +1,4 @@
-"""The Allan deviation, and how well it says the mean and the slope of a hold are known.
+"""The Allan deviation, and how well it says the mean of a hold is known.
 
 Samples of a real sensor are not independent, so the mean of n samples is less certain than their
 standard deviation over √n. The Allan deviation at an averaging time τ measures the scatter of means
@@ -48,11 +48,6 @@ class AllanDeviation:
         """Curve of some of the channels."""
         return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
 
-    def up_to(self, tau: float) -> AllanDeviation:
-        """Curve without averaging times beyond `tau`, s; the shortest one stays."""
-        kept = self.tau <= max(tau, self.tau[0] if len(self.tau) else 0.0)
-        return AllanDeviation(self.tau[kept], self.deviation[kept], self.differences[kept])
-
 
 @dataclass(frozen=True)
 class AllanMoments:
@@ -73,13 +68,6 @@ class AllanMoments:
     def turned(self, matrix: Array) -> AllanMoments:
         """Moments of other channels, samples @ matrix, for a matrix (c, d)."""
         return replace(self, squares=matrix.T @ self.squares @ matrix)
-
-    def up_to(self, factor: float) -> AllanMoments:
-        """Return the contributions of the shorter averages; the shortest one always stays."""
-        k = max(1, int(np.searchsorted(self.factors, factor, side="right")))
-        return AllanMoments(
-            self.factors[:k], self.squares[:k], self.terms[:k], self.independent[:k]
-        )
 
 
 def allan_moments(samples: ArrayLike) -> AllanMoments:
@@ -225,43 +213,3 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: i
     return MeanAccuracy(
         duration, white, float(np.exp(level + slope * np.log(duration))), tau, slope
     )
-
-
-def slope_sigmas(
-    residuals: Sequence[Sequence[AllanMoments]],
-    n_samples: Sequence[int],
-    variances: Array,
-    step: float,
-) -> Array:
-    """Standard deviations of the slopes of the axes in holds, (n, 3), m/s²/s.
-
-    The slope over a time T depends on the difference between its two halves. For white noise the
-    least-squares slope has σ = √6 σ_A(T/2) / T with the Allan deviation σ_A; for flicker noise and
-    a random walk this is right within some 10 %.
-
-    σ_A is that of the residuals about the line of each hold, over all holds together, so that
-    slopes do not count as noise. Since the line also absorbs the slowest noise, a hold contributes
-    only averaging times up to an eighth of its length. Longer ones come from longer holds, or are
-    extrapolated.
-
-    Parameters
-    ----------
-    residuals : for each hold, AllanMoments of its uninterrupted parts about the line
-    n_samples : sequence of int, samples in each hold
-    variances : (n, 3) array, of the samples within each hold, (m/s²)²
-    step : float, s, between samples
-    """
-    records = [
-        record.up_to(n / SHARE)
-        for parts, n in zip(residuals, n_samples, strict=True)
-        for record in parts
-    ]
-    curve = pooled_deviation(records, step)
-    sd = np.sqrt(np.mean(variances, axis=0))
-    sigma = np.empty((len(residuals), 3))
-    for i, n in enumerate(n_samples):
-        for axis in range(3):
-            channel = curve.channels(slice(axis, axis + 1))
-            half = accuracy_of_mean(channel, n * step / 2, sd[axis], max(1, n // 2))
-            sigma[i, axis] = np.sqrt(6.0) * half.allan / (n * step)
-    return sigma

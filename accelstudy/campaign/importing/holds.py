@@ -24,7 +24,6 @@ from accelstudy.campaign.importing.allan import (
     MeanAccuracy,
     accuracy_of_mean,
     pooled_deviation,
-    slope_sigmas,
 )
 from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.resolution import rounding_of_mean
@@ -89,7 +88,6 @@ class DetectedHolds:
     conditions : mapping of "temperature" and "vibration" to (n,) arrays, °C (mean) and m/s² (rms);
         NaN where nothing is known
     noise : HoldNoise, of the holds that are not left out
-    sd_slope : (n, 3) array, m/s²/s, standard deviations of the slopes of the samples
     threshold : Threshold
     step : float, s, usual time between samples; 1 where the log does not tell it
     resolution : (3,) array, m/s², steps in which the axes are read; 0 where none is found
@@ -102,7 +100,6 @@ class DetectedHolds:
     left_out: Mapping[int, str]
     conditions: Mapping[str, Array]
     noise: HoldNoise
-    sd_slope: Array
     threshold: Threshold
     step: float
     resolution: Array
@@ -121,7 +118,6 @@ class DetectedHolds:
             segments={n: part for n, part in self.segments.items() if n not in numbers},
             left_out={n: why for n, why in self.left_out.items() if n not in numbers},
             conditions={name: values[kept] for name, values in self.conditions.items()},
-            sd_slope=self.sd_slope[kept],
         )
 
     def of_each(self, attribute: str) -> NDArray[Any]:
@@ -231,7 +227,6 @@ def detected_holds(
         left_out=left_out,
         conditions=_conditions(list(segments.values()), log.conditions),
         noise=hold_noise(used, log.step, survey.steps),
-        sd_slope=_slope_sigmas(list(segments.values()), log.step),
         threshold=threshold,
         step=log.step,
         resolution=survey.steps,
@@ -363,13 +358,6 @@ def hold_noise(segments: Sequence[Segment], step: float, resolution: ArrayLike =
     of_axes = np.sqrt(np.mean([segment.sd**2 for segment in segments], axis=0))
     rounding = float(np.sqrt(np.mean(rounding_of_mean(resolution, of_axes) ** 2)))
     return HoldNoise(allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding)
-
-
-def _slope_sigmas(segments: Sequence[Segment], step: float) -> Array:
-    """Standard deviations of the slopes of the samples in holds, (n, 3), m/s²/s."""
-    variances = np.array([np.diag(segment.covariance) for segment in segments])
-    residuals, n_samples = [s.wobble for s in segments], [s.n for s in segments]
-    return slope_sigmas(residuals, n_samples, variances, step)
 
 
 def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:

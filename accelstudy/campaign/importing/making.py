@@ -142,10 +142,10 @@ def campaign_of_holds(
     notes = [*_recognised(settings, first), *notes]
     warnings += [warning for part in parts for warning in part.warnings()]
     columns: dict[str, Any] = {}
-    if holds.size is None or "time" in first.places:
-        columns = {"slope": holds.of_each("slope"), "sd_slope": holds.sd_slope}
-        if not isinstance(log, LogSeries) or log.timed:
-            columns["time"] = time
+    if (holds.size is None or "time" in first.places) and (
+        not isinstance(log, LogSeries) or log.timed
+    ):
+        columns["time"] = time
     for name, values in holds.conditions.items():
         if np.isfinite(values).all():
             columns[name] = values

@@ -180,8 +180,7 @@ class Segment:
     t0, t1 : float, s, times of the first and of the last sample
     moments : Moments, of time and forces, c = 4, s and m/s²
     conditions : (3, k) array, number, sum and sum of squares of what else was measured
-    noise, wobble : tuples of AllanMoments, of the forces, and of their residuals about a straight
-        line in time; one for each uninterrupted part
+    noise : tuple of AllanMoments, of the forces, one for each uninterrupted part
     """
 
     start: int
@@ -191,7 +190,6 @@ class Segment:
     moments: Moments
     conditions: Array
     noise: tuple[AllanMoments, ...]
-    wobble: tuple[AllanMoments, ...]
 
     @property
     def n(self) -> int:
@@ -214,11 +212,6 @@ class Segment:
         return np.sqrt(np.diag(self.covariance))
 
     @property
-    def slope(self) -> Array:
-        """Slope of the forces over time by least squares, (3,), m/s²/s."""
-        return self.moments.products[0, 1:] / self.moments.products[0, 0]
-
-    @property
     def variance(self) -> float:
         """Norm of the variances of the axes, the measure of the detector, (m/s²)²."""
         return float(np.linalg.norm(np.diag(self.covariance)))
@@ -233,7 +226,6 @@ class Segment:
             self.moments + later.moments,
             self.conditions + later.conditions,
             self.noise + later.noise,
-            self.wobble + later.wobble,
         )
 
 
@@ -312,8 +304,6 @@ class GrowingHold:
         record, self._record, self._waiting = np.concatenate(self._record), [], _NONE
         moments = allan_moments(record)
         forces = np.eye(4)[:, 1:]
-        about_line = forces.copy()
-        about_line[0] = -self._moments.products[0, 1:] / self._moments.products[0, 0]
         return Segment(
             self.start,
             self.start + self.n,
@@ -322,7 +312,6 @@ class GrowingHold:
             self._moments,
             self._conditions,
             (moments.turned(forces),),
-            (moments.turned(about_line),),
         )
 
     def saturated(self, step: Array, noise: Array) -> bool:

@@ -221,8 +221,7 @@ class Weighing:
     classes : list of Class, candidates that mean the same together, strongest evidence first
     together : list of Together, the evidence for all pairs of candidates
     alone : list of Weighed, one effect, one bumped position, or something unknown
-    pairs : list of Weighed, two of them or with bumped positions three, or one of them beside
-        something unknown
+    pairs : list of Weighed, two of them, or one of them beside something unknown
     noises : list of Weighed, only the noise is wrong, in one of its kinds
     slow : float, probability that the noise lasts for some holds, by the evidence alone
     posterior : Posterior, of all of these
@@ -275,8 +274,6 @@ def weigh_pairs(
 ) -> list[Weighed]:
     """Weigh candidates together.
 
-    Where one position was bumped, a further one is as probable as two effects rather than one.
-
     Parameters
     ----------
     together, singles, members, classes : as in `Weighing`
@@ -290,10 +287,9 @@ def weigh_pairs(
     for one in together:
         best = tuple(sorted(one.best, key=lambda h: -singles.densities[h.name]))
         alike = tuple(members[h.name] for h in best)
-        if len(best) > 2 or alike[0] != alike[1] or best[0].effect is None:
+        if alike[0] != alike[1] or best[0].effect is None:
             names = tuple(called.get(h.name, h.name) for h in best)
-            weight = one.log_density + each + (len(best) - 2) * np.log(priors.TWO)
-            weighed.append(Weighed(names, alike, weight, best))
+            weighed.append(Weighed(names, alike, one.log_density + each, best))
     return weighed
 
 
@@ -326,14 +322,13 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
     unequal = nothing + np.log(priors.AXES) + problem.axes.log_evidence
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
-    tails = tail_test(residuals.positions, chance)
+    tails = tail_test(residuals, chance)
     processes, course = colour_densities(residuals, evidence), -np.inf
     coloured = np.log(priors.COLOUR) + log_mean(processes)
     if problem.absent:
         unknown = problem.field.unknown
-        if unknown is None or residuals.slopes:
-            # As noise it leaves the slopes within the holds as they are.
-            courses = LearnedShapes.of(problem.frame, SLOW, rates=False)
+        if unknown is None:
+            courses = LearnedShapes.of(problem.frame, SLOW)
         else:
             courses = unknown.shapes.at(SLOW)
         of_places = Unknown(courses).by_place(evidence, residuals.z).values()

@@ -18,8 +18,7 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT, groups
-from accelstudy.diagnosis.space.hypotheses import Spaces
+from accelstudy.diagnosis.space.repeats import lack_of_fit
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.sensors.sensor import SensorModel
 
@@ -69,7 +68,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
         if not stated:
             least = max(1e-9, least_sigma(campaign, approach))
             sigma = max(fit.sigma_position, least)
-            measured = replace(measured, sigma_force=sigma, slope=None, sd_slope=None)
+            measured = replace(measured, sigma_force=sigma)
     solution = solve(fit.model, fit.approach, fit.observed, fit.adjustment)
     sd, n, within = campaign.sd, campaign.n_samples, None
     if sd is not None and n is not None and np.all(sd > 0):
@@ -93,7 +92,6 @@ class Problem:
     base : BaseFit, with equal axes
     examined : ExaminedFit, the same with unequal axes weighted, and the hypotheses about it
     axes : UnequalAxes, how probable these are; None of an exact fit
-    groups : dict of str to Spaces, groups of regressors: direction, time and so on
     field : Field, all candidates
     evidence : Evidence, by which they are weighed
     """
@@ -101,7 +99,6 @@ class Problem:
     base: BaseFit
     examined: ExaminedFit
     axes: UnequalAxes | None
-    groups: dict[str, Spaces]
     field: Field
     evidence: Evidence
 
@@ -116,6 +113,11 @@ class Problem:
         return self.examined.frame.residuals
 
     @property
+    def repeated(self) -> bool:
+        """Whether attitudes were measured repeatedly, so that the noise shows by itself."""
+        return self.field.attitude is not None
+
+    @property
     def absent(self) -> tuple[str, ...]:
         """Columns that would tell what changes slowly, and that the campaign lacks."""
         return tuple(n for n in ("temperature", "time") if getattr(self.frame.hold, n) is None)
@@ -128,7 +130,7 @@ def pose(base: BaseFit) -> Problem:
     ones do, with nothing missing, with any single effect, or with something unknown.
     """
     first, examined, axes = base.solution, examine(base.solution), None
-    field, shown = _field(examined)
+    field = _field(examined)
     if not is_exact(first):
         residuals = examined.frame.residuals
         evidence = Evidence(base.level, residuals.redundancy)
@@ -145,15 +147,15 @@ def pose(base: BaseFit) -> Problem:
             # With other weights a sensor that clips may have no solution.
             with suppress(InputError):
                 examined = examine(solve(first.model, first.approach, observed))
-                field, shown = _field(examined)
+                field = _field(examined)
     evidence = Evidence(base.level, examined.frame.residuals.redundancy)
-    return Problem(base, examined, axes, shown, field, evidence)
+    return Problem(base, examined, axes, field, evidence)
 
 
-def _field(examined: ExaminedFit) -> tuple[Field, dict[str, Spaces]]:
-    """All candidates of a fit, and the groups of regressors."""
-    shown = groups(examined)
-    return Field(examined.candidates, examined.frame, shown.get(LACK_OF_FIT)), shown
+def _field(examined: ExaminedFit) -> Field:
+    """All candidates of a fit."""
+    frame = examined.frame
+    return Field(examined.candidates, frame, lack_of_fit(frame.residuals, frame.forces))
 
 
 def is_exact(fit: Solution) -> bool:

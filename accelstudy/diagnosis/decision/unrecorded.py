@@ -16,7 +16,6 @@ from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR
-from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 
 ASKED = {"temperature": "the temperature at the sensor", "time": "the time of each hold"}
@@ -46,7 +45,7 @@ def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> F
         return finding
     of = "temperature or time" if "temperature" in absent else "time"
     asked = [ASKED[name] for name in absent]
-    if REPEAT not in problem.groups:
+    if not problem.repeated:
         asked.append("repeats of one attitude in between")
     if finding.verdict == "unknown" or weighing.slow >= priors.SURE:
         noise = "slow noise"
@@ -64,7 +63,7 @@ def with_unrecorded(problem: Problem, weighing: Weighing, finding: Finding) -> F
 
 def _of_courses(problem: Problem, posterior: Posterior) -> float:
     """Probability of effects of time or temperature, and of something unknown like them."""
-    courses = {name for name in effect_names() if get_effect(name).group in COURSES}
+    courses = {name for name in effect_names() if get_effect(name).is_course}
     unknown = problem.field.unknown
     if unknown is not None:
         places = unknown.by_place(problem.evidence, problem.residuals.z)

@@ -46,8 +46,8 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     within_hold_test,
 )
 from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.groups import LACK_OF_FIT, LackOfFit, clusters
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, Spaces
+from accelstudy.diagnosis.space.repeats import LackOfFit, clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects.learned import LEARNED
@@ -329,9 +329,7 @@ def _refitted(
     best, solution = fit
     z, basis = problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
-    # The refit is one of the means; of slopes it takes up what first order does.
-    means = left[: len(problem.residuals.positions.design)]
-    gain = max(float(means @ means) - solution.omega, 0.0)
+    gain = max(float(left @ left) - solution.omega, 0.0)
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
     first, refit = problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
@@ -394,10 +392,10 @@ def misfit(problem: Problem, solution: Solution) -> str:
 
 def lack_of_fit(problem: Problem) -> float:
     """p-value of the test whether repeats agree better with each other than with the model."""
-    residuals, groups = problem.residuals, problem.groups
-    if LACK_OF_FIT not in groups:
+    residuals, same = problem.residuals, problem.field.attitude
+    if same is None:
         return 1.0
-    return _of_fit(residuals, *_of_repeats(residuals, groups[LACK_OF_FIT]))
+    return _of_fit(residuals, *_of_repeats(residuals, same))
 
 
 def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
@@ -430,7 +428,7 @@ def tests_of_noise(
     campaign : Campaign
     chance : Chance, residuals without any effect
     """
-    residuals, base = frame.residuals.positions, problem.residuals.positions
+    residuals, base = frame.residuals, problem.residuals
     sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
     # With a sigma far too large, the attitudes would look like steps.
     least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
@@ -450,7 +448,7 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
     """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
     if frame is problem.frame:
         return level_test(Residuals.of(problem.base.solution))
-    return level_test(frame.residuals.positions)
+    return level_test(frame.residuals)
 
 
 def sigma_holds(problem: Problem, frame: Frame) -> bool:
@@ -461,7 +459,7 @@ def sigma_holds(problem: Problem, frame: Frame) -> bool:
 
 def unit_variance(problem: Problem, frame: Frame) -> float:
     """Variance of unit weight: 1 where the given sigma holds, else a posteriori."""
-    return 1.0 if sigma_holds(problem, frame) else frame.residuals.positions.variance
+    return 1.0 if sigma_holds(problem, frame) else frame.residuals.variance
 
 
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
@@ -553,7 +551,7 @@ def describe(
         places = [(q, columns[q.name]) for q in best.shown.parameters]
         examined, members = problem.examined, choice.members
         searched = [s for s in best.effect.takes if s.name == best.smooth]
-        # What is beside a large effect was found in what its refit leaves, with other slopes.
+        # What is beside a large effect was found in what its refit leaves.
         here = None if name == LEARNED else examined.hypothesis(best.effect)
         near, imitators = (
             ((), ()) if here is None else (examined.nearest(here), examined.imitators(here))

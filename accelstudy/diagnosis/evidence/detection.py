@@ -32,8 +32,8 @@ AT_ONCE = 500_000
 """Numbers that are drawn at once; all sets of very many positions would not fit in memory."""
 
 
-SLOPES = 1
-"""Stream of the slopes and of priors, apart from all others of the same seed."""
+PRIORS = 1
+"""Stream of the rows of priors, apart from all others of the same seed."""
 KEPT = 16_000_000
 """Most numbers that are kept; more are drawn anew whenever they are needed."""
 
@@ -75,12 +75,12 @@ class Chance:
 
     def errors(self, residuals: Residuals) -> Iterator[Array]:
         """Yield residuals of a fit, (b, m) each, all simulations one after the other."""
-        m = len(residuals.positions.design)
-        key = (*self.seed.spawn_key, SLOPES)
+        m = len(residuals.design)
+        key = (*self.seed.spawn_key, PRIORS)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
             noise = drawn[:, :m]
-            more = m - noise.shape[1] + residuals.slopes
+            more = m - noise.shape[1]
             if more:
                 # From a stream of their own: the draws of the positions stay what they are.
                 noise = np.concatenate([noise, rng.standard_normal((len(noise), more))], axis=1)

@@ -41,12 +41,6 @@ BOUNDED = 5
 """Shapes of a pair of which bounds are evaluated."""
 WEIGHTY = 6.0
 """Log evidence by which a pair may be weaker than the strongest one and still get its bounds."""
-STRONGEST = 6
-"""Effects beside a bumped position, the strongest of them, beside which a further one is tried."""
-FIRST = 2
-"""Bumped positions beside each effect, and pairs of them, beside which a further one is tried."""
-NEVER = 30.0
-"""Log evidence by which a pair with a bumped position is so weak that a further one is no help."""
 POSITIONS = 100
 """Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
@@ -236,11 +230,10 @@ class Together:
 def all_pairs(
     candidates: Mapping[str, Shapes], residuals: Residuals, evidence: Evidence
 ) -> list[Together]:
-    """Evidence for all pairs of candidates, over all shapes of both, and for bumps beside them.
+    """Evidence for all pairs of candidates, over all shapes of both.
 
     Of the bumped positions only the `POSITIONS` that explain most by themselves are tried; pairs
-    with the others count as pairs without any evidence. Three together are a pair of an effect and
-    a bumped position, or of two of these, with one more position.
+    with the others count as pairs without any evidence.
 
     Parameters
     ----------
@@ -296,15 +289,7 @@ def all_pairs(
         total = float(np.logaddexp.reduce(weighted[alike]) + twice)
         top = max(top, total)
         pairs[k] = Together((tried[a[best]], tried[b[best]]), total)
-    found = [pairs[k] for k in range(len(groups))]
-    if OUTLIER not in order:
-        return found
-    bumped = np.flatnonzero(number == order[OUTLIER])
-    # Positions are the last candidate, so the second of a pair is one wherever any is.
-    with_bump = np.isin(other, bumped)
-    rows = one[with_bump], other[with_bump], logs[with_bump], weighted[with_bump]
-    weight = float(weights[bumped[0]])
-    return [*found, *_with_another_bump(tried, number, bumped, weight, rows, products, z, evidence)]
+    return [pairs[k] for k in range(len(groups))]
 
 
 def _within_bounds(
@@ -326,80 +311,6 @@ def _within_bounds(
     within = np.full(len(some), found.min())
     within[most] = found
     return within
-
-
-def _with_another_bump(
-    tried: Sequence[Hypothesis],
-    number: NDArray[np.int_],
-    bumped: NDArray[np.int_],
-    weight: float,
-    rows: tuple[NDArray[np.int_], NDArray[np.int_], Array, Array],
-    products: _Products,
-    z: Array,
-    evidence: Evidence,
-) -> list[Together]:
-    """Evidence for one more bumped position beside the strongest pairs that have one.
-
-    Parameters
-    ----------
-    tried : h hypotheses
-    number : (h,) int array, the candidate of each
-    bumped : (b,) int array, which of them are bumped positions
-    weight : float, prior probability of each position
-    rows : (j,) arrays of pairs: one, a bumped position, log density without and with weights
-    products : _Products, of all that were tried
-    z : (m,) array
-    evidence : Evidence
-    """
-    if not len(rows[0]):
-        return []
-    likely = rows[3] > rows[3].max() - NEVER
-    one, place, logs, weighted = (row[likely] for row in rows)
-    # Of two bumps each row is a set of positions; of an effect it is one of many shapes.
-    twice = number[one] == number[bumped[0]]
-    keys = np.stack([np.where(twice, one, -1 - number[one]), place])
-    _, group = np.unique(keys, axis=1, return_inverse=True)
-    group = group.ravel()
-    totals = np.full(group.max() + 1, -np.inf)
-    np.logaddexp.at(totals, group, weighted)
-    order = np.argsort(-totals[group], kind="stable")
-    # The strongest places of each candidate, and of these candidates the strongest.
-    chosen: dict[int, list[int]] = {}
-    seen = set[int]()
-    for row in order.tolist():
-        if group[row] not in seen:
-            seen.add(int(group[row]))
-            chosen.setdefault(int(number[one[row]]), []).append(row)
-    bumps = chosen.pop(int(number[bumped[0]]), [])
-    first = [*list(chosen.values())[:STRONGEST], bumps]
-    found: list[Together] = []
-    for mine in first:
-        sets: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
-        for row in mine[:FIRST]:
-            alike = np.flatnonzero(group == group[row])
-            best = alike[np.argmax(logs[alike])]
-            pair = int(one[best]), int(place[best])
-            third = np.setdiff1d(bumped, pair)
-            part, independent = products.of_third(pair, third)
-            dims = products.dims[third] + products.dims[list(pair)].sum()
-            fits = independent & (dims < evidence.redundancy)
-            if not fits.any():
-                continue
-            three = evidence.of_spaces(part[fits], dims[fits], float(z @ z))
-            orders = 6 if twice[row] else 2
-            three += totals[group[row]] - logs[best] + np.log(orders * weight)
-            for i, log in zip(third[fits].tolist(), three.tolist(), strict=True):
-                key = tuple(sorted((*pair, i) if twice[row] else (pair[1], i)))
-                sets[key] = max(sets.get(key, (-np.inf, ())), (log, (*pair, i)))
-        if not sets:
-            continue
-        total = float(np.logaddexp.reduce([log for log, _ in sets.values()]))
-        best_three = tuple(tried[i] for i in max(sets.values())[1])
-        if best_three[0].estimates is not None:
-            beside = np.linalg.qr(np.concatenate([h.basis for h in best_three[1:]], axis=1))[0]
-            total += float(within_bounds(best_three[:1], z, evidence, [beside])[0])
-        found.append(Together(best_three, total))
-    return found
 
 
 def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
@@ -467,23 +378,3 @@ class _Products:
         part = np.sum(self.seen[a] ** 2, axis=1)
         part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
         return part, values[:, 0] > COLLINEAR
-
-    def of_third(
-        self, pair: tuple[int, int], third: NDArray[np.int_]
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Likewise for third spaces (j,) together with those of a pair."""
-        a = np.concatenate([self.starts[i] + np.arange(self.dims[i]) for i in pair])
-        inverse = np.linalg.inv(self.gram[np.ix_(a, a)])
-        taken = inverse @ self.seen[a]
-        part, apart = np.full(len(third), taken @ self.seen[a]), np.zeros(len(third), dtype=bool)
-        for dim in np.unique(self.dims[third]):
-            some = np.flatnonzero(self.dims[third] == dim)
-            b = self.starts[third[some]][:, None] + np.arange(dim)
-            cross = np.moveaxis(self.gram[a[:, None, None], b], 0, 1)
-            left = np.eye(dim) - np.swapaxes(cross, 1, 2) @ inverse @ cross
-            values, vectors = np.linalg.eigh(left)
-            rest = self.seen[b] - np.einsum("jab,a->jb", cross, taken)
-            along = np.einsum("jab,ja->jb", vectors, rest) ** 2
-            part[some] += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
-            apart[some] = values[:, 0] > COLLINEAR
-        return part, apart

@@ -9,29 +9,27 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import display_unit, shown_unit, to_display
+from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.forms import TARGETS, coordinate_of
-from accelstudy.diagnosis.loop import CASES, Loop
 from accelstudy.diagnosis.report.document import condition_sigma
-from accelstudy.diagnosis.report.words import GROUPS
+from accelstudy.diagnosis.report.words import COORDINATES as IN_WORDS
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.shape import LearnedShape
+from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.drawing.style import (
     ANGLE_COLOURS,
     COLUMN,
     FULL,
     INK,
     MISSING,
-    log_ticks,
     new_figure,
     say_empty,
 )
@@ -40,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 def diagnosis_figures(
-    diagnosis: Diagnosis, positions: pd.DataFrame, loop: Loop | None = None
+    diagnosis: Diagnosis, positions: pd.DataFrame
 ) -> dict[str, Callable[[], Figure]]:
     """Return a function that draws each figure; figures that would show nothing are left out.
 
@@ -48,7 +46,6 @@ def diagnosis_figures(
     ----------
     diagnosis : Diagnosis
     positions : DataFrame, of `positions_table`
-    loop : Loop, optional
     """
     d = diagnosis
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
@@ -60,11 +57,8 @@ def diagnosis_figures(
         figures["shape"] = lambda: shape_figure(shape)
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
-    # Without sigma, no size of the residuals is too large for noise.
-    if any(d.location.values()) and (d.sigma_known or d.verdict != "noise_model"):
-        figures["location"] = lambda: location_figure(d)
-    if loop is not None:
-        figures["loop"] = lambda: loop_figure(loop)
+    if d.like:
+        figures["location"] = lambda: location_figure(d, positions)
     return figures
 
 
@@ -219,22 +213,58 @@ def _percent(probability: float | None) -> str:
     return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
 
 
-def location_figure(diagnosis: Diagnosis) -> Figure:
-    """Share of the excess χ² that each group of regressors takes up, of those that can be told."""
-    shares = sorted(diagnosis.location.items(), key=lambda item: item[1])
-    figure = new_figure(FULL * 0.62, 14 + 5.5 * len(shares))
-    ax = figure.add_subplot()
-    titles = [GROUPS.get(name, words(name)) for name, _ in shares]
-    percent = [100 * share for _, share in shares]
-    usual = [100 * diagnosis.location_by_chance[name] for name, _ in shares]
-    place = np.arange(len(shares))
-    ax.barh(titles, percent, color=AFTER, height=0.6)
-    ax.vlines(usual, place - 0.42, place + 0.42, color=INK)
-    for row, ends in enumerate(zip(percent, usual, strict=True)):
-        ax.text(max(ends) + 1.5, row, f"{ends[0]:.0f} %", va="center", fontsize=7.5)
-    ax.set(xlim=(0, 112), xlabel="share of the excess χ² / %")
-    ax.grid(axis="y", visible=False)
+LISTED = 5
+"""Places that are drawn by themselves; the others count together."""
+
+
+def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+    """Posterior of the places where what is missing may live, and residuals over the best one."""
+    d, best = diagnosis, diagnosis.like[0]
+    bars = {f"{o.target} over\n{_coordinate(o.coordinate)}": o.posterior for o in d.like[:LISTED]}
+    if len(d.like) > LISTED:
+        bars["all others"] = sum(one.posterior for one in d.like[LISTED:])
+    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
+    values = coordinate_in_holds(best.coordinate, d.frame)
+    # Each axis has its own argument, and a panel of its own only where all residuals are one.
+    together = values.shape[1] in (1, len(names))
+    panels = 1 if together else values.shape[1]
+    figure = new_figure(FULL, 22 + 8 * max(len(bars), 4))
+    left, *axes = figure.subplots(1, 1 + panels, width_ratios=[1.1, *[1.4 / panels] * panels])
+    drawn = left.barh(list(bars), [100 * p for p in bars.values()], color=AFTER, height=0.6)
+    left.bar_label(drawn, [_percent(p) for p in bars.values()], padding=2, fontsize=7.5)
+    left.set(xlim=(0, 118), xlabel="posterior probability / %")
+    left.set_xticks([0, 25, 50, 75, 100])
+    left.invert_yaxis()
+    left.grid(axis="y", visible=False)
+    words, size, unit = _shown_coordinate(best.coordinate, d.frame.hold.time is None)
+    when = "after" if d.verdict == "unknown" and d.found else "before"
+    for k, ax in enumerate(axes):
+        ax.axhline(0, color=INK, linewidth=0.6)
+        for i, name in enumerate(names):
+            x = values[:, min(i, values.shape[1] - 1) if together else k] / size
+            _draw_component(ax, positions, name, when, _abreast(x, i, len(names)), False)
+        ax.set_title("" if together else ("roll", "pitch")[k] if panels == 2 else "xyz"[k])
+        ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+        ax.sharey(axes[0])
+        ax.tick_params(labelleft=k == 0)
+    same = "\nof the same axis" if together and values.shape[1] > 1 else ""
+    axes[panels // 2].set_xlabel(_per_unit(f"{words}{same}", unit))
+    axes[0].set_ylabel("residual / (mm/s²)")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     return figure
+
+
+def _coordinate(name: str) -> str:
+    """Name a coordinate of a place without its article."""
+    return IN_WORDS.get(name, f"the {name}").removeprefix("the ")
+
+
+def _shown_coordinate(name: str, ordered: bool) -> tuple[str, float, str]:
+    """Words, SI size and unit of a coordinate; without times that of the time is the order."""
+    known = {"dT/dt": "temperature rate", "next": "previous", "move": "angle"}
+    of = coordinate_of("order" if name == "time" and ordered else known.get(name, name))
+    words = of.words.removeprefix("the ") if name == "time" else _coordinate(name)
+    return words, of.size, of.unit
 
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
@@ -357,9 +387,6 @@ def _per_unit(what: str, unit: str) -> str:
     return f"{what} / {f'({unit})' if '/' in unit else unit}".removesuffix(" / ")
 
 
-SIMULATION_COLOURS = {"old": "#999999", "new": "#56B4E9"}
-DIFFERENT = 5
-"""Ratio of variances or tilt errors from which on an axis is logarithmic."""
 DIGITS = 48
 """Most digits of position numbers along the axis."""
 LARGE = 20
@@ -398,68 +425,3 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     bars.margins(y=0.12)
     bars.grid(axis="x", visible=False)
     return figure
-
-
-def loop_figure(loop: Loop) -> Figure:
-    """Measured variances of unit weight among the simulated ones, and what the tilt error is."""
-    figure = new_figure(FULL, 62)
-    base, extended, tilt = figure.subplots(1, 3, width_ratios=[1.5, 1, 1.3])
-    _draw_variances(base, loop, "base", ("old", "new"))
-    _draw_variances(extended, loop, "extended", ("new",))
-    base.set_ylabel("simulated sessions")
-    handles = [
-        Patch(color=SIMULATION_COLOURS["old"], label="old simulation"),
-        Patch(color=SIMULATION_COLOURS["new"], label="new simulation"),
-        Line2D([], [], color=INK, linestyle="--", label="measurement"),
-    ]
-    figure.legend(handles=handles, loc="outside upper left", ncols=3)
-
-    titles = (
-        "base calibration,\nold simulation",
-        "base calibration,\nnew simulation",
-        "extended calibration,\nnew simulation",
-    )
-    colours = (SIMULATION_COLOURS["old"], BEFORE, AFTER)
-    place = np.arange(len(CASES))[::-1]
-    ends = []
-    for case, y, colour in zip(CASES, place, colours, strict=True):
-        values = to_display(loop.case(*case)["tilt_error_rad"], "rad")
-        rms = to_display(loop.tilt(*case), "rad").item()
-        low, high = np.quantile(values, [0.025, 0.975])
-        ends += [float(low), float(high)]
-        tilt.hlines(y, low, high, color=colour, linewidth=5, alpha=0.4)
-        tilt.plot(rms, y, "o", color=colour, markersize=6)
-        tilt.annotate(number(rms), (rms, y), xytext=(0, 7), textcoords="offset points",
-                      ha="center", fontsize=7.5)  # fmt: skip
-    tilt.set_yticks(place, titles)
-    tilt.set_ylim(-0.5, len(CASES) - 0.3)
-    tilt.set_xlabel(f"tilt error / {display_unit('rad')}")
-    tilt.grid(axis="y", visible=False)
-    _scale(tilt, min(ends), max(ends))
-    return figure
-
-
-def _draw_variances(ax: Axes, loop: Loop, calibration: str, simulations: tuple[str, ...]) -> None:
-    measured = loop.measured[calibration]
-    values = {s: loop.case(s, calibration)["sigma0_squared"].to_numpy() for s in simulations}
-    everything = np.concatenate([[measured], *values.values()])
-    low, high = float(everything.min()), float(everything.max())
-    bins = np.geomspace(low, high, 50) if high > DIFFERENT * low else np.linspace(low, high, 30)
-    for simulation, drawn in values.items():
-        counts, _ = np.histogram(drawn, bins)
-        # Scaled to the same height, or a narrow distribution would hide a wide one.
-        ax.stairs(counts / counts.max(), bins, fill=True, color=SIMULATION_COLOURS[simulation])
-    ax.axvline(measured, color=INK, linewidth=1.2, linestyle="--")
-    _scale(ax, low, high)
-    ax.set_yticks([])
-    ax.set_xlabel("variance of unit weight")
-    ax.set_title(f"{calibration} calibration")
-    ax.grid(axis="x", visible=False)
-
-
-def _scale(ax: Axes, low: float, high: float) -> None:
-    """Make the abscissa logarithmic where the values differ much."""
-    if high > DIFFERENT * low:
-        ax.set_xscale("log")
-        ax.set_xlim(0.7 * low, 1.4 * high)
-        log_ticks(ax.xaxis, low, high)

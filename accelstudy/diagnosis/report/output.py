@@ -117,7 +117,7 @@ def write_diagnosis(
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    _write_report(diagnosis, document, positions, loop, folder, calibration, source, place)
+    _write_report(diagnosis, document, positions, folder, calibration, source, place)
     write_json(folder / "diagnosis.json", document)
     return document
 
@@ -143,7 +143,6 @@ def _write_report(
     diagnosis: Diagnosis,
     document: dict[str, Any],
     positions: pd.DataFrame,
-    loop: Loop | None,
     folder: Path,
     calibration: dict[str, Any] | None,
     source: str | Path,
@@ -156,12 +155,11 @@ def _write_report(
     diagnosis : Diagnosis
     document : dict, of `diagnosis_document`
     positions : DataFrame, of `positions_table`
-    loop : Loop, optional
     folder : Path
     calibration : dict, of `diagnosed_calibration`, optional
     source, place : paths of the campaign and of the results, for the commands that the page gives
     """
-    drawn = save_all(diagnosis_figures(diagnosis, positions, loop), folder / "figures")
+    drawn = save_all(diagnosis_figures(diagnosis, positions), folder / "figures")
     lines = wording.verdict_lines(diagnosis)
     write_page(
         folder / "report.html",
@@ -170,7 +168,6 @@ def _write_report(
         d=diagnosis,
         doc=document,
         effects=[effect_document(named) for named in diagnosis.found],
-        groups=wording.GROUPS,
         verdict=wording.badge(diagnosis),
         headline=lines[0],
         lines=lines[1:],

@@ -24,25 +24,12 @@ from accelstudy.diagnosis.forms import coordinate_of
 from accelstudy.diagnosis.formulas import OTHER
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.diagnosis.space.groups import COURSES, REPEAT
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 TEMPLATE = "diagnosis/report/words.txt.j2"
-
-GROUPS = {
-    "direction": "with the direction of gravity",
-    "robot_angles": "with the angles of the robot",
-    "repeat": "between repeats of the same attitude",
-    "slow_time": "slowly with time",
-    "temperature": "with temperature",
-    "temperature_rate": "with the rate of temperature",
-    "previous_position": "with the position before",
-    "single_position": "in one single position",
-}
-"""How a residual of each group of regressors varies."""
 
 COORDINATES = {
     "dT/dt": "the rate of the temperature",
@@ -152,9 +139,8 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
         "stands_for": stands_for(d),
         "formulas": formulas(d),
         "beyond": beyond(d),
-        "location": _location(d),
         "effects": [
-            (f, effect.equation, effect.group in COURSES)
+            (f, effect.equation, effect.is_course)
             for f in d.found
             if _is_effect(f) and f.name != LEARNED
             for effect in [get_effect(f.spec)]
@@ -171,7 +157,7 @@ def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what would show more, apart from further positions."""
     d = diagnosis
     hidden = [name for name in d.invisible if name != "gravity_error"]
-    may_repeat = REPEAT not in d.groups and (d.verdict == "noise_model" or not d.sigma_known)
+    may_repeat = not d.repeated and (d.verdict == "noise_model" or not d.sigma_known)
     # What is slow and not told apart; where it is, the reason says what to record.
     by_heat = d.coloured >= WORTH and not d.unrecorded and d.campaign.temperature is None
     unseen = [] if d.approach.uses_angles else hidden
@@ -226,18 +212,14 @@ def _weights(d: Diagnosis) -> list[float]:
     return (variances / variances.mean()).tolist()
 
 
-def _location(d: Diagnosis) -> list[tuple[str, float, float]]:
-    """Groups with the largest shares of the excess, in words, these shares, and those by chance."""
-    ranked = sorted(d.location.items(), key=lambda item: -item[1])[:3]
-    chance = d.location_by_chance
-    return [(GROUPS.get(n, words(n)), share, chance[n]) for n, share in ranked if share > 0]
-
-
 def like(diagnosis: Diagnosis) -> str:
-    """Say of what something without a name may be a function; nothing where that is open."""
+    """Say of what that which is missing may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= WORTH]
     if diagnosis.shape is not None and len(worth) == 1:
         return ""
+    named = diagnosis.verdict not in ("unknown", "learned")
+    if named and worth and worth[0].posterior < PLAIN:
+        return ""  # the figure has all of it
     return _listed(
         [
             (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
@@ -314,6 +296,8 @@ FAMILIES = {
 
 WORTH = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
+PLAIN = 0.5
+"""Posterior from which on it is worth a word where that which has a name lives."""
 MOST = 3
 """Formulas that are worth a word; the page lists all."""
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}

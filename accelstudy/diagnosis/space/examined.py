@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,7 @@ from accelstudy.diagnosis.space.hypotheses import (
     same_space,
 )
 from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, ideal_residuals, spans
-from accelstudy.diagnosis.space.signatures import Moments, Signature, signatures
-from accelstudy.diagnosis.space.slopes import Slopes
+from accelstudy.diagnosis.space.signatures import Columns, Signature, signatures
 from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
 from accelstudy.sensors.models import compose
@@ -49,7 +47,7 @@ class Frame:
     sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
     output : (n, 3) array, m/s², adjusted readings, on which effects act that act last
     angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
-    moments : Moments, of the holds, completed with what is implied
+    hold : HoldConditions, completed with what is implied
     """
 
     solution: Solution
@@ -59,12 +57,12 @@ class Frame:
     sensed: Array
     output: Array
     angles: Array
-    moments: Moments
+    hold: HoldConditions
 
-    @property
-    def hold(self) -> HoldConditions:
-        """The holds, completed with what is implied."""
-        return self.moments.hold
+    @cached_property
+    def _columns(self) -> Columns:
+        """Columns of the holds beside arrays of settings and parameters."""
+        return Columns(self.hold, 2)
 
     @classmethod
     def of(cls, solution: Solution) -> Frame:
@@ -76,7 +74,7 @@ class Frame:
         else:
             angles = angles_of(forces)
         t = model.axes_matrix(solution.parameters[: model.n_parameters])
-        frame = cls(
+        return cls(
             solution=solution,
             residuals=Residuals.of(solution),
             ideal=ideal,
@@ -84,9 +82,8 @@ class Frame:
             sensed=np.asarray(np.linalg.solve(t, forces.T).T),
             output=observed.forces[0] + solution.residuals[:, :3],
             angles=angles,
-            moments=Moments(implied_hold(solution, angles), rates=observed.slope is not None),
+            hold=implied_hold(solution, angles),
         )
-        return frame.with_slopes()
 
     def signature(self, effect: Effect) -> Signature:
         """Signature of an effect of the sensor."""
@@ -95,42 +92,13 @@ class Frame:
     def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
         """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
         forces = self.forces if ideal else self.output if shapes[0].last else self.sensed
-        shown = signatures(shapes, forces, self.angles, self.solution.gravity, self.moments)
+        shown = signatures(shapes, forces, self.angles, self.solution.gravity, self._columns)
         model = self.solution.model
         if ideal or shapes[0].last or not any(effect.last for effect in model.effects):
             return shown
         p = self.solution.parameters[: model.n_parameters]
         slope = model.slope_of_last(self.sensed, p, self.hold)
-        return replace(shown, force=slope @ shown.force, rate=slope @ shown.rate)
-
-    def with_slopes(self) -> Frame:
-        """Add the slopes within the holds where they tell more than the means."""
-        without = replace(self, moments=Moments(self.hold, rates=False))
-        slopes = Slopes.of(self.solution.observed, self.forces)
-        if slopes is None:
-            return without
-        modelled = [self.signature(effect) for effect in self.solution.model.effects]
-        rows = slopes.beside(self.residuals, self.solution.parameters, modelled, self.of_time())
-        if rows is None:
-            return without
-        return replace(
-            self,
-            residuals=self.residuals.with_slopes(rows),
-            ideal=self.ideal.with_slopes(replace(rows, errors=0 * rows.errors)),
-        )
-
-    def of_time(self) -> Iterator[Signature]:
-        """Signatures of the effects beside the model that change the output within a hold."""
-        modelled = {effect.name for effect in self.solution.model.effects}
-        for name in effect_names():
-            if name in modelled:
-                continue
-            try:
-                shapes = get_effect(name).candidates(self.hold, self.forces, self.solution.gravity)
-                shown = self.signatures(shapes).split(len(shapes)) if shapes else []
-            except InputError:  # a column is absent
-                continue
-            yield from takewhile(lambda one: bool(one.rate.any()), shown)
+        return replace(shown, force=slope @ shown.force)
 
     def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
         """Return what shapes of an effect would leave in the residuals; None for nothing."""
@@ -140,14 +108,9 @@ class Frame:
             return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
 
         shown = self.signatures(shapes, ideal=True)
-        # A fit is made to the means, so they have to show the effect.
-        means = self.ideal.positions
-        projected = of_each(means.project(means.whitened(shown)))
-        sizes = means.size(shown, self.solution.gravity).reshape(len(shapes), -1)
+        projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
+        sizes = self.ideal.size(shown, self.solution.gravity).reshape(len(shapes), -1)
         directions, ideal, seen = spans(projected, sizes, VISIBLE)
-        if self.ideal.slopes:
-            projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
-            ideal = spans(projected @ directions, None, ROUNDING)[1]
         columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
         sizes = np.linalg.norm(projected @ directions, axis=1)
@@ -244,13 +207,13 @@ class ExaminedFit:
                 untestable[name] = str(error)
                 continue
             seen = [shape for shape in shapes if shape is not None]
-            fitting = [shape for shape in seen if shape.dim < residuals.positions.redundancy]
+            fitting = [shape for shape in seen if shape.dim < residuals.redundancy]
             if fitting:
                 candidates[name] = EffectShapes.of(fitting)
             elif seen:
                 untestable[name] = (
                     f"its {seen[0].dim} parameters need more than the "
-                    f"{residuals.positions.redundancy} redundant conditions there are"
+                    f"{residuals.redundancy} redundant conditions there are"
                 )
             else:
                 invisible.append(name)

@@ -7,13 +7,12 @@ from the model adds R D p to them, D the derivatives of the conditions by its pa
 tests of the diagnosis work in this space, so they take into account what the parameters of the
 model have already absorbed.
 
-The rows are those of the positions, of observed gravity and, where they tell something, of the
-slopes within the holds. `Residuals.positions` has those of the positions only.
+The rows are those of the positions and of what was observed of the parameters themselves.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -34,22 +33,6 @@ ABSORBED = 1e-2
 
 
 @dataclass(frozen=True)
-class SlopeRows:
-    """Rows of slopes within the holds, of unit weight.
-
-    Attributes
-    ----------
-    rates : (q, n, 3) array, their derivatives by the rates of the output
-    design : (q, u) array, derivatives of their misclosures by the parameters of the model
-    errors : (q,) array, slopes less those that the model predicts
-    """
-
-    rates: Array
-    design: Array
-    errors: Array
-
-
-@dataclass(frozen=True)
 class Residuals:
     """The residual space of a set of linearised positions.
 
@@ -60,8 +43,6 @@ class Residuals:
     whitening : (n, c, c) array, L of each position
     jac_observations : (n, c, o) array, B
     sigmas : (n, o) array, of the observations
-    rates : (q, n, 3) array, derivatives of the rows of slopes, which are the last, by the rates of
-        the output
     """
 
     design: Array
@@ -69,7 +50,6 @@ class Residuals:
     whitening: Array
     jac_observations: Array
     sigmas: Array
-    rates: Array | None = None
 
     @classmethod
     def of(cls, solution: Solution) -> Residuals:
@@ -81,28 +61,6 @@ class Residuals:
             solution.jac_observations,
             np.sqrt(solution.variances),
         )
-
-    def with_slopes(self, rows: SlopeRows) -> Residuals:
-        """Add rows of slopes."""
-        return replace(
-            self,
-            design=np.concatenate([self.design, rows.design]),
-            errors=np.concatenate([self.errors, rows.errors]),
-            rates=rows.rates,
-        )
-
-    @property
-    def slopes(self) -> int:
-        """Number of rows of slopes."""
-        return 0 if self.rates is None else len(self.rates)
-
-    @cached_property
-    def positions(self) -> Residuals:
-        """The same without the slopes."""
-        if self.rates is None:
-            return self
-        rows = slice(len(self.design) - self.slopes)
-        return replace(self, design=self.design[rows], errors=self.errors[rows], rates=None)
 
     @cached_property
     def absorbed(self) -> Array:
@@ -146,7 +104,7 @@ class Residuals:
         change = b[..., :3] @ signature.force
         if b.shape[-1] > 3 and signature.angles.any():
             change += b[..., 3:] @ signature.angles
-        return self.stacked(change, signature.rate)
+        return self.stacked(change)
 
     def size(self, signature: Signature, g: float) -> Array:
         """Size of a signature in the observations, (k,), however little the approach sees of it.
@@ -161,16 +119,11 @@ class Residuals:
         """Scale changes of the conditions, (n, c, k), to unit weight, (m, k)."""
         return self.stacked(np.asarray(np.linalg.solve(self.whitening, change), dtype=float))
 
-    def stacked(self, change: Array, rate: Array | None = None) -> Array:
-        """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k).
-
-        Rates of the output (n, 3, k) change the slopes, if there are any.
-        """
+    def stacked(self, change: Array) -> Array:
+        """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k)."""
         white = change.reshape(-1, change.shape[-1])
         rows = np.zeros((len(self.design), white.shape[1]))
         rows[: len(white)] = white
-        if self.rates is not None and rate is not None:
-            rows[-self.slopes :] = np.einsum("qna,nak->qk", self.rates, rate)
         return rows
 
     def project(self, rows: Array) -> Array:

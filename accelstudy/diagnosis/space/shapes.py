@@ -11,18 +11,17 @@ Because S falls with the frequency, a shape does not pay for all of its dimensio
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.signatures import Moment, rate_of
+from accelstudy.diagnosis.space.signatures import Columns
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import (
     CYCLES,
@@ -67,19 +66,18 @@ class LearnedShapes:
     shares: tuple[Array, ...]
 
     @classmethod
-    def of(cls, frame: Frame, only: Collection[Place] = (), rates: bool = True) -> LearnedShapes:
+    def of(cls, frame: Frame, only: Collection[Place] = ()) -> LearnedShapes:
         """All shapes that the coordinates of a session allow, and that its model leaves.
 
         Parameters
         ----------
         frame : Frame
         only : places; all by default
-        rates : bool, whether a function of time changes the slopes within the holds, too
         """
         places: list[Place] = []
         kinds: list[int] = []
         covariances: list[Array] = []
-        for kind, (place, rows, priors) in enumerate(_functions(frame, only, rates)):
+        for kind, (place, rows, priors) in enumerate(_functions(frame, only)):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
             for prior in priors[priors @ left > SURVIVES * (priors @ whole)]:
@@ -155,9 +153,6 @@ class LearnedShapes:
 
 # --- coordinates --------------------------------------------------------------------------------
 
-Course: TypeAlias = Callable[[Moment], Array]
-"""Functions of a coordinate at a moment of each hold, (n, a, k): of a arguments, k each."""
-
 
 @dataclass(frozen=True)
 class _Coordinate:
@@ -167,13 +162,15 @@ class _Coordinate:
     ----------
     name : str
     targets : tuple of str, what may depend on it
-    course : Course
+    values : (n, a) array, the coordinate in the holds, of a arguments
+    functions : (n, a, k) array, k functions of each argument
     priors : (p, k) array, prior variances of their weights by smoothness
     """
 
     name: str
     targets: tuple[str, ...]
-    course: Course
+    values: Array
+    functions: Array
     priors: Array
 
 
@@ -181,82 +178,70 @@ SLOW = ("bias", "scale", "square", "reading", "tilt")
 """Targets of anything that changes from hold to hold, whatever the attitude."""
 
 
+def coordinate_in_holds(name: str, frame: Frame) -> Array:
+    """Return a coordinate of a place in each hold, (n, a) for its a arguments, SI."""
+    return next(one.values for one in _coordinates(frame) if one.name == name)
+
+
 def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
     """Coordinates of a session that vary."""
-    hold, f, now = frame.hold, frame.sensed, Moment(frame.hold)
+    hold, f, angles = frame.hold, frame.sensed, frame.angles
     order = "order" if hold.time is None else "time"
 
-    def smooth(name: str, targets: tuple[str, ...], at: Course) -> Iterator[_Coordinate]:
-        values = at(now)
+    def smooth(name: str, targets: tuple[str, ...], values: Array) -> Iterator[_Coordinate]:
         if np.ptp(values, axis=0).max() > 0:
-            yield _Coordinate(name, targets, *_sines(at, values))
+            yield _Coordinate(name, targets, values, *_sines(values))
 
-    yield from smooth("force", ("bias", "bias of the others"), lambda at: f)
-    yield _Coordinate("force", ("bias",), *_on_the_sphere(f))
-    yield _Coordinate("angle", ("reading",), *_harmonics(lambda at: frame.angles))
+    yield from smooth("force", ("bias", "bias of the others"), f)
+    yield _Coordinate("force", ("bias",), f, *_on_the_sphere(f))
+    yield _Coordinate("angle", ("reading",), angles, *_harmonics(angles))
     if hold.yaw is not None and np.ptp(hold.yaw) > 0:
-        course, priors = _harmonics(lambda at: at.yaw[:, None])
-        yield _Coordinate("yaw", ("bias", "reading", "tilt"), course, priors)
+        yaw = hold.yaw[:, None]
+        yield _Coordinate("yaw", ("bias", "reading", "tilt"), yaw, *_harmonics(yaw))
     if hold.vibration is not None:
-        yield from smooth(
-            "vibration", ("bias", "scale", "reading", "tilt"), lambda at: at.vibration[:, None]
-        )
+        targets = ("bias", "scale", "reading", "tilt")
+        yield from smooth("vibration", targets, hold.vibration[:, None])
     if hold.temperature is not None:
-        yield from smooth("temperature", SLOW, lambda at: at.temperature[:, None])
+        yield from smooth("temperature", SLOW, hold.temperature[:, None])
     if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
         return
     when = hold.column(order)
-    yield from smooth("time", SLOW, lambda at: getattr(at, order)[:, None])
-    yield _Coordinate("time", ("bias",), *_waves(order, when))
+    yield from smooth("time", SLOW, when[:, None])
+    yield _Coordinate("time", ("bias",), when[:, None], *_waves(when))
     before = np.concatenate([f[:1], f[:-1]])
-    yield from smooth("previous", ("bias",), lambda at: before)
-    yield from smooth("next", ("bias",), lambda at: np.append(f[1:], f[-1:], 0) - f)
-    moved = wrapped(np.diff(frame.angles, axis=0, prepend=frame.angles[:1]))
-    yield from smooth("move", ("reading",), lambda at: moved)
+    yield from smooth("previous", ("bias",), before)
+    yield from smooth("next", ("bias",), np.append(f[1:], f[-1:], 0) - f)
+    moved = wrapped(np.diff(angles, axis=0, prepend=angles[:1]))
+    yield from smooth("move", ("reading",), moved)
     if hold.temperature is not None and np.all(np.diff(when) > 0):
         rates = np.diff(hold.temperature) / np.diff(when)
         last = np.append(rates[:1], rates)
         for rate in (last, (last + np.append(rates, rates[-1:])) / 2):
-            yield from smooth("dT/dt", ("bias", "scale"), partial(_as_it_is, rate[:, None]))
+            yield from smooth("dT/dt", ("bias", "scale"), rate[:, None])
 
 
-def _as_it_is(values: Array, now: Moment) -> Array:
-    """Values that do not change within a hold."""
-    return values
-
-
-def _sines(at: Course, values: Array) -> tuple[Course, Array]:
+def _sines(values: Array) -> tuple[Array, Array]:
     """Sines of a coordinate (n, a), and their prior variances."""
     low, high = values.min(axis=0), values.max(axis=0)
     half = np.where(high > low, (high - low) / 2, 1.0)
-
-    def course(now: Moment) -> Array:
-        return np.stack(sines((at(now) - (low + high) / 2) / half, np), axis=-1)
-
-    return course, spectrum(frequencies(), LENGTHS)
+    functions = np.stack(sines((values - (low + high) / 2) / half, np), axis=-1)
+    return functions, spectrum(frequencies(), LENGTHS)
 
 
-def _harmonics(at: Course) -> tuple[Course, Array]:
-    """Harmonics of angles (n, a)."""
-
-    def course(now: Moment) -> Array:
-        return np.stack(harmonics(at(now), np), axis=-1)
-
-    return course, np.tile(spectrum(ORDERS, LENGTHS), 2)
+def _harmonics(angles: Array) -> tuple[Array, Array]:
+    """Harmonics of angles (n, a), and their prior variances."""
+    functions = np.stack(harmonics(angles, np), axis=-1)
+    return functions, np.tile(spectrum(ORDERS, LENGTHS), 2)
 
 
-def _waves(order: str, when: Array) -> tuple[Course, Array]:
+def _waves(when: Array) -> tuple[Array, Array]:
     """Sines and cosines of time, one number of cycles at a time."""
-    first, turn = when.min(), 2 * np.pi * CYCLES / np.ptp(when)
-
-    def course(now: Moment) -> Array:
-        phase = turn * (getattr(now, order)[:, None] - first)
-        return np.concatenate([np.sin(phase), np.cos(phase)], axis=1)[:, None]
-
-    return course, np.tile(np.eye(len(CYCLES)), 2)
+    phase = 2 * np.pi * CYCLES / np.ptp(when) * (when - when.min())[:, None]
+    waves = np.concatenate([np.sin(phase), np.cos(phase)], axis=1)
+    return waves[:, None], np.tile(np.eye(len(CYCLES)), 2)
 
 
-def _on_the_sphere(f: Array) -> tuple[Course, Array]:
+def _on_the_sphere(f: Array) -> tuple[Array, Array]:
     """Functions of the direction of forces (n, 3), smooth by any of two lengths."""
     unit = f / np.linalg.norm(f, axis=1, keepdims=True)
     # Of many directions some will do: the functions are smooth (Nyström).
@@ -267,8 +252,7 @@ def _on_the_sphere(f: Array) -> tuple[Course, Array]:
         kept = values[-DIRECTIONS:]
         features.append(_alike(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
         weights.append(kept)
-    functions = np.concatenate(features, axis=1)[:, None]
-    return lambda now: functions, np.asarray(block_diag(*weights))
+    return np.concatenate(features, axis=1)[:, None], np.asarray(block_diag(*weights))
 
 
 def _alike(one: Array, other: Array, length: float) -> Array:
@@ -283,54 +267,49 @@ NAMES = {"square": "scale", "bias of the others": "bias"}
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 
-def _functions(
-    frame: Frame, only: Collection[Place], rates: bool
-) -> Iterator[tuple[Place, Array, Array]]:
+def _functions(frame: Frame, only: Collection[Place]) -> Iterator[tuple[Place, Array, Array]]:
     """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k).
 
     Their means over the holds are zero: what is the same in all of them is no function.
     """
-    now, robot = Moment(frame.hold), frame.solution.approach.uses_angles
+    robot = frame.solution.approach.uses_angles
     for one in _coordinates(frame):
-        course = partial(less_its_mean, one.course, one.course(now).mean(axis=0))
+        varying = less_its_mean(one.functions)
         for target in one.targets:
             place = (one.name, NAMES.get(target, target))
             if (only and place not in only) or (target in ("reading", "tilt") and not robot):
                 continue
-            rows = function_rows(frame, target, course, rates)
+            rows = function_rows(frame, target, varying)
             count = rows.shape[1] // one.priors.shape[1]
             # Only a bias is tried that changes as fast as that.
             rough = target != "bias" and len(one.priors) == len(LENGTHS)
             yield place, rows, np.tile(one.priors[rough:], count)
 
 
-def function_rows(frame: Frame, target: str, course: Course, rates: bool = True) -> Array:
+def function_rows(frame: Frame, target: str, functions: Array) -> Array:
     """What functions of a coordinate do to the conditions of unit weight, by components, (m, l).
 
     Parameters
     ----------
     frame : Frame
     target : str
-    course : Course
-    rates : bool, whether a function of time changes the slopes within the holds, too
+    functions : (n, a, k) array, k functions of each of a arguments
     """
-    residuals, now = frame.residuals, Moment(frame.hold)
+    residuals = frame.residuals
     seen = residuals.by_observations
     if target == "reading":
-        return residuals.stacked(seen[..., 3:] @ _each(course(now), 2))
-    change = partial(_change, course, target, frame.sensed, frame)
-    rate = rate_of(change, frame.hold) if rates and residuals.slopes else None
-    return residuals.stacked(seen[..., :3] @ change(now), rate)
+        return residuals.stacked(seen[..., 3:] @ _each(functions, 2))
+    return residuals.stacked(seen[..., :3] @ _change(functions, target, frame))
 
 
-def less_its_mean(course: Course, mean: Array, now: Moment) -> Array:
-    """Functions of a coordinate that are zero on average."""
-    return course(now) - mean
+def less_its_mean(functions: Array) -> Array:
+    """Functions (n, ...) that are zero on average over the holds."""
+    return functions - functions.mean(axis=0)
 
 
-def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) -> Array:
-    """Change of the output, (n, 3, l), by functions of a target."""
-    h = course(now)
+def _change(h: Array, target: str, frame: Frame) -> Array:
+    """Change of the output, (n, 3, l), by functions h (n, a, k) of a target."""
+    f = frame.sensed
     if target == "bias":
         return _each(h, 3)
     if target == "bias of the others":
@@ -343,20 +322,11 @@ def _change(course: Course, target: str, f: Array, frame: Frame, now: Moment) ->
     if target == "square":
         return _each(h, 3) * f[..., None] ** 2
     a, b, nothing = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
+    hold: Any = Columns(frame.hold, 1)
     tilt = get_effect("base_tilt").output(
-        (nothing, nothing, nothing), (a, b), frame.solution.gravity, _Beside(now), np
+        (nothing, nothing, nothing), (a, b), frame.solution.gravity, hold, np
     )
     return np.einsum("nac,nk->nack", np.stack(tilt, axis=1), h[:, 0]).reshape(len(f), 3, -1)
-
-
-class _Beside:
-    """Columns of the holds (n, 1), beside the parameters of an effect."""
-
-    def __init__(self, now: Moment) -> None:
-        self._now = now
-
-    def __getattr__(self, name: str) -> Array:
-        return getattr(self._now, name)[:, None]
 
 
 def _each(h: Array, count: int) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import permutations, product
 from typing import TypeVar
@@ -77,7 +77,6 @@ class Session:
     time : (n,) array, s, middles of the holds; None if they were not written down
     course : Course, of the temperature; None without a thermometer
     vibration : (n,) array, m/s²; None if it was not measured
-    slopes : bool, whether the slopes within the holds were kept
     full_range : float, m/s², the sensor is stated to measure ± this; None if nothing is stated
     """
 
@@ -91,7 +90,6 @@ class Session:
     time: Array | None = None
     course: Course | None = None
     vibration: Array | None = None
-    slopes: bool = False
     full_range: float | None = None
 
     @property
@@ -168,10 +166,6 @@ class Session:
     def warmth(self, tau: float = 0.0) -> Array:
         """Temperature above `REFERENCE` of a body with a lag of `tau` seconds, (n, 1), K."""
         return _needed(self.course).lagged(_needed(self.time), tau)[:, None] - REFERENCE
-
-    def later(self, seconds: float) -> Session:
-        """The same holds some seconds later."""
-        return replace(self, time=_needed(self.time) + seconds)
 
 
 def _needed(value: T | None) -> T:
@@ -260,9 +254,7 @@ def _spread_24(rng: np.random.Generator) -> Session:
     time = _times(24, 30.0, 20.0)
     course = _smooth(time, lambda t: 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170))
     joints = joints_of(directions)
-    return Session(
-        "spread-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 3000, 30.0, time, course, slopes=True
-    )
+    return Session("spread-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 3000, 30.0, time, course)
 
 
 def _abba_48(rng: np.random.Generator) -> Session:
@@ -271,9 +263,7 @@ def _abba_48(rng: np.random.Generator) -> Session:
     time = _times(48, 20.0, 20.0) + 900.0 * np.repeat(np.arange(4), 12)
     course = _blocks(time, (12.0, 34.0, 34.0, 12.0))
     yaw = rng.uniform(-np.pi, np.pi, 48)
-    return Session(
-        "abba-48", joints, yaw, 0.001, ANGLE_SIGMA, 2000, 20.0, time, course, slopes=True
-    )
+    return Session("abba-48", joints, yaw, 0.001, ANGLE_SIGMA, 2000, 20.0, time, course)
 
 
 def _circles_24(rng: np.random.Generator) -> Session:
@@ -308,16 +298,13 @@ def _repeats_30(rng: np.random.Generator) -> Session:
         time,
         course,
         vibration=0.1 + 1.4 * rng.random(30) ** 2,
-        slopes=True,
     )
 
 
 def _yaw_50(rng: np.random.Generator) -> Session:
     joints = joints_of(rng.permutation(_spiral(50, rng)))
     yaw = rng.uniform(-np.pi, np.pi, 50)
-    return Session(
-        "yaw-50", joints, yaw, 0.003, ANGLE_SIGMA, 1000, 15.0, _times(50, 15.0, 12.0), slopes=True
-    )
+    return Session("yaw-50", joints, yaw, 0.003, ANGLE_SIGMA, 1000, 15.0, _times(50, 15.0, 12.0))
 
 
 def _long_60(rng: np.random.Generator) -> Session:

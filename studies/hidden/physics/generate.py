@@ -140,7 +140,7 @@ def generate(
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
     campaign = _campaign(case, session, forces, reading)
-    campaign = _with_samples(campaign, session, sensor, causes, noise, rng)
+    campaign = _with_samples(campaign, session, noise, rng)
     settings: dict[str, float] = {}
     if case.gross is not None:
         campaign, settings = GROSS[case.gross](campaign, session, conditions, rng)
@@ -192,29 +192,14 @@ def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Ca
 
 
 def _with_samples(
-    campaign: Campaign,
-    session: Session,
-    sensor: Sensor,
-    causes: list[Cause],
-    noise: Noise,
-    rng: np.random.Generator,
+    campaign: Campaign, session: Session, noise: Noise, rng: np.random.Generator
 ) -> Campaign:
     """Add the statistics of the samples within the holds, where they were kept."""
     if not session.n_samples:
         return campaign
     sd = noise.sds(session, rng)
     n_samples = np.full(session.n, session.n_samples)
-    campaign = replace(campaign, sd=sd, n_samples=n_samples)
-    if not session.slopes:
-        return campaign
-    # Least-squares slope of n equally spaced samples with independent errors.
-    root = np.sqrt(12 / session.n_samples) / session.length
-    slope = root * noise.samples_sd(session) * rng.standard_normal(sd.shape)
-    if any(cause.kind.in_time for cause in causes):
-        half = session.length / 4
-        ahead, back = (observe(session.later(by), sensor, causes)[0][0] for by in (half, -half))
-        slope += (ahead - back) / (2 * half)
-    return replace(campaign, slope=slope, sd_slope=root * sd)
+    return replace(campaign, sd=sd, n_samples=n_samples)
 
 
 def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:

@@ -21,9 +21,8 @@ LEAST = 100.0
 """Noncentrality of a bumped hold, at least."""
 FAR = 0.3 * GRAVITY
 """m/s², least difference of the forces of exchanged rows, or nothing would show."""
-SIGNED, UNSIGNED = ("forces", "slope"), ("sd", "sd_slope")
-PER_AXIS = (*SIGNED, *UNSIGNED)
-"""Columns with a value for each axis, those with a sign first."""
+PER_AXIS = ("forces", "sd")
+"""Columns with a value for each axis, that with a sign first."""
 
 # What a number in the file would be for one in its header's unit.
 FORCE_UNITS = (1 / STANDARD_GRAVITY, 1e3 / STANDARD_GRAVITY, STANDARD_GRAVITY)
@@ -44,7 +43,7 @@ def _axis_error(
     for name in PER_AXIS:
         values = getattr(campaign, name)
         if values is not None:
-            turned = np.array(signs) if name in SIGNED else 1.0
+            turned = np.array(signs) if name == "forces" else 1.0
             changed[name] = turned * values[:, order]
     shown = [sign * (axis + 1) for axis, sign in zip(order, signs, strict=True)]
     return replace(campaign, **changed), dict(zip("xyz", shown, strict=True))
@@ -105,10 +104,6 @@ def _outlier_position(
     settings = {"position": row + 1.0, **dict(zip("xyz", error.tolist(), strict=True))}
     settings["lam"] = lam
     campaign = replace(campaign, forces=campaign.forces + change[0])
-    if campaign.slope is not None and rng.random() < 0.5:
-        # It was not bumped before the hold, but crept through it.
-        campaign = replace(campaign, slope=campaign.slope + 2 * change[0] / session.length)
-        settings["crept"] = 1.0
     return campaign, settings
 
 

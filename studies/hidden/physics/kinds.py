@@ -30,8 +30,6 @@ the joints (B, n, 2); rotation of the sensor on it (B, n, 3); errors of the enco
 COUNTS = {"output": 3, "clipping": 3, "gravity": 1, "tilt": 2, "skew": 1, "deflection": 2,
           "mounting": 3, "reading": 2}  # fmt: skip
 """Target -> its number of parameters, where a kind has no other."""
-SLOW = {"time", "course", "warming"}
-"""Needs of what changes within a hold, too."""
 
 
 @dataclass(frozen=True)
@@ -72,11 +70,6 @@ class Kind:
     def k(self) -> int:
         """Number of parameters."""
         return self.count or COUNTS[self.target]
-
-    @property
-    def in_time(self) -> bool:
-        """Whether it changes within a hold."""
-        return bool(SLOW & {*self.needs})
 
     def shows(self, session: Session) -> bool:
         """Whether a session has what it needs."""
