@@ -6,16 +6,23 @@ from pathlib import Path
 
 import click
 
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import warn
 from accelstudy.commands.options import PATH, example
+
+LEVELED = (
+    "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the calibrated force in "
+    "frd (guide 'On a device'); `accelstudy apply` gives them with their sigmas"
+)
+"""What to do instead of `--level`."""
 
 
 @click.command("export", epilog=example("accelstudy export calibrated/calibration.json --form c"))
 @click.argument("calibration", type=PATH)
 @click.option(
-    "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix, px4 or ros."
+    "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix or px4."
 )
-@click.option("--level", is_flag=True, help="For c: add roll and pitch with their sigmas.")
+@click.option("--level", is_flag=True, hidden=True)  # of earlier versions
 def export_command(calibration: Path, form: str, level: bool) -> None:
     """Print a CALIBRATION in a form that a device takes.
 
@@ -27,17 +34,18 @@ def export_command(calibration: Path, form: str, level: bool) -> None:
     depend on them, temperature, time and vibration. What depends on the position before is refused.
 
     px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
-    axis. ros is one for the ROS package imu_calib: a matrix and a bias. They are closest to the
-    calibration over all attitudes. What they cannot hold is said, with the errors of roll and pitch
-    that it leaves.
+    axis, closest to the calibration over all attitudes. What PX4 cannot hold is said, with the
+    errors of roll and pitch that it leaves.
 
     Readings and forces are in the axes of the log.
     """
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.export import export, losses
 
+    if level:
+        raise InputError(f"--level: no longer an option; {LEVELED}")
     content = read_calibration(calibration).content
-    text = export(content, form, level)
+    text = export(content, form)
     if mended := content["mended"]:
         warn(f"the calibration is of mended data: {mended['reason']}")
     for loss in losses(content, form):

@@ -1,4 +1,4 @@
-"""Calibrations on a device: functions in C, compiled, and parameters of PX4 and ROS."""
+"""Calibrations on a device: functions in C, compiled, and parameters of PX4."""
 
 import ctypes
 import json
@@ -9,7 +9,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-import yaml
 from calling import refusal, succeed
 
 from accelstudy.approaches import get_approach
@@ -17,7 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import Calibration, calibration_of
 from accelstudy.campaign.calibration.c_code import HEAD, SOLVE, c_header
 from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.export import device_matrix, export, losses
+from accelstudy.campaign.calibration.export import export, losses
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import HoldConditions, effect_names, get_effect
@@ -115,14 +114,11 @@ class Library:
             names = [argument.split()[-1] for argument in signature.split(",")[1:-1]]
             self.columns[name] = names
             given = "".join(f", known[{k} * n + i]" for k in range(len(names)))
-            level = f"reading + 3 * i{given}, noise, out + 7 * i + 3, out + 7 * i + 5"
-            level = f"{name}_level({level});" if "accel_level" in body else ""
             texts.append(
                 f"void run_{name}(int n, const accel_real *reading, const accel_real *known,"
-                " accel_real noise, accel_real *out)\n{\n    int i;\n    (void)known;\n"
-                "    (void)noise;\n"
-                f"    for (i = 0; i < n; i++) {{\n        {name}_calibrate(reading + 3 * i{given},"
-                f" out + 7 * i);\n        {level}\n    }}\n}}"
+                " accel_real *out)\n{\n    int i;\n    (void)known;\n"
+                f"    for (i = 0; i < n; i++)\n        {name}_calibrate(reading + 3 * i{given},"
+                " out + 3 * i);\n}"
             )
         texts.append("#endif\n")
         source, library = folder / "all.c", folder / "all.so"
@@ -132,19 +128,19 @@ class Library:
         subprocess.run([*command, *(["-DACCEL_DOUBLE"] if double else [])], check=True)
         self._library = ctypes.CDLL(str(library))
 
-    def __call__(self, name, readings, known, noise=0.01):
-        """Forces (n, 3), angles (n, 2) and sigmas (n, 2)."""
+    def __call__(self, name, readings, known):
+        """Forces (n, 3)."""
         pointer, n = ctypes.POINTER(self.real), len(readings)
         of = [known[column] for column in self.columns[name]] or [np.zeros(n)]
         arrays = [np.ascontiguousarray(a, dtype=self.real) for a in (readings, np.stack(of))]
-        out = np.full((n, 7), np.nan, dtype=self.real)
+        out = np.full((n, 3), np.nan, dtype=self.real)
         reading, columns, result = (a.ctypes.data_as(pointer) for a in (*arrays, out))
-        getattr(self._library, f"run_{name}")(n, reading, columns, self.real(noise), result)
-        return out[:, :3].astype(float), out[:, 3:5].astype(float), out[:, 5:].astype(float)
+        getattr(self._library, f"run_{name}")(n, reading, columns, result)
+        return out.astype(float)
 
 
-def header_of(calibration, level=False, unit="m/s^2"):
-    return c_header(calibration, conversion_of(unit), FRD, np.eye(3), unit, level)
+def header_of(calibration, unit="m/s^2"):
+    return c_header(calibration, conversion_of(unit), FRD, np.eye(3), unit)
 
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc)")
@@ -159,9 +155,7 @@ def of_effects():
 
 @pytest.fixture(scope="module")
 def headers(of_effects):
-    alone, pairs = of_effects
-    headers = {name: header_of(each, level=True) for name, each in alone.items()}
-    return headers | {name: header_of(each) for name, each in pairs.items()}
+    return {name: header_of(each) for some in of_effects for name, each in some.items()}
 
 
 @pytest.fixture(scope="module", params=["float", "double"])
@@ -178,7 +172,7 @@ def settled(known, library, name):
 
 @needs_cc
 def test_c_of_each_effect_is_what_apply_does(compiled, of_effects):
-    """Forces, angles and sigmas; also after the session, when drifts have ended."""
+    """Forces; also after the session, when drifts have ended."""
     precision, library = compiled
     exact = precision == "double"
     known = conditions(60, until=2000.0)
@@ -186,15 +180,10 @@ def test_c_of_each_effect_is_what_apply_does(compiled, of_effects):
     for name, calibration in of_effects[0].items():
         hold = holds(known)
         readings = readings_of(calibration, attitudes(60), hold)
-        force, angle, sigma = library(name, readings, settled(known, library, name))
+        force = library(name, readings, settled(known, library, name))
         expected = calibration.correct(readings, hold)
         assert np.isfinite(expected).all()
         np.testing.assert_allclose(force, expected, rtol=0, atol=2e-6 if exact else 1.1e-5)
-        angles, sigmas = calibration.level(readings, 0.01, hold)
-        tilt = np.cos(angles[:, 1:])  # near the roll pole, roll means nothing
-        difference = (angle - angles + np.pi) % (2 * np.pi) - np.pi
-        np.testing.assert_allclose(difference * tilt, 0, atol=1e-6 if exact else 5e-6)
-        np.testing.assert_allclose(sigma, sigmas, rtol=1e-5 if exact else 2e-3, err_msg=name)
 
 
 @needs_cc
@@ -205,7 +194,7 @@ def test_c_of_each_pair_gives_the_force_that_made_the_reading(compiled, of_effec
     known, forces = conditions(40), attitudes(40, size)
     for name, calibration in of_effects[1].items():
         readings = readings_of(calibration, forces, holds(known))
-        force, _, _ = library(name, readings, settled(known, library, name))
+        force = library(name, readings, settled(known, library, name))
         bound = 1e-6 if precision == "double" else size * 1.1e-5
         np.testing.assert_allclose(
             force, forces, rtol=0, atol=bound, err_msg=str(calibration.model)
@@ -223,7 +212,7 @@ def test_c_follows_a_lag_as_its_head_says(tmp_path):
         lagged.append(lagged[-1] + (now - lagged[-1]) * factor)
     hold = HoldConditions(time=time, temperature=temperature)
     readings = np.tile([0.0, 0.0, -G], (len(time), 1))
-    force, _, _ = library("lag", readings, {"temperature_lagged_300": np.array(lagged)})
+    force = library("lag", readings, {"temperature_lagged_300": np.array(lagged)})
     expected = calibration.correct(readings, hold)
     largest = 0.007 * 0.5 * 15 / 1000  # half a second behind a straight line, at 7 mm/s²/K
     np.testing.assert_allclose(force, expected, rtol=0, atol=1.1 * largest)
@@ -235,7 +224,7 @@ def test_c_has_no_force_where_apply_has_none(tmp_path):
     calibration = calibration_with(("saturation(knee=9)",), values=[1.0, 1.0, 1.0])
     library = Library({"clips": header_of(calibration)}, tmp_path, double=False)
     readings = np.array([[0.0, 0.0, -8.0], [0.0, 9.5, 0.0]])
-    force, _, _ = library("clips", readings, {})
+    force = library("clips", readings, {})
     np.testing.assert_allclose(force[0], [0, 0, -8], atol=1e-5)
     assert np.isnan(force[1]).all()
     assert np.isnan(calibration.correct(readings)[1]).any()
@@ -248,19 +237,16 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, tmp_path):
     calibration = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
     turn, axes = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), parse_frame(frame)
     raw = conversion_of("counts", [0.002, 0.0021, 0.0019], [33000.3, 33100.4, 32900.2])
-    header = c_header(calibration, raw, axes, turn, "counts", level=True)
+    header = c_header(calibration, raw, axes, turn, "counts")
     library = Library({"log": header}, tmp_path, double=False)
     forces, hold = attitudes(30), HoldConditions()
     counts = raw.from_si(axes.from_frd(readings_of(calibration, forces, hold) @ turn))
-    force, angle, _ = library("log", counts, {})
+    force = library("log", counts, {})
     np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
-    angles, _ = calibration.level(axes.to_frd(raw.to_si(counts)) @ turn.T, 0.01)
-    difference = (angle - axes.signs[:2] * angles + np.pi) % (2 * np.pi) - np.pi
-    np.testing.assert_allclose(difference * np.cos(angles[:, 1:]), 0, atol=1e-5)
 
 
 def test_a_header_says_what_it_takes_and_where_it_is_from():
-    header = header_of(calibration_with(tuple(EFFECTS)), level=True)
+    header = header_of(calibration_with(tuple(EFFECTS)))
     comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
     for words in (
         "temperature: degC", "time: s since the start", "vibration: m/s^2, rms", "g = 9.81 m/s^2",
@@ -296,7 +282,7 @@ def calibrated(tmp_path_factory):
     return of
 
 
-@pytest.mark.parametrize("form", ["c", "px4", "ros"])
+@pytest.mark.parametrize("form", ["c", "px4"])
 @pytest.mark.parametrize(("spec", "what"), [
     ("hysteresis", "position before"),
     ("settling", "position before"),
@@ -318,15 +304,19 @@ def test_what_no_device_knows_is_refused_in_one_line(form, spec, what, calibrate
     assert line.count("\n") == 1
 
 
-def test_only_c_levels(calibrated):
-    path = calibrated("bias-scale-nonorthogonality")
-    assert "accel_level(" in succeed("export", path, "--form", "c", "--level").stdout
-    assert "accel_level" not in succeed("export", path, "--form", "c").stdout
-    assert "no place for roll and pitch" in refusal("export", path, "--form", "px4", "--level")
-    content = json.loads(path.read_text())
-    content["covariance"] = [[None] * 9] * 9
-    with pytest.raises(InputError, match="has no sigmas; export it without --level"):
-        export(content, "c", level=True)
+def test_level_is_no_longer_an_option(calibrated):
+    line = refusal("export", calibrated("bias-scale-nonorthogonality"), "--form", "c", "--level")
+    assert line.startswith(
+        "error: --level: no longer an option; roll = atan2(-f_y, -f_z) and pitch"
+    )
+    assert "`accelstudy apply` gives them with their sigmas" in line
+    assert line.count("\n") == 1
+
+
+def test_ros_is_no_longer_a_form(calibrated):
+    line = refusal("export", calibrated("bias-scale-nonorthogonality"), "--form", "ros")
+    assert "form ros: no longer a form; `--form matrix` has the numbers of imu_calib" in line
+    assert line.count("\n") == 1
 
 
 def px4_of(text):
@@ -366,16 +356,14 @@ def test_px4_holds_bias_scale_and_curves_of_the_temperature(calibrated):
     np.testing.assert_allclose(corrected_by_px4(found, readings, temperature), expected, atol=1e-6)
 
 
-@pytest.mark.parametrize(("model", "form", "missing"), [
-    ("bias-scale-nonorthogonality", "px4", "nonorthogonality"),
-    ("bias-scale-nonorthogonality+quadratic_scale", "px4", "nonorthogonality and quadratic_scale"),
-    ("bias-scale-nonorthogonality+quadratic_scale", "ros", "quadratic_scale"),
-    ("bias-scale-nonorthogonality+thermal_bias", "ros", "thermal_bias"),
+@pytest.mark.parametrize(("model", "missing"), [
+    ("bias-scale-nonorthogonality", "nonorthogonality"),
+    ("bias-scale-nonorthogonality+quadratic_scale", "nonorthogonality and quadratic_scale"),
 ])  # fmt: skip
-def test_what_a_file_cannot_hold_is_said_with_its_size(model, form, missing, calibrated):
+def test_what_px4_cannot_hold_is_said_with_its_size(model, missing, calibrated):
     """The errors of roll and pitch by a device of our own, at tilts drawn at random."""
-    path = calibrated(model, temperature="thermal" in model)
-    result = succeed("export", path, "--form", form)
+    path = calibrated(model)
+    result = succeed("export", path, "--form", "px4")
     (warning,) = result.stderr.splitlines()
     assert f"has no place for {missing};" in warning
     assert warning.removeprefix("warning: ") in result.stdout
@@ -388,11 +376,7 @@ def test_what_a_file_cannot_hold_is_said_with_its_size(model, form, missing, cal
     low, high = calibration.ranges.get("temperature_degC", (20, 20))
     temperature = rng.choice(np.linspace(low, high, 5), n)
     readings = readings_of(calibration, forces, HoldConditions(temperature=temperature))
-    if form == "px4":
-        found = corrected_by_px4(px4_of(result.stdout), readings, temperature)
-    else:
-        file = yaml.safe_load(result.stdout)
-        found = readings @ np.reshape(file["SM"], (3, 3)).T - file["bias"]
+    found = corrected_by_px4(px4_of(result.stdout), readings, temperature)
 
     def roll_pitch(f):
         return np.stack([np.arctan2(-f[:, 1], -f[:, 2]), np.arcsin(f[:, 0] / norm(f))], axis=1)
@@ -406,17 +390,21 @@ def norm(vectors):
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu"])
-def test_ros_holds_what_a_matrix_holds(frame, calibrated):
-    """SM · reading − bias, as the node apply_calib takes it."""
+def test_matrix_has_what_imu_calib_takes(frame, calibrated):
+    """SM · reading − bias, with the first three columns and minus the last one."""
     log = {"unit": "counts", "scale": [0.02, 0.021, 0.019], "offset": [5, 1, -4], "frame": frame}
     content = json.loads(calibrated("bias-scale-nonorthogonality").read_text()) | {"log": log}
-    text = export(content, "ros")
-    assert losses(content, "ros") == ()
-    file = yaml.safe_load(text)
-    matrix = device_matrix(content)
-    np.testing.assert_allclose(np.reshape(file["SM"], (3, 3)), matrix[:, :3], atol=1e-11)
-    np.testing.assert_allclose(file["bias"], -matrix[:, 3], atol=1e-9)
-    assert "readings in counts" in text
+    matrix = np.array([row.split() for row in export(content, "matrix").splitlines()], dtype=float)
+    sm, bias = matrix[:, :3], -matrix[:, 3]
+    axes, forces = parse_frame(frame), attitudes(30)
+    sensed = axes.from_frd(readings_of(calibration_of(content), forces, HoldConditions()))
+    counts = sensed / log["scale"] + log["offset"]
+    np.testing.assert_allclose(counts @ sm.T - bias, axes.from_frd(forces), atol=1e-9)
+
+
+def test_px4_takes_no_counts(calibrated):
+    log = {"unit": "counts", "scale": [0.02] * 3, "offset": [0] * 3, "frame": "frd"}
+    content = json.loads(calibrated("bias-scale-nonorthogonality").read_text()) | {"log": log}
     with pytest.raises(InputError, match="PX4 takes readings in m/s\\^2"):
         export(content, "px4")
 

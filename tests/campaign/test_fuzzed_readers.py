@@ -148,7 +148,7 @@ def test_what_no_calibration_can_hold_is_said_when_it_is_read(calibration, chang
 INJECTED = "x\n1\t1\tCAL_ACC0_XOFF\t9\t9\x1b[31m\u2028*/"
 
 
-@pytest.mark.parametrize("form", ["px4", "ros", "c", "yaml"])
+@pytest.mark.parametrize("form", ["px4", "c", "yaml"])
 def test_a_name_is_no_line_of_an_export(calibration, form):
     content = {**calibration, "sensor": INJECTED, "campaign": INJECTED}
     with TemporaryDirectory() as name:
@@ -160,7 +160,7 @@ def test_a_name_is_no_line_of_an_export(calibration, form):
     assert "\u2028" not in text
 
 
-forms = st.sampled_from(["json", "yaml", "c", "matrix", "px4", "ros"])
+forms = st.sampled_from(["json", "yaml", "c", "matrix", "px4"])
 
 
 @settings(max_examples=150)

@@ -10,7 +10,6 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-import yaml
 from places import ROOT
 from study_helpers import grid, make_study, run_study
 
@@ -93,7 +92,7 @@ def test_each_key_of_a_calibration_is_described(pages):
     }
     described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
     assert {name: described[name] for name in written} == written
-    assert described.keys() - written == {"calibration.h", "calibration.params", "imu_calib.yaml"}
+    assert described.keys() - written == {"calibration.h", "calibration.params"}
 
 
 def test_each_name_of_an_exported_calibration_is_described(pages):
@@ -103,18 +102,15 @@ def test_each_name_of_an_exported_calibration_is_described(pages):
     document = calibration_document(
         fit_campaign(simulate_campaign(settings)[0], model, get_approach("robot"))
     )
-    code = export(document, "c", level=True).split("*/", 1)[1]
-    signatures = re.findall(r"void (accel_(?:calibrate|level))\((.*)\)", code)
-    names = {
-        word for name, arguments in signatures for word in (name, *re.findall(r"\w+", arguments))
-    }
-    names = {name.removesuffix("_60") for name in names if name not in ("const", "2", "3")}
+    code = export(document, "c").split("*/", 1)[1]
+    (signature,) = re.findall(r"void (accel_calibrate\(.*\))", code)
+    words = set(re.findall(r"\w+", signature)) - {"const", "3"}
+    names = {word.removesuffix("_60") for word in words}
     lines = [line.split("\t") for line in export(document, "px4").splitlines() if line[0] != "#"]
     first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
     described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
     assert described["calibration.h"] == names
     assert described["calibration.params"] == first
-    assert described["imu_calib.yaml"] == set(yaml.safe_load(export(document, "ros")))
 
 
 def _lot():

@@ -21,19 +21,17 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.applying import MARGIN, Calibration, noise_of_reading
+from accelstudy.campaign.calibration.applying import MARGIN, Calibration
 from accelstudy.campaign.calibration.device import KNOWN, in_use, must_be_known
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
-from accelstudy.leveling.angles import roll_pitch
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.conversion import Conversion
 from accelstudy.sensors.frames import FRD, Frame
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.tracing import derivative, symbolic, symbols
+from accelstudy.symbolic.tracing import derivative, symbols
 
 Array = NDArray[np.float64]
 
@@ -85,25 +83,6 @@ static inline void accel_solve(accel_real a[3][3], const accel_real b[3], accel_
         x[j] = (b[0] * minors[0][j] + b[1] * minors[1][j] + b[2] * minors[2][j]) / det;
 }"""
 
-SIGMAS = """\
-for (n = 0; n < 2; n++) {{
-    accel_real variance = 0;
-    for (k = {u}; k < {u} + 3; k++) {{
-        accel_real sum = 0;
-        for (i = 0; i < 3; i++)
-            sum += angle_by[n][i] * partial[k][i];
-        variance += noise * noise * sum * sum;
-    }}
-    for (j = 0; j < {u}; j++) {{
-        accel_real sum = 0;
-        for (k = 0; k < {u}; k++)
-            for (i = 0; i < 3; i++)
-                sum += angle_by[n][i] * partial[k][i] * root[k][j];
-        variance += sum * sum;
-    }}
-    sigma[n] = ACCEL(sqrt)(variance);
-}}"""
-
 ARGUMENTS = {
     "temperature": "degC",
     "time": "s since the start of the calibration session",
@@ -117,12 +96,7 @@ KEPT = "time_kept"
 
 
 def c_header(
-    calibration: Calibration,
-    raw: Conversion,
-    frame: Frame,
-    mending: Array,
-    unit: str,
-    level: bool = False,
+    calibration: Calibration, raw: Conversion, frame: Frame, mending: Array, unit: str
 ) -> str:
     """Write a header with a function that turns readings into calibrated forces.
 
@@ -131,7 +105,6 @@ def c_header(
     calibration : Calibration
     raw, frame, unit : of the readings
     mending : (3, 3) array, turns forces in frd as they are read into those that were fitted
-    level : bool, whether to add a function of roll and pitch with their sigmas
 
     Raises
     ------
@@ -139,8 +112,8 @@ def c_header(
         If an effect depends on what no device knows, or no force explains a reading.
     """
     code = _Code(calibration, raw, frame, mending)
-    functions = list(code.functions(level))
-    blocks = provenance(calibration), code.notes(unit, level), _parameters(calibration)
+    functions = list(code.functions())
+    blocks = provenance(calibration), code.notes(unit), _parameters(calibration)
     lines = [w for block in blocks for text in (*block, "") for w in wrap(text, WIDTH) or [""]]
     comment = "\n".join(f" * {line}".rstrip() for line in lines[:-1]).replace("*/", "* /")
     return "\n\n".join([f"/*\n{comment}\n */", HEAD, *functions, "#endif"]) + "\n"
@@ -154,8 +127,8 @@ class _Part:
     ----------
     effect : Effect
     lags : dict of the name of a lagged temperature to its time constant, s
-    output, slope, partial : (3, 1), (3, 3) and (3, k) matrices, what it adds to the output, and the
-        derivatives of that by the force and by its parameters
+    output, slope : (3, 1) and (3, 3) matrices, what it adds to the output, and the derivative of
+        that by the force
     axes : (3, 3) matrix, what it adds to T
     """
 
@@ -163,7 +136,6 @@ class _Part:
     lags: dict[str, float]
     output: Any
     slope: Any
-    partial: Any
     axes: Any
 
     @property
@@ -193,15 +165,6 @@ class _Part:
         """Lines that add it to an output and its slope."""
         values = {f"output[{i}]": self.output[i] for i in range(3)}
         values |= {f"slope[{i}][{j}]": self.slope[i, j] for i in range(3) for j in range(3)}
-        return self._added(values)
-
-    @cached_property
-    def partial_in_c(self) -> tuple[str, ...]:
-        """Lines that add the derivatives by its parameters."""
-        ways = ((i, k) for k in range(len(self.p)) for i in range(3))
-        return self._added({f"partial[{k}][{i}]": self.partial[i, k] for i, k in ways})
-
-    def _added(self, values: Mapping[str, Any]) -> tuple[str, ...]:
         values = {name: value for name, value in values.items() if value != 0}
         used = set().union(*(value.free_symbols for value in values.values()))
         force = [(f, i) for i, f in enumerate(_force()) if f in used]
@@ -219,10 +182,8 @@ def _part(spec: str) -> _Part:
     if effect.drifts:
         renamed[hold.time] = symbols(KEPT)[0]
     column = sp.Matrix(output).xreplace(renamed)
-    p = symbols(*(parameter.name for parameter in effect.parameters))
-    slope, partial = derivative(column, _force()), derivative(column, p)
     lags = {name: float(tau) for name, tau in lags.items()}
-    return _Part(effect, lags, column, slope, partial, sp.Matrix(axes))
+    return _Part(effect, lags, column, derivative(column, _force()), sp.Matrix(axes))
 
 
 class _Stage:
@@ -237,7 +198,6 @@ class _Stage:
 
     def __init__(self, name: str, parts: Sequence[tuple[_Part, Array]], g: float) -> None:
         self.name, self.parts, self._g = name, parts, g
-        self.n_parameters = sum(len(p) for _, p in parts)
         self.columns = tuple(sorted({name for part, _ in parts for name in part.columns}))
         self.linear = all(part.linear for part, _ in parts)
 
@@ -267,23 +227,16 @@ class _Stage:
             return 0
         return 1 if self.linear else int(1 + np.argmax((sizes[:, solved] < BOUND).all(axis=1)))
 
-    def functions(self, level: bool) -> Iterable[str]:
-        """Write the function of the output and its slope, and perhaps that of the partials."""
+    @property
+    def function(self) -> str:
+        """The function of the output and its slope."""
         known = f"const accel_real force[3]{''.join(f', accel_real {c}' for c in self.columns)}"
         lines = ["int i, j;", "for (i = 0; i < 3; i++) {", "    output[i] = force[i];"]
         lines += ["    for (j = 0; j < 3; j++)", "        slope[i][j] = i == j;", "}"]
         for part, p in self.parts:
             lines += self._scope(part, p, part.in_c)
         to = "accel_real output[3], accel_real slope[3][3]"
-        yield _function(self.name, f"{known}, {to}", lines)
-        if level:
-            n = self.n_parameters
-            lines = ["int i, k;", f"for (k = 0; k < {n}; k++)", "    for (i = 0; i < 3; i++)"]
-            lines += ["        partial[k][i] = 0;"]
-            for part, p in self.parts:
-                lines += [*self._scope(part, p, part.partial_in_c), f"partial += {len(p)};"]
-            lines += [f"(void){name};" for name in ("force", *self.columns)]
-            yield _function(f"{self.name}_by", f"{known}, accel_real (*partial)[3]", lines)
+        return _function(self.name, f"{known}, {to}", lines)
 
     def _scope(self, part: _Part, p: Array, lines: Sequence[str]) -> list[str]:
         """Lines in a scope of their own, with the numbers that occur in them."""
@@ -355,16 +308,13 @@ class _Code:
         """Whether it takes more than one step to solve for the force."""
         return max(self.steps, default=1) > 1
 
-    def functions(self, level: bool) -> Iterable[str]:
+    def functions(self) -> Iterable[str]:
         """Write all functions."""
         affine = not self.columns and all(stage.linear for stage in self._stages)
-        if level or not affine:
+        if not affine:
             yield SOLVE
-            for stage in self._stages:
-                yield from stage.functions(level)
+            yield from (stage.function for stage in self._stages)
         yield self._calibrate(affine)
-        if level:
-            yield self._level()
 
     @property
     def _arguments(self) -> str:
@@ -420,70 +370,8 @@ class _Code:
             lines += [f"lost = lost || !({size} < {_number(LOST)});"]
         return [*lines, all_three, "    output[i] = f[i];"]
 
-    def _level(self) -> str:
-        """Write the function of roll and pitch with their sigmas.
-
-        Raises
-        ------
-        InputError
-            If the calibration has no covariance matrix.
-        """
-        covariance = self._calibration.covariance
-        if not np.isfinite(covariance).all():
-            raise InputError("the calibration has no sigmas; export it without --level")
-        all_p = [symbol for stage in self._stages for part, _ in stage.parts for symbol in part.p]
-        places = [self._calibration.model.parameter_names.index(str(p)) for p in all_p]
-        values, vectors = np.linalg.eigh(covariance[np.ix_(places, places)])
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        u = len(root)
-        force = sp.Matrix(symbols(*(f"force[{i}]" for i in range(3))))
-        turned = symbols("F_x", "F_y", "F_z")
-        angles = roll_pitch(turned, symbolic)
-        by_force = derivative(angles, turned)
-        signed = [int(sign) * a for sign, a in zip(self._frame.signs, angles, strict=False)]
-        count = len(self._stages)
-        arrays = [f"f{n}[3]" for n in range(count + 1)] + [f"slope{n}[3][3]" for n in range(count)]
-        arrays = [f"partial[{u + 3}][3]", *arrays]
-        lines = [
-            f"static const accel_real axes[3][3] = {_table(self._axes)};",
-            f"static const accel_real root[{u}][{u}] = {_table(root)};",
-            f"accel_real force[3], angle_by[2][3], step[3], {', '.join(arrays)};",
-            "int i, j, k, n;",
-            *self._kept(),
-            f"accel_calibrate(reading{''.join(f', {c}' for c in self.columns)}, force);",
-            *_declared(turned, _matrix(self._frame.matrix) * force),
-            *_assigned(_named("f0", _matrix(np.linalg.inv(self._axes)) * sp.Matrix(turned))),
-        ]
-        firsts = np.cumsum([0, *(stage.n_parameters for stage in self._stages)]).tolist()
-        for n, stage in enumerate(self._stages):
-            given = "".join(f", {name}" for name in stage.columns)
-            lines += [f"{stage.name}(f{n}{given}, f{n + 1}, slope{n});"]
-            lines += [f"{stage.name}_by(f{n}{given}, partial + {firsts[n]});"]
-        # The noise of a reading comes after all effects, and is solved for like their parameters.
-        lines += ["for (j = 0; j < 3; j++)", "    for (i = 0; i < 3; i++)"]
-        lines += [f"        partial[{u} + j][i] = i == j;"]
-        for n in range(count)[::-1]:
-            lines += [f"for (k = {firsts[n]}; k < {u + 3}; k++) {{"]
-            lines += [f"    accel_solve(slope{n}, partial[k], step);"]
-            lines += ["    for (i = 0; i < 3; i++)", "        partial[k][i] = step[i];", "}"]
-        lines += [f"for (k = 0; k < {u + 3}; k++) {{", "    for (i = 0; i < 3; i++)"]
-        lines += ["        step[i] = axes[i][0] * partial[k][0] + axes[i][1] * partial[k][1]"]
-        lines += ["            + axes[i][2] * partial[k][2];"]
-        lines += ["    for (i = 0; i < 3; i++)", "        partial[k][i] = -step[i];", "}"]
-        f0 = sp.Matrix(symbols(*(f"f0[{i}]" for i in range(3))))
-        axes = sum((part.axes for stage in self._stages for part, _ in stage.parts), sp.zeros(3))
-        for k, p in enumerate(all_p):
-            turn = axes.diff(p) * f0
-            lines += _assigned({f"partial[{k}][{i}]": turn[i] for i in range(3) if turn[i]}, "+=")
-        by = {f"angle_by[{i}][{j}]": by_force[i, j] for i in range(2) for j in range(3)}
-        lines += [*_assigned(_named("angle", signed)), *_assigned(by)]
-        lines += SIGMAS.format(u=u).splitlines()
-        arguments = f"const accel_real reading[3]{self._arguments}, accel_real noise"
-        arguments += ", accel_real angle[2], accel_real sigma[2]"
-        return _function("accel_level", arguments, lines)
-
-    def notes(self, unit: str, level: bool) -> Iterable[str]:
-        """Say what the functions take and give."""
+    def notes(self, unit: str) -> Iterable[str]:
+        """Say what the function takes and gives."""
         calibration, end = self._calibration, self._end
         yield (
             f"accel_calibrate: from a reading in {unit} to the specific force in m/s^2, both in "
@@ -506,12 +394,6 @@ class _Code:
                 f"of less than {BOUND:g} m/s^2 ({BOUND / calibration.gravity / MGON:.2g} mgon) at "
                 f"up to {FORCES[-1]:g} g, in the ranges of the calibration. The force is NAN where "
                 "none explains the reading."
-            )
-        if level:
-            yield (
-                "accel_level: roll and pitch in rad, and their sigmas, for a reading with a noise "
-                f"in m/s^2 per axis; a single reading had {number(noise_of_reading(calibration))}. "
-                "At a pitch close to a right angle roll has no meaning, and sigmas do not hold."
             )
         yield (
             f"All is in float, with rounding errors below {ROUNDING:g} m/s^2 at 1 g, or in double "
@@ -577,8 +459,8 @@ def _printer() -> Any:
     return Printer({"user_functions": {name: f"ACCEL({c})" for name, c in names.items()}})
 
 
-def _number(value: float, digits: int = 12) -> str:
-    text = f"{value:.{digits}g}"
+def _number(value: float) -> str:
+    text = f"{value:.12g}"
     return f"ACCEL({text if set('.e') & set(text) else f'{text}.0'})"
 
 
@@ -599,17 +481,6 @@ def _matrix(values: ArrayLike) -> Any:
     exact = {0.0: sp.S.Zero, 1.0: sp.S.One, -1.0: -sp.S.One}
     rows = np.asarray(values, dtype=float).reshape(3, -1).tolist()
     return sp.Matrix([[exact.get(value, sp.Float(value)) for value in row] for row in rows])
-
-
-def _table(values: Array) -> str:
-    """Numbers of a matrix, of which nine digits are enough."""
-    rows = (", ".join(_number(value, 9) for value in row) for row in values)
-    return "{\n" + ",\n".join(f"    {{{row}}}" for row in rows) + "\n}"
-
-
-def _declared(names: Iterable[Any], values: Iterable[Any]) -> list[str]:
-    names = (f"const accel_real {name}" for name in names)
-    return _assigned(dict(zip(names, values, strict=True)))
 
 
 def _assigned(values: Mapping[str, Any], sign: str = "=") -> list[str]:

@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.applying import Calibration, calibration_of
 from accelstudy.campaign.calibration.c_code import c_header
-from accelstudy.campaign.calibration.parameter_files import PROGRAMS
+from accelstudy.campaign.calibration.parameter_files import PX4
 from accelstudy.effects import Effect
 from accelstudy.effects.base import formulas
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -24,7 +24,12 @@ from accelstudy.sensors.sensor import SensorModel, not_affine
 
 Array = NDArray[np.float64]
 
-FORMS = ("json", "yaml", "c", "matrix", "px4", "ros")
+FORMS = ("json", "yaml", "c", "matrix", "px4")
+RETIRED = {
+    "ros": "`--form matrix` has the numbers of imu_calib, if the model is linear in the force: SM "
+    "is its first three columns, bias minus its last"
+}
+"""Forms of earlier versions, with what to do instead."""
 
 STEPS = (
     "f_s = mending · to_frd · ((raw − offset) · scale), m/s²",
@@ -94,14 +99,13 @@ def mending(calibration: Mapping[str, Any]) -> Array:
     return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
 
 
-def export(calibration: Mapping[str, Any], form: str, level: bool = False) -> str:
+def export(calibration: Mapping[str, Any], form: str) -> str:
     """Text of a calibration in one of `FORMS`.
 
     Parameters
     ----------
     calibration : mapping, content of calibration.json
     form : one of `FORMS`
-    level : bool, whether the form "c" has a function of roll and pitch, too
 
     Raises
     ------
@@ -111,17 +115,17 @@ def export(calibration: Mapping[str, Any], form: str, level: bool = False) -> st
     Notes
     -----
     "json" and "yaml" hold everything: parameters with sigmas, formulas of the effects and, if there
-    is one, the matrix. "c" is a header in C99. "matrix" has plain 3 × 4 numbers. "px4" and "ros"
-    are files of parameters, in which `losses` of the calibration are missing.
+    is one, the matrix. "c" is a header in C99. "matrix" has plain 3 × 4 numbers. "px4" is a
+    file of parameters, in which `losses` of the calibration are missing.
     """
-    if level and form != "c":
-        raise InputError(f"the form {form} has no place for roll and pitch; c has")
+    if form in RETIRED:
+        raise InputError(f"form {form}: no longer a form; {RETIRED[form]}")
     if form == "matrix":
         return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
     if form == "c":
-        return c_header(*_of_device(calibration), level)
-    if form in PROGRAMS:
-        return PROGRAMS[form](*_of_device(calibration)).text
+        return c_header(*_of_device(calibration))
+    if form == "px4":
+        return PX4(*_of_device(calibration)).text
     if form == "json":
         return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
     if form == "yaml":
@@ -131,7 +135,7 @@ def export(calibration: Mapping[str, Any], form: str, level: bool = False) -> st
 
 def losses(calibration: Mapping[str, Any], form: str) -> tuple[str, ...]:
     """What a form cannot hold of a calibration, a sentence each."""
-    return PROGRAMS[form](*_of_device(calibration)).lost if form in PROGRAMS else ()
+    return PX4(*_of_device(calibration)).lost if form == "px4" else ()
 
 
 def _of_device(calibration: Mapping[str, Any]) -> tuple[Calibration, Conversion, Frame, Array, str]:

@@ -1,9 +1,9 @@
-"""A calibration as parameters of programs that have a form of their own: PX4 and ROS.
+"""A calibration as parameters of PX4.
 
-They hold a sensor whose reading of a force f is A f + o. What such a form cannot hold is left out:
-A and o are those that come closest to the readings of the calibrated sensor, by least squares over
-all attitudes at rest and over the conditions of the calibration. So they are its scales and biases
-as long as it has these. What is lost is stated as errors of roll and pitch.
+PX4 corrects each axis by itself, as if its reading of a force f were a f + o. What it cannot hold
+is left out: a and o are those that come closest to the readings of the calibrated sensor, by least
+squares over all attitudes at rest and over the conditions of the calibration. So they are its
+scales and biases as long as it has these. What is lost is stated as errors of roll and pitch.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from accelstudy.sensors.models import compose
 Array = NDArray[np.float64]
 
 ATTITUDES = 60
-"""Attitudes, each mirrored in all axes, over which a form is fitted."""
+"""Attitudes, each mirrored in all axes, over which the parameters are fitted."""
 TILTED = 200
-"""Attitudes over which its loss is taken."""
+"""Attitudes over which the loss is taken."""
 SEEN = 0.01 * MGON
 """Error of an angle below which nothing is lost."""
 DEGREE = 3
@@ -44,8 +44,11 @@ REAL, INTEGER = 9, 6
 """Types of parameters in files of PX4 (MAVLink)."""
 
 
-class ParameterFile:
-    """A calibration as parameters of a program.
+class PX4:
+    """Parameters CAL_ACC0_* and TC_A0_* of PX4, in a file that QGroundControl loads.
+
+    PX4 corrects each axis by itself: (reading − TC − OFF) · SCALE, with TC = X1 ΔT + X2 ΔT² +
+    X3 ΔT³, ΔT = T − TREF (its Accelerometer::Correct and TemperatureCompensation).
 
     Parameters
     ----------
@@ -56,41 +59,62 @@ class ParameterFile:
     Raises
     ------
     InputError
-        If an effect depends on what no device knows, or no force explains a reading.
+        If an effect depends on what no device knows, no force explains a reading, or readings are
+        not in m/s².
     """
-
-    program: str
-    axes: bool
-    """Whether each axis stands by itself."""
-    warms: bool
-    """Whether there are polynomials of the temperature."""
 
     def __init__(
         self, calibration: Calibration, raw: Conversion, frame: Frame, mending: Array, unit: str
     ) -> None:
         must_be_known(calibration.needs)
-        self.calibration, self.unit, self.frame = calibration, unit, frame
+        if unit != "m/s^2":
+            raise InputError(
+                f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
+            )
+        self.calibration, self.frame = calibration, frame
         self._raw, self._to_read = raw, np.linalg.inv(mending)
-        self.a, self.o = self._fitted(calibration)
+        self.gains, self.offsets = self._fitted(calibration)
         self.lost = tuple(self._lost())
 
     @property
     def text(self) -> str:
         """The file."""
-        head = [*provenance(self.calibration), *self.lost, *self.remarks()]
-        return "".join(f"{line}\n" for line in (*(f"# {line}" for line in head), *self.lines()))
+        head = [*provenance(self.calibration), *self.lost, *self._remarks()]
+        return "".join(f"{line}\n" for line in (*(f"# {line}" for line in head), *self._lines()))
 
-    def remarks(self) -> Iterable[str]:
+    def _remarks(self) -> Iterable[str]:
         """What a user has to know."""
-        raise NotImplementedError
+        yield f"(reading - TC - OFF) * SCALE, m/s^2, in the sensor's axes {self.frame.description}"
+        yield (
+            "CAL_ACC0_ID must be that of the sensor, which PX4's own calibration sets; "
+            "CAL_ACC0_ROT stays as it is"
+        )
+        if self._is_warmed:
+            yield "TC_A0_ID must be that of the sensor, too; TC_A_ENABLE takes a reboot"
+        yield "vehicle\tcomponent\tname\tvalue\ttype"
 
-    def lines(self) -> Iterable[str]:
+    def _lines(self) -> Iterable[str]:
         """Lines of the parameters."""
-        raise NotImplementedError
+        values: dict[str, float] = {}
+        for i, axis in enumerate("XYZ"):
+            values[f"CAL_ACC0_{axis}OFF"] = self.offsets[i, 0]
+            values[f"CAL_ACC0_{axis}SCALE"] = 1 / self.gains[i]
+        if self._is_warmed:
+            low, high = self.calibration.ranges[KNOWN["temperature"]]
+            values |= {"TC_A0_TREF": REFERENCE_TEMPERATURE, "TC_A0_TMIN": low, "TC_A0_TMAX": high}
+            for i, powers in enumerate(self.offsets):
+                values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
+            yield f"1\t1\tTC_A_ENABLE\t1\t{INTEGER}"
+        for name, value in sorted(values.items()):
+            # Readers of such files take a number without a point for an integer, or for none.
+            text = np.format_float_positional(
+                np.round(value, 15) + 0.0, 9, unique=False, fractional=False, trim="0"
+            )
+            yield f"1\t1\t{name}\t{text}\t{REAL}"
 
     def _terms(self, hold: HoldConditions) -> Array:
         """1 and the powers of the temperature, (n, k)."""
-        degree = DEGREE if self.warms and self._is_warmed else 0
+        degree = DEGREE if self._is_warmed else 0
         return np.vander(
             hold.column("temperature") - REFERENCE_TEMPERATURE, degree + 1, increasing=True
         )
@@ -107,7 +131,7 @@ class ParameterFile:
         return self._raw.from_si(self.frame.from_frd(output @ self._to_read.T))
 
     def _fitted(self, calibration: Calibration) -> tuple[Array, Array]:
-        """A (3, 3), and o (3, k) by powers of the temperature."""
+        """Gains (3,), and offsets (3, k) by powers of the temperature."""
         signs = np.array(list(product((1.0, -1.0), repeat=3)))
         ways = (signs[:, None] * evenly_spread(ATTITUDES)).reshape(-1, 3)
         forces, hold = in_use(
@@ -117,43 +141,41 @@ class ParameterFile:
         if not np.isfinite(readings).all():
             raise InputError(f"the model {calibration.model.name!r} has no inverse")
         felt, terms = self.frame.from_frd(forces), self._terms(hold)
-        a, o = np.zeros((3, 3)), np.zeros((3, terms.shape[1]))
+        found = np.empty((3, 1 + terms.shape[1]))
         for i in range(3):
-            of = [i] if self.axes else [0, 1, 2]
-            columns = np.column_stack([felt[:, of], terms])
+            columns = np.column_stack([felt[:, i], terms])
             size = np.linalg.norm(columns, axis=0)
-            found = np.linalg.lstsq(columns / size, readings[:, i], rcond=None)[0] / size
-            a[i, of], o[i] = np.split(found, [len(of)])
-        return a, o
+            found[i] = np.linalg.lstsq(columns / size, readings[:, i], rcond=None)[0] / size
+        return found[:, 0], found[:, 1:]
 
     def _loss(self, calibration: Calibration) -> tuple[Array, Array]:
-        """Rms and largest error, (2,), of roll and of pitch by what the form cannot hold, rad."""
-        a, o = self._fitted(calibration)
+        """Rms and largest error, (2,), of roll and of pitch by what PX4 cannot hold, rad."""
+        gains, offsets = self._fitted(calibration)
         cap = cap_forces(MAX_TILT_GON * GON, TILTED, calibration.gravity)
         forces, hold = in_use(calibration, cap, calibration.model.hold_columns)
-        linear = self._read(calibration, forces, hold) - self._terms(hold) @ o.T
-        corrected = self.frame.to_frd(np.linalg.solve(a, linear.T).T)
+        linear = self._read(calibration, forces, hold) - self._terms(hold) @ offsets.T
+        corrected = self.frame.to_frd(linear / gains)
         error = wrapped(angles_of(corrected) - angles_of(forces))
         return np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
 
     def _lost(self) -> Iterable[str]:
-        """Say what the form cannot hold, and what that does to roll and pitch."""
+        """Say what PX4 cannot hold, and what that does to roll and pitch."""
         rms, largest = self._loss(self.calibration)
         if largest.max() > SEEN:
             parts = [effect for effect, alone in self._alone() if self._loss(alone)[1].max() > SEEN]
             without = f" for {comma_list(parts)}" if parts else ""
             (roll, pitch), (most_roll, most_pitch) = rms / MGON, largest / MGON
             yield (
-                f"{self.program} has no place{without}; so roll is wrong by "
+                f"PX4 has no place{without}; so roll is wrong by "
                 f"{number(roll)} mgon and pitch by {number(pitch)} mgon (rms over tilts up to "
                 f"{MAX_TILT_GON:g} gon), at most by {number(most_roll)} and {number(most_pitch)} "
                 "mgon; --form c holds all"
             )
         for effect in self.calibration.model.effects:
             tau = effect.settings.get("tau") if effect.family == "temperature" else None
-            if self.warms and tau:
+            if tau:
                 yield (
-                    f"{self.program} has no lag behind a thermometer: {effect.name} with one of "
+                    f"PX4 has no lag behind a thermometer: {effect.name} with one of "
                     f"{tau:g} s is right at a settled temperature only"
                 )
 
@@ -171,70 +193,3 @@ class ParameterFile:
                 ),
             )
             first = last
-
-
-class PX4(ParameterFile):
-    """Parameters CAL_ACC0_* and TC_A0_* of PX4, in a file that QGroundControl loads.
-
-    PX4 corrects each axis by itself: (reading − TC − OFF) · SCALE, with TC = X1 ΔT + X2 ΔT² +
-    X3 ΔT³, ΔT = T − TREF (its Accelerometer::Correct and TemperatureCompensation).
-    """
-
-    program, axes, warms = "PX4", True, True
-
-    def remarks(self) -> Iterable[str]:
-        """What a user has to know."""
-        if self.unit != "m/s^2":
-            raise InputError(
-                f"PX4 takes readings in m/s^2, and this calibration is of readings in {self.unit}"
-            )
-        yield f"(reading - TC - OFF) * SCALE, m/s^2, in the sensor's axes {self.frame.description}"
-        yield (
-            "CAL_ACC0_ID must be that of the sensor, which PX4's own calibration sets; "
-            "CAL_ACC0_ROT stays as it is"
-        )
-        if self._is_warmed:
-            yield "TC_A0_ID must be that of the sensor, too; TC_A_ENABLE takes a reboot"
-        yield "vehicle\tcomponent\tname\tvalue\ttype"
-
-    def lines(self) -> Iterable[str]:
-        """Lines of the parameters."""
-        values: dict[str, float] = {}
-        for i, axis in enumerate("XYZ"):
-            values[f"CAL_ACC0_{axis}OFF"] = self.o[i, 0]
-            values[f"CAL_ACC0_{axis}SCALE"] = 1 / self.a[i, i]
-        if self._is_warmed:
-            low, high = self.calibration.ranges[KNOWN["temperature"]]
-            values |= {"TC_A0_TREF": REFERENCE_TEMPERATURE, "TC_A0_TMIN": low, "TC_A0_TMAX": high}
-            for i, powers in enumerate(self.o):
-                values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
-            yield f"1\t1\tTC_A_ENABLE\t1\t{INTEGER}"
-        for name, value in sorted(values.items()):
-            # Readers of such files take a number without a point for an integer, or for none.
-            text = np.format_float_positional(
-                np.round(value, 15) + 0.0, 9, unique=False, fractional=False, trim="0"
-            )
-            yield f"1\t1\t{name}\t{text}\t{REAL}"
-
-
-class ROS(ParameterFile):
-    """The file of calibration of the ROS package imu_calib: SM · reading − bias."""
-
-    program, axes, warms = "imu_calib", False, False
-
-    def remarks(self) -> Iterable[str]:
-        """What a user has to know."""
-        yield (
-            f"SM * reading - bias, with readings in {self.unit} and the result in m/s^2, both in "
-            f"the axes {self.frame.description}; calib_file of the node apply_calib"
-        )
-
-    def lines(self) -> Iterable[str]:
-        """Lines of the parameters."""
-        inverse = np.linalg.inv(self.a)
-        for name, values in (("SM", inverse.ravel()), ("bias", inverse @ self.o[:, 0])):
-            yield f"{name}: [{', '.join(f'{value:.12g}' for value in np.round(values, 15) + 0.0)}]"
-
-
-PROGRAMS: dict[str, type[ParameterFile]] = {"px4": PX4, "ros": ROS}
-"""Parameter files by their forms."""
