@@ -7,10 +7,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from accelstudy.api.calibrations import Calibration, calibrate
+    from accelstudy.api.calibrations import (
+        Calibration,
+        calibrate,
+        check_sigmas,
+        export,
+        read_calibration,
+    )
     from accelstudy.api.campaigns import find_holds, read_campaign, simulate_campaign
+    from accelstudy.api.catalogues import catalogue
     from accelstudy.api.diagnoses import Diagnosis, diagnose
+    from accelstudy.api.epochs import Comparison, History, compare, history
     from accelstudy.api.logs import Log, read_log
+    from accelstudy.api.lots import Lot, lot
     from accelstudy.api.plans import Plan, plan
     from accelstudy.api.simulations import Simulation, simulate
     from accelstudy.basics.errors import InputError
@@ -19,12 +28,45 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES = {
-    "api.calibrations": ("Calibration", "calibrate"),
-    "api.campaigns": ("find_holds", "read_campaign", "simulate_campaign"),
-    "api.diagnoses": ("Diagnosis", "diagnose"),
-    "api.logs": ("Log", "read_log"),
-    "api.plans": ("Plan", "plan"),
-    "api.simulations": ("Simulation", "simulate"),
+    "api.calibrations": (
+        "Calibration",
+        "calibrate",
+        "check_sigmas",
+        "export",
+        "read_calibration",
+    ),
+    "api.campaigns": (
+        "find_holds",
+        "read_campaign",
+        "simulate_campaign",
+    ),
+    "api.catalogues": ("catalogue",),
+    "api.diagnoses": (
+        "Diagnosis",
+        "diagnose",
+    ),
+    "api.epochs": (
+        "Comparison",
+        "History",
+        "compare",
+        "history",
+    ),
+    "api.logs": (
+        "Log",
+        "read_log",
+    ),
+    "api.lots": (
+        "Lot",
+        "lot",
+    ),
+    "api.plans": (
+        "Plan",
+        "plan",
+    ),
+    "api.simulations": (
+        "Simulation",
+        "simulate",
+    ),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
 }
@@ -33,15 +75,25 @@ _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [
     "Calibration",
     "Campaign",
+    "Comparison",
     "Diagnosis",
+    "History",
     "InputError",
     "Log",
+    "Lot",
     "Plan",
     "Simulation",
     "calibrate",
+    "catalogue",
+    "check_sigmas",
+    "compare",
     "diagnose",
+    "export",
     "find_holds",
+    "history",
+    "lot",
     "plan",
+    "read_calibration",
     "read_campaign",
     "read_log",
     "simulate",

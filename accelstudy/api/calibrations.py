@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from accelstudy.api.given import (
@@ -19,14 +19,23 @@ from accelstudy.api.given import (
     path_of,
     python_words,
     quantity,
+    whole,
 )
 from accelstudy.api.logs import log_of
-from accelstudy.approaches import get_approach
-from accelstudy.basics.units import Given
-from accelstudy.basics.wording import counted
-from accelstudy.campaign.calibration.applying import read_calibration
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import assessed_positions, json_text
+from accelstudy.api.results import Result
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.units import GON, Given
+from accelstudy.campaign.calibration import export as forms
+from accelstudy.campaign.calibration.applying import (
+    NO_CALIBRATION,
+    calibration_of,
+    read_calibration_content,
+)
+from accelstudy.campaign.calibration.assessment import assess, tilt_left
+from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
 from accelstudy.campaign.calibration.leveling import level_log
 from accelstudy.campaign.calibration.output import (
@@ -34,42 +43,65 @@ from accelstudy.campaign.calibration.output import (
     draw_residuals,
     write_calibration,
 )
+from accelstudy.campaign.calibration.sigma_check import check_sigmas as checked_sigmas
+from accelstudy.campaign.calibration.wording import parameter_lines
+from accelstudy.campaign.format import read_campaign as read_folder
+from accelstudy.campaign.of_type import with_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.drawing.style import FULL
-from accelstudy.files.outputs import CALIBRATION, result_folder
-from accelstudy.pages.notebook import notebook_html
+from accelstudy.files.outputs import CALIBRATION
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIGMA = Given("m/s^2", "", "Noise of a reading.")
+TILT = Given("rad", "", "Largest tilt.", 1e-3, np.pi / 2)
+REPLICATES = Range(2, 10**9)
+NINE = "bias-scale-nonorthogonality"
+"""Model by default."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Calibration:
+class Calibration(Result):
     """A calibration of a campaign.
 
     Attributes
     ----------
     content : mapping, that of calibration.json
-    fit : CampaignFit
+    fit : CampaignFit, the adjustment; None of a calibration that was read from a file
     """
 
-    content: Mapping[str, Any]
-    fit: CampaignFit
+    kind = CALIBRATION
 
-    def __repr__(self) -> str:
-        n = counted(self.content["n_positions"], "position")
-        return f"Calibration({self.content['campaign']!r}, {n}, {self.verdict})"
+    def __init__(self, content: Mapping[str, Any], fit: CampaignFit | None = None) -> None:
+        self._content, self.fit = content, fit
 
-    def _repr_html_(self) -> str:
-        return notebook_html("Calibration", self.content["quality"]["verdict"], self.parameters)
+    @property
+    def content(self) -> Mapping[str, Any]:
+        """Content of calibration.json."""
+        return self._content
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return str(self.content["campaign"])
+
+    @property
+    def state(self) -> str:
+        """State: accepted, rejected, cannot tell or implausible."""
+        return str(self.content["quality"]["state"])
 
     @property
     def verdict(self) -> str:
-        """State of the calibration: accepted, rejected, cannot tell or implausible."""
-        return str(self.content["quality"]["state"])
+        """Verdict in sentences."""
+        return str(self.content["quality"]["verdict"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What its user should know, of the campaign and of the calibration."""
+        return (*self.content["warnings"], *self.content["quality"]["warnings"])
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -77,8 +109,78 @@ class Calibration:
         rows = pd.DataFrame(self.content["parameters"])[["name", "value", "sigma", "unit"]]
         return rows.set_index("name")
 
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance matrix of the parameters, SI."""
+        return self._matrix("covariance")
+
+    @property
+    def correlation(self) -> pd.DataFrame:
+        """Correlation matrix of the parameters."""
+        return self._matrix("correlation")
+
+    def _matrix(self, key: str) -> pd.DataFrame:
+        names = self.parameters.index
+        values = np.array(self.content[key], dtype=float)  # None becomes NaN
+        return pd.DataFrame(values, index=names, columns=names)
+
     @for_programs
-    def apply(self, log: Any, *, sigma: float | str | None = None) -> pd.DataFrame:
+    def intervals(self, level: float = 0.95) -> pd.DataFrame:
+        """Return the interval of each parameter that holds it with a probability, SI.
+
+        It is that of the normal distribution where sigma was stated, and of Student's t with the
+        redundancy where it was estimated from the residuals.
+
+        Parameters
+        ----------
+        level : float, between 0 and 1
+
+        Returns
+        -------
+        DataFrame
+            Columns low, high and unit.
+        """
+        from scipy import stats
+
+        of_type("level", level, float, expected="a probability between 0 and 1")
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
+        known = self.content["sigma_source"] == "a priori"
+        freedom = np.inf if known else self.content["redundancy"]
+        half = stats.t.ppf((1 + level) / 2, freedom) * self.parameters["sigma"]
+        value, unit = self.parameters["value"], self.parameters["unit"]
+        return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """Residuals, tests and reliability of each position, as positions.parquet has them."""
+        return assessed_positions(assess(self._fitted("residuals")))
+
+    @for_programs
+    def tilt_error(self, tilt_range: float | str = MAX_TILT_GON * GON) -> pd.Series:
+        """Return the rms tilt error that the calibration leaves, rad, of roll and of pitch.
+
+        It comes from the uncertainty of the parameters and from what the residuals show that the
+        model lacks, over all attitudes up to a tilt, without the noise of a reading.
+
+        Parameters
+        ----------
+        tilt_range : float in rad or str with a unit, largest tilt
+        """
+        left = tilt_left(self._fitted("tilt_error"), quantity("tilt_range", tilt_range, TILT))
+        return pd.Series(left, index=["roll", "pitch"], name="tilt_error_rad")
+
+    def _fitted(self, what: str) -> CampaignFit:
+        if self.fit is None:
+            raise InputError(
+                f"{what}: a calibration that was read from a file has none; calibrate its campaign"
+            )
+        return self.fit
+
+    @for_programs
+    def apply(
+        self, log: Any, *, sigma: float | str | None = None, start: float | None = None
+    ) -> pd.DataFrame:
         """Level a log.
 
         Parameters
@@ -86,6 +188,8 @@ class Calibration:
         log : Log, or what `read_log` takes
         sigma : float in m/s² or str with a unit, of a reading; as within the holds of the campaign
             if omitted
+        start : float, s from the start of the calibration session to the first row, where effects
+            depend on it; 0 if omitted
 
         Returns
         -------
@@ -96,52 +200,178 @@ class Calibration:
         log = log_of(log)
         reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
         with TemporaryDirectory(prefix=IN_MEMORY) as folder:
-            kept, out = Path(folder) / "calibration.json", Path(folder) / "leveled.parquet"
-            kept.write_text(json_text(dict(self.content)), encoding="utf-8")
-            leveled = level_log(read_calibration(kept), log.path, out, log.layout, reading)
+            out = Path(folder) / "leveled.parquet"
+            sensor = calibration_of(self.content)
+            leveled = level_log(sensor, log.path, out, log.layout, reading, start)
             table = pd.read_parquet(out)
         table.attrs["warnings"] = list(map(python_words, leveled.warnings))
         return table
 
     @for_programs
-    def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
-        """Write what ``accelstudy calibrate`` writes into a folder."""
-        path = path_of("folder", folder)
-        with result_folder(path, CALIBRATION, force=force) as part:
-            write_calibration(self.fit, part, place=path)
-            (part / "calibration.json").write_text(json_text(dict(self.content)), encoding="utf-8")
+    def export(self, form: str = "json") -> str:
+        """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
+        return forms.export(calibration_of(self.content).content, form)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the parameters, as `parameters`."""
+        return self.parameters
+
+    def _table(self) -> str:
+        """Parameters with sigmas in the units that people read, then what the user should know."""
+        lines = [*parameter_lines(self.content), *(f"warning: {one}" for one in self.warnings)]
+        return "\n".join(lines)
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
+        if self.fit is not None:
+            write_calibration(self.fit, folder, place=place)
+        # That of a diagnosis knows of what was mended.
+        write_json(folder / "calibration.json", dict(self.content))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw |f| − g of each position, mm/s²."""
+        fit = self._fitted("plot")
         with drawing(ax, FULL, 62) as ax:
-            draw_residuals(ax, self.fit, assessed_positions(assess(self.fit)))
+            draw_residuals(ax, fit, self.residuals)
         return ax
 
 
 @for_programs
+def read_calibration(path: str | PathLike[str]) -> Calibration:
+    """Read a calibration.json.
+
+    Parameters
+    ----------
+    path : path of the file, or of the folder that has it
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not a calibration.
+    """
+    file = path_of("path", path)
+    file = file / "calibration.json" if file.is_dir() else file
+    content = read_calibration_content(file)
+    calibration_of(content, f"{file}: {NO_CALIBRATION}")
+    return Calibration({"warnings": [], **content})
+
+
+@for_programs
 def calibrate(
-    campaign: Campaign,
+    campaign: Campaign | str | PathLike[str],
     *,
-    model: str = "bias-scale-nonorthogonality",
+    model: str = NINE,
     approach: str | None = None,
+    prior: str | PathLike[str] | None = None,
 ) -> Calibration:
     """Calibrate a campaign.
 
     Parameters
     ----------
-    campaign : Campaign
+    campaign : Campaign, or the path of its folder
     model : str, a name, a composition, or the path of a YAML file
     approach : str, optional, "gravity" or "robot"; with the robot, if the campaign has its angles
+    prior : path, optional
+        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
 
     Raises
     ------
     InputError
         If the campaign does not determine the model, or a name is unknown.
     """
-    of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns")
+    return calibrated(*asked(campaign, model, approach, prior))
+
+
+def calibrated(campaign: Campaign, model: SensorModel, approach: Approach | None) -> Calibration:
+    """Calibrate a campaign with a model by an approach, and assess it."""
+    fit = fit_campaign(campaign, model, approach)
+    return Calibration(calibration_content(fit, assess(fit)), fit)
+
+
+@for_programs
+def check_sigmas(
+    campaign: Campaign | str | PathLike[str],
+    *,
+    model: str = NINE,
+    approach: str | None = None,
+    replicates: int = 2000,
+    seed: int = 1,
+) -> pd.DataFrame:
+    """Check the sigmas of a calibration by simulation.
+
+    The campaign is simulated with the noise that its sigmas are from. So the check finds whether
+    the adjustment turns that noise into the right sigmas, and not whether the noise is right.
+
+    Parameters
+    ----------
+    campaign, model, approach : as in `calibrate`
+    replicates : int, simulated campaigns
+    seed : int
+
+    Returns
+    -------
+    DataFrame
+        A row per parameter, in the units that people read: parameter, unit, estimate, sigma (as the
+        adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
+        sd_empirical) and n_converged.
+    """
+    fit = fit_campaign(*asked(campaign, model, approach))
+    return checked_sigmas(
+        fit, whole("replicates", replicates, REPLICATES), whole("seed", seed, bounds.SEED)
+    )
+
+
+def export(calibration: Calibration | str | PathLike[str], *, form: str = "json") -> str:
+    """Return a calibration in a form that a device takes.
+
+    Parameters
+    ----------
+    calibration : Calibration, or the path of a calibration.json
+    form : str, "json", "yaml", "c", "matrix" or "px4"
+
+    Returns
+    -------
+    str
+        Text of a file.
+    """
+    return given_calibration(calibration).export(form)
+
+
+# --- what is given ------------------------------------------------------------------------------
+
+
+def given_calibration(calibration: Any, name: str = "calibration") -> Calibration:
+    """Return a calibration that is given as one, or as a path."""
+    if isinstance(calibration, str | PathLike):
+        return read_calibration(calibration)
+    if not isinstance(calibration, Calibration):
+        raise InputError(
+            f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
+            f"{shown(calibration)}"
+        )
+    return calibration
+
+
+def given_campaign(campaign: Any, plausible: bool = True) -> Campaign:
+    """Return a campaign that is given as one, or as the path of its folder."""
+    if isinstance(campaign, str | PathLike):
+        return read_folder(path_of("campaign", campaign), plausible=plausible)
+    of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path")
+    return campaign
+
+
+def asked(
+    campaign: Any, model: Any, approach: Any, prior: Any = None, plausible: bool = True
+) -> tuple[Campaign, SensorModel, Approach | None]:
+    """Campaign, model and approach by what a program gives."""
+    measured = given_campaign(campaign, plausible)
     of_type("model", model, str, expected="the name of a model")
     if approach is not None:
         of_type("approach", approach, str, expected="the name of an approach")
-    chosen = None if approach is None else get_approach(approach)
-    fit = fit_campaign(campaign, get_model(model), chosen)
-    return Calibration(calibration_content(fit, assess(fit)), fit)
+    chosen = get_model(model)
+    of_sensors = None if prior is None else path_of("prior", prior)
+    return (
+        with_type(measured, of_sensors, chosen),
+        chosen,
+        None if approach is None else get_approach(approach),
+    )

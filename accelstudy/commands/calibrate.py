@@ -37,34 +37,31 @@ def calibrate_command(
     programs, positions.parquet and figures. Parameters are in the axes frd (forward, right, down),
     whatever those of the log are.
     """
-    from accelstudy.approaches import get_approach
-    from accelstudy.basics.units import display_unit
-    from accelstudy.basics.wording import estimate
+    from accelstudy.api.calibrations import asked
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
-    from accelstudy.campaign.calibration.wording import approach_words, interval_words, next_steps
-    from accelstudy.campaign.format import read_campaign
-    from accelstudy.campaign.of_type import with_type
+    from accelstudy.campaign.calibration.wording import (
+        approach_words,
+        interval_words,
+        next_steps,
+        parameter_lines,
+    )
     from accelstudy.files.outputs import CALIBRATION, result_folder
     from accelstudy.sensors.frames import axes_note
-    from accelstudy.sensors.models import get_model
 
-    chosen = get_model(model), None if approach is None else get_approach(approach)
     inputs = [campaign] if prior is None else [campaign, prior]
     with result_folder(out, CALIBRATION, inputs, force) as folder, stage("calibration"):
-        measured = with_type(read_campaign(campaign), prior, chosen[0])
-        fit = fit_campaign(measured, *chosen)
+        fit = fit_campaign(*asked(campaign, model, approach, prior))
         content = write_calibration(fit, folder, campaign, out)
-    for warning in measured.warnings:
+    for warning in fit.campaign.warnings:
         warn(warning)
-    for entry in content["parameters"]:
-        value, sigma = estimate(entry["value"], entry["sigma"], entry["unit"])
-        say(f"{entry['name']:>9} = {value:>12} ± {sigma} {display_unit(entry['unit'])}")
+    for line in parameter_lines(content):
+        say(line)
     if content["sigmas_95"] is not None:
         say(f"±: {interval_words(fit)}")
     quality = content["quality"]
     say(approach_words(fit))
-    say(axes_note(None if measured.log is None else measured.log.frame))
+    say(axes_note(None if fit.campaign.log is None else fit.campaign.log.frame))
     click.echo(f"{quality['state'].upper()}: {quality['verdict']}")
     what, command = next_steps(fit, quality["state"], campaign, out / "calibration.json")[0]
     say(f"{what}: {command}")

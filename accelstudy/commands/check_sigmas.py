@@ -43,14 +43,11 @@ def check_sigmas_command(
     its sigmas are from. So the check finds whether the adjustment turns that noise into the right
     sigmas, and not whether the noise is right.
     """
-    from accelstudy.approaches import get_approach
+    from accelstudy.api.calibrations import asked
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
-    from accelstudy.campaign.format import read_campaign
-    from accelstudy.sensors.models import get_model
 
-    named = None if approach is None else get_approach(approach)
-    fit = fit_campaign(read_campaign(campaign), get_model(model), named)
+    fit = fit_campaign(*asked(campaign, model, approach))
     table = check_sigmas(fit, replicates, seed)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")

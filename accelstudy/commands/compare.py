@@ -44,13 +44,11 @@ def compare_command(first: Path, second: Path, out: Path, tilt_range: float, for
 
     The folder of results gets report.html, comparison.json and a figure.
     """
-    from accelstudy.campaign.calibration.applying import read_calibration
-    from accelstudy.epochs.comparison import compare
-    from accelstudy.epochs.output import write_comparison
+    from accelstudy import compare
     from accelstudy.files.outputs import COMPARISON, result_folder
 
     with result_folder(out, COMPARISON, [first, second], force) as folder, stage("comparison"):
-        comparison = compare(read_calibration(first), read_calibration(second), tilt_range)
-        content = write_comparison(comparison, folder)
-    click.echo(f"{content['state'].upper()}: {content['verdict']}")
+        comparison = compare(first, second, tilt_range=tilt_range)
+        comparison.write(folder, out)
+    click.echo(f"{comparison.state.upper()}: {comparison.verdict}")
     say(f"report: {out / 'report.html'}")

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from datetime import datetime
 from pathlib import Path
 
 import click
 
-from accelstudy.basics.dates import read_date
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, stage
-from accelstudy.basics.wording import counted
 from accelstudy.commands.options import (
     PATH,
     Quantity,
@@ -21,7 +17,6 @@ from accelstudy.commands.options import (
     given_once,
     quiet_option,
 )
-from accelstudy.commands.plan import Confidence
 
 
 @click.command(
@@ -54,7 +49,6 @@ from accelstudy.commands.plan import Confidence
 )
 @click.option(
     "--confidence",
-    type=Confidence(),
     default="95%",
     show_default=True,
     help="Probability with which it stays so.",
@@ -68,7 +62,7 @@ def history_command(
     out: Path,
     tilt_accuracy: float | None,
     tilt_range: float,
-    confidence: float | None,
+    confidence: str,
     force: bool,
 ) -> None:
     """Say how a sensor changes over time.
@@ -83,47 +77,18 @@ def history_command(
 
     The folder of results gets report.html, history.json, history.parquet and a figure.
     """
-    from accelstudy.campaign.calibration.applying import read_calibration
-    from accelstudy.epochs.history import history_of
-    from accelstudy.epochs.history_output import write_history
-    from accelstudy.epochs.interval import Interval
+    from accelstudy import history
     from accelstudy.files.outputs import HISTORY, result_folder
 
     given_once(calibrations, "calibration")
-    if dates and len(dates) != len(calibrations):
-        raise InputError(
-            f"--date: {counted(len(dates), 'date')} for "
-            f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
-            "--date 2026-03-01"
-        )
-    if confidence is None:
-        raise InputError("--confidence: a probability, such as 95%, not rms")
     with result_folder(out, HISTORY, calibrations, force) as folder, stage("history"):
-        read = [read_calibration(path) for path in calibrations]
-        first: dict[bytes, Path] = {}
-        for path, one in zip(calibrations, read, strict=True):
-            # Noise never repeats: the same numbers are one campaign, whatever the file is called.
-            if (same := first.setdefault(one.parameters.tobytes(), path)) != path:
-                raise InputError(f"{path}: has the numbers of {same}; each campaign counts once")
-        given = dates or [one.content["date"] for one in read]
-        wheres = ["--date"] * len(dates) or [f"{path}: date" for path in calibrations]
-        when = [_date(text, where) for text, where in zip(given, wheres, strict=True)]
-        history = history_of(read, when)
-        interval = None
-        if tilt_accuracy is not None:
-            interval = Interval(history, tilt_accuracy, tilt_range, confidence)
-        content = write_history(history, folder, interval)
-    click.echo(f"{content['state'].upper()}: {content['verdict']}")
-    say(f"report: {out / 'report.html'}")
-
-
-def _date(text: str | None, where: str) -> datetime:
-    if text is None:
-        raise InputError(
-            f"{where}: missing; give --date for each calibration, or calibrate again with `date` "
-            "in the header of the campaign"
+        found = history(
+            calibrations,
+            dates=dates,
+            tilt_accuracy=tilt_accuracy,
+            tilt_range=tilt_range,
+            confidence=confidence,
         )
-    try:
-        return read_date(text)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        found.write(folder, out)
+    click.echo(f"{found.state.upper()}: {found.verdict}")
+    say(f"report: {out / 'report.html'}")

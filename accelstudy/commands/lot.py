@@ -59,21 +59,15 @@ def lot_command(
     with all that the model lacks, and type.yaml: the model of the type for `--model`, what these
     sensors tell of the next one for `--prior`, and a data sheet for `plan --sensor`.
     """
-    from accelstudy.approaches import get_approach
-    from accelstudy.campaign.format import read_campaign
+    from accelstudy import lot
     from accelstudy.files.outputs import LOT, result_folder
-    from accelstudy.lots.run import FEWEST, evaluate_lot
-    from accelstudy.sensors.models import get_model
 
     folders = [path for given in campaigns for path in _folders(given)]
-    if len(folders) < FEWEST:
-        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
     given_once(folders, "sensor")
-    chosen = get_model(model), None if approach is None else get_approach(approach)
     with result_folder(out, LOT, folders, force) as results:
-        measured = [read_campaign(folder) for folder in folders]
-        content = evaluate_lot(measured, results, *chosen, seed, cores, out)
-    click.echo(content["verdict"])
+        found = lot(folders, model=model, approach=approach, seed=seed, cores=cores)
+        found.write(results, out)
+    click.echo(found.verdict)
     say(f"report: {out / 'report.html'}")
 
 

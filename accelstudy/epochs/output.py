@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -123,6 +124,19 @@ def write_comparison(comparison: Comparison, folder: str | Path) -> dict[str, An
     )
     write_json(folder / "comparison.json", content)
     return content
+
+
+def draw_changes(ax: Axes, comparison: Comparison) -> None:
+    """Draw the change of each parameter over its sigma, with the interval that holds 95 %."""
+    c = comparison
+    change = c.epochs.differences / np.sqrt(np.diag(c.epochs.covariance))
+    ax.axhline(0, color=INK, linewidth=0.8)
+    for i, parameter in enumerate(c.parameters):
+        colour = group_colour(group_of(parameter.name))
+        filled = colour if i in c.changed else "white"
+        ax.errorbar(i, change[i], 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
+    ax.set_xticks(range(len(c.parameters)), [symbol(p.name) for p in c.parameters])
+    ax.set(ylabel="change / sigma")
 
 
 def changes_figure(comparison: Comparison) -> Figure:

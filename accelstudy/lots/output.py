@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -35,7 +38,7 @@ from accelstudy.drawing.style import (
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import Lot
-from accelstudy.lots.passes import LEVEL, Found
+from accelstudy.lots.passes import LEVEL, Found, Size
 from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
 
@@ -135,37 +138,49 @@ def lot_document(
     }  # fmt: skip
 
 
-def write_lot(
-    lot: Lot,
-    found: Sequence[Found],
-    fits: Sequence[CampaignFit | InputError],
-    tilt: Array | None,
-    approach: Approach,
-    folder: str | Path,
-    place: str | Path,
-    left_out: Mapping[str, str],
-) -> dict[str, Any]:
-    """Write lot.json, type.yaml, report.html, the figure, and a calibration of each sensor.
+@dataclass(frozen=True, eq=False)
+class LotReport:
+    """All that is told of a lot.
 
-    Parameters
+    Attributes
     ----------
     lot : Lot
     found : of `with_sizes`
     fits : of `calibrations`
     tilt : of `worth`, rad; None where nothing of the catalogue is missing
     approach : Approach, of the first campaign
+    left_out : as in `lot_document`
+    """
+
+    lot: Lot
+    found: Sequence[Found]
+    fits: Sequence[CampaignFit | InputError]
+    tilt: Array | None
+    approach: Approach
+    left_out: Mapping[str, str]
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of lot.json."""
+        failed = [str(fit) if isinstance(fit, InputError) else None for fit in self.fits]
+        return lot_document(self.lot, self.found, failed, self.tilt, self.left_out)
+
+    @property
+    def state(self) -> str:
+        """State in a word, as the badge of the page has it."""
+        return "no_effect" if not self.lot.missing else "named" if self.found else "unknown"
+
+
+def write_lot(report: LotReport, folder: str | Path, place: str | Path) -> None:
+    """Write lot.json, type.yaml, report.html, the figure, and a calibration of each sensor.
+
+    Parameters
+    ----------
+    report : LotReport
     folder : path, to write to
     place : path of the results, for the commands that the page gives
-    left_out : as in `lot_document`
-
-    Returns
-    -------
-    dict
-        The content of lot.json.
     """
-    folder = Path(folder)
-    failed = [str(fit) if isinstance(fit, InputError) else None for fit in fits]
-    content = lot_document(lot, found, failed, tilt, left_out)
+    folder, lot, found, fits = Path(folder), report.lot, report.found, report.fits
     for i, fit in enumerate(fits, start=1):
         if isinstance(fit, CampaignFit):
             its_own = folder / EACH / f"{i:04d}-{path_name(fit.campaign.name, 'sensor')}"
@@ -174,26 +189,24 @@ def write_lot(
     steps = []
     if write_type(lot, fits, folder):
         of_type = Path(place) / TYPE_FILE
-        command = suggested.calibrate("CAMPAIGN", of_type, approach.name, of_type)
+        command = suggested.calibrate("CAMPAIGN", of_type, report.approach.name, of_type)
         steps.append(("Calibrate the next sensor of the type, with what these tell", command))
     drawn = save_all({"sensors": lambda: sensors_figure(lot, found)}, folder / "figures")
-    sentences = said(lot, found, tilt)
-    state = "no_effect" if not lot.missing else "named" if found else "unknown"
+    sentences = said(lot, found, report.tilt)
     write_page(
         folder / "report.html",
         "lots/report.html.j2",
         " ".join(sentences),
-        doc=content,
-        state=state,
+        doc=report.content,
+        state=report.state,
         lines=sentences,
         shown=shown,
         figures=drawn,
         next_steps=steps,
     )
     files = (path for path in folder.rglob("*") if path.is_file())
-    content["files"] = sorted(path.relative_to(folder).as_posix() for path in files)
-    write_json(folder / "lot.json", content)
-    return content
+    names = sorted(path.relative_to(folder).as_posix() for path in files)
+    write_json(folder / "lot.json", {**report.content, "files": names})
 
 
 def sensors_figure(lot: Lot, found: Sequence[Found]) -> Figure:
@@ -203,21 +216,35 @@ def sensors_figure(lot: Lot, found: Sequence[Found]) -> Figure:
     panels = figure.subplots(max(len(sizes), 1), 1, sharex=True, squeeze=False)[:, 0]
     if not sizes:
         say_empty(panels[0], "nothing of the catalogue was found")
-    odd = {o.campaign for o in lot.odd}
-    strange = np.array([each.campaign in odd for each in lot.sensors])
-    places = np.arange(1, len(lot.sensors) + 1)
     for ax, size in zip(panels, sizes, strict=False):
-        colour = group_colour(group_of(size.name))
-        each, sigma, mean, scatter = (
-            to_display(x, size.unit) for x in (size.each, size.sigma_each, size.mean, size.scatter)
-        )
-        ax.axhspan(mean - 2 * scatter, mean + 2 * scatter, color=MISSING)
-        ax.axhline(mean, color=colour, linewidth=0.8)
-        ax.axhline(0, color=INK, linewidth=0.8)
-        ax.errorbar(places, each, 1.96 * sigma, fmt="o", color=colour, capsize=2)
-        ax.plot(places[strange], each[strange], "o", markersize=9, markerfacecolor="none",
-                color=SUSPECT)  # fmt: skip
-        ax.set_ylabel(f"{symbol(size.name)} / ({shown_unit(size.unit)})")
+        _draw_size(ax, lot, size)
     panels[-1].set_xlabel("sensor")
     figure.suptitle("Each sensor with its 95 % interval; band: the type, ± 2 scatter; circle: odd")
     return figure
+
+
+def draw_sensors(ax: Axes, lot: Lot, found: Sequence[Found]) -> None:
+    """Draw the first parameter that `sensors_figure` shows."""
+    size = next((size for f in found for size in f.sizes), None)
+    if size is None:
+        say_empty(ax, "nothing of the catalogue was found")
+    else:
+        _draw_size(ax, lot, size)
+    ax.set_xlabel("sensor")
+
+
+def _draw_size(ax: Axes, lot: Lot, size: Size) -> None:
+    """Draw a parameter of each sensor with its interval, the type as a band, and odd sensors."""
+    odd = {o.campaign for o in lot.odd}
+    strange = np.array([each.campaign in odd for each in lot.sensors])
+    places = np.arange(1, len(lot.sensors) + 1)
+    colour = group_colour(group_of(size.name))
+    each, sigma = (to_display(x, size.unit) for x in (size.each, size.sigma_each))
+    mean, scatter = (float(to_display(x, size.unit)) for x in (size.mean, size.scatter))
+    ax.axhspan(mean - 2 * scatter, mean + 2 * scatter, color=MISSING)
+    ax.axhline(mean, color=colour, linewidth=0.8)
+    ax.axhline(0, color=INK, linewidth=0.8)
+    ax.errorbar(places, each, 1.96 * sigma, fmt="o", color=colour, capsize=2)
+    ax.plot(places[strange], each[strange], "o", markersize=9, markerfacecolor="none",
+            color=SUSPECT)  # fmt: skip
+    ax.set_ylabel(f"{symbol(size.name)} / ({shown_unit(size.unit)})")

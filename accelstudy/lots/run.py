@@ -36,7 +36,7 @@ from accelstudy.leveling.error import (
     tilt_error,
 )
 from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
-from accelstudy.lots.output import write_lot
+from accelstudy.lots.output import LotReport, write_lot
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -48,29 +48,20 @@ FEWEST = 2
 
 def evaluate_lot(
     campaigns: Sequence[Campaign],
-    folder: str | Path,
     model: SensorModel,
     approach: Approach | None = None,
     seed: int = 1,
     cores: int = 1,
-    place: str | Path = "",
     left_out: Mapping[str, str] | None = None,
-) -> dict[str, Any]:
-    """Say what the model of sensors of one type lacks, calibrate each of them, and write all of it.
+) -> LotReport:
+    """Say what the model of sensors of one type lacks, and calibrate each of them.
 
     Parameters
     ----------
     campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
         numbers behind it, and those of one log count once
-    folder : path, to write to
-    place : path of the results, for the commands that the page gives
     left_out : mapping of campaigns that could not be read to what is wrong with them; what cannot
         be judged by itself, as it leaves no redundancy, is left out as well
-
-    Returns
-    -------
-    dict
-        The content of lot.json.
 
     Raises
     ------
@@ -102,14 +93,12 @@ def evaluate_lot(
     fits = calibrations(lot, usable, approach)
     found = with_sizes(lot, fits, model)
     named = any(spec is not None for _, spec in lot.effects)
-    return write_lot(
+    return LotReport(
         lot,
         found,
         fits,
         worth(lot.usual(fits), model) if named else None,
         approach or usual_approach(usable[0]),
-        folder,
-        place,
         without,
     )
 
@@ -153,7 +142,9 @@ def run_lot(
     model = get_model(settings.model or batch.model)
     approach = None if settings.approach is None else get_approach(settings.approach)
     with result_folder(out, LOT) as new:
-        return evaluate_lot(campaigns, new, model, approach, settings.seed, cores, out, unread)
+        report = evaluate_lot(campaigns, model, approach, settings.seed, cores, unread)
+        write_lot(report, new, out)
+    return report.content
 
 
 def worth(fits: Sequence[CampaignFit], model: SensorModel) -> Array | None:

@@ -3,13 +3,13 @@ import accelstudy as acs
 log = acs.read_log("imu.csv", rate=100, columns={"fx": "ax", "fy": "ay", "fz": "az"})
 campaign = acs.find_holds(log, gravity=9.80795)
 calibration = acs.calibrate(campaign)
-print(calibration.verdict, calibration.parameters, sep="\n")
+print(calibration.state, calibration.parameters, sep="\n")
 leveled = calibration.apply(log)
 calibration.save("calibrated")
 calibration.plot()
 
 diagnosis = acs.diagnose(campaign)
-print(diagnosis.verdict, diagnosis.explanations, diagnosis.calibration, sep="\n")
+print(diagnosis.state, diagnosis.explanations, diagnosis.calibration, sep="\n")
 diagnosis.plot()
 
 plan = acs.plan(tilt_accuracy="10 mgon", sigma="2 mm/s^2")

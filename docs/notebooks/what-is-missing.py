@@ -32,7 +32,7 @@ campaign
 
 # %%
 calibration = acs.calibrate(campaign, approach="robot")
-print(calibration.verdict)
+print(calibration.state)
 ax = calibration.plot()
 
 # %% [markdown]
@@ -56,7 +56,7 @@ ax = diagnosis.plot()
 
 # %%
 mended = diagnosis.calibration
-print(mended.verdict)
+print(mended.state)
 ax = mended.plot()
 
 # %% [markdown]

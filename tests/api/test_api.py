@@ -200,7 +200,7 @@ def test_what_reading_refuses_is_diagnosed(tmp_path):
     write_campaign(given, tmp_path, plausible=False)
     with pytest.raises(acs.InputError, match="looks like g"):
         acs.read_campaign(tmp_path)
-    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).verdict == "gross_error"
+    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
 
 
 WRONG = {

@@ -24,7 +24,7 @@ def ran(tmp_path_factory):
 
 def test_a_first_calibration_finds_the_errors(ran):
     names = ran["first-calibration"]
-    assert names["calibration"].verdict == "accepted"
+    assert names["calibration"].state == "accepted"
     found = names["found"]
     assert (abs(found["value"] - names["truth"]) < 4 * found["sigma"]).all()
     assert {"roll_gon", "pitch_gon"} <= set(names["leveled"])
@@ -32,9 +32,9 @@ def test_a_first_calibration_finds_the_errors(ran):
 
 def test_what_is_missing_is_found(ran):
     names = ran["what-is-missing"]
-    assert names["calibration"].verdict == "rejected"
+    assert names["calibration"].state == "rejected"
     assert names["diagnosis"].explanations["explanation"].tolist() == ["thermal_bias"]
-    assert names["mended"].verdict == "accepted"
+    assert names["mended"].state == "accepted"
     usual, mended = names["calibration"].parameters, names["mended"].parameters
     assert list(mended.index[len(usual) :]) == ["b_T_x", "b_T_y", "b_T_z"]
     off = abs(usual["value"] - mended["value"][usual.index]) / mended["sigma"][usual.index]

@@ -276,12 +276,16 @@ def read_calibration(path: str | Path) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
+    return calibration_of(read_calibration_content(path), f"{path}: {NO_CALIBRATION}")
+
+
+def read_calibration_content(path: str | Path) -> Any:
+    """Read all that `calibration.json` holds, without a check."""
     with readable(path):
         is_folder = Path(path).is_dir()
     if is_folder:
         raise InputError(f"{path}: a folder; give the calibration.json in it")
-    content = read_json(path, NO_CALIBRATION)
-    return calibration_of(content, f"{path}: {NO_CALIBRATION}")
+    return read_json(path, NO_CALIBRATION)
 
 
 def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:

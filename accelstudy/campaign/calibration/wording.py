@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from accelstudy.basics import suggested
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
-from accelstudy.basics.units import GON
+from accelstudy.basics.units import GON, display_unit
+from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.importing.resolution import steps_text
@@ -18,6 +21,15 @@ from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 ANGLES = {"nonorthogonality", "cross_axis_misalignment"}
 """Effects that a model has unless it takes the axes to be at right angles."""
+
+
+def parameter_lines(content: Mapping[str, Any]) -> list[str]:
+    """Return each parameter of calibration.json with its sigma, in the units that people read."""
+    shown = []
+    for entry in content["parameters"]:
+        value, sigma = estimate(entry["value"], entry["sigma"], entry["unit"])
+        shown.append(f"{entry['name']:>9} = {value:>12} ± {sigma} {display_unit(entry['unit'])}")
+    return shown
 
 
 def verdict_lines(assessment: Assessment) -> list[str]:

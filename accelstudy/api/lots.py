@@ -1,0 +1,138 @@
+"""Sensors of one type together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from accelstudy.api.calibrations import NINE, Calibration, asked, given_campaign
+from accelstudy.api.given import drawing, for_programs, whole
+from accelstudy.api.results import Result
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError
+from accelstudy.campaign.calibration.assessment import assess
+from accelstudy.campaign.calibration.output import calibration_content
+from accelstudy.campaign.session import Campaign
+from accelstudy.drawing.style import FULL
+from accelstudy.files.outputs import LOT
+from accelstudy.lots.output import LotReport, draw_sensors, write_lot
+from accelstudy.lots.run import FEWEST, evaluate_lot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CORES = Range(1, 10_000)
+
+
+class Lot(Result):
+    """What the model of sensors of one type lacks, and a calibration of each of them.
+
+    Attributes
+    ----------
+    report : accelstudy.lots.output.LotReport, all of it
+    """
+
+    kind = LOT
+
+    def __init__(self, report: LotReport) -> None:
+        self.report = report
+
+    @property
+    def name(self) -> str:
+        """How many sensors it has."""
+        return f"{self.content['sensors']} sensors"
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Content of lot.json."""
+        return self.report.content
+
+    @property
+    def state(self) -> str:
+        """One of no_effect, named, unknown."""
+        return self.report.state
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """Parameters that the model lacks: mean and scatter over the sensors that have them."""
+        rows = [
+            {"effect": " or ".join(one["names"]), "share": one["share"], **size}
+            for one in self.content["effects"]
+            for size in one["parameters"]
+        ]
+        columns = ["effect", "share", "name", "mean", "scatter", "sigma", "unit"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return for each sensor which effects its model lacks, and their posterior probability."""
+        odd = {one["campaign"] for one in self.content["odd"]}
+        rows = [
+            {
+                "campaign": one["campaign"],
+                "effects": ", ".join(one["names"]),
+                "posterior": one["posterior"],
+                "odd": one["campaign"] in odd,
+                "failed": one["failed"],
+            }
+            for one in self.content["each"]
+        ]
+        return pd.DataFrame(rows).set_index("campaign")
+
+    @property
+    def calibrations(self) -> dict[str, Calibration]:
+        """Calibration of each sensor with all that the model lacks, by its campaign."""
+        return {
+            fit.campaign.name: Calibration(calibration_content(fit, assess(fit)), fit)
+            for fit in self.report.fits
+            if not isinstance(fit, InputError)
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw what each sensor has of the first parameter that the model lacks."""
+        with drawing(ax, FULL, 62) as ax:
+            draw_sensors(ax, self.report.lot, self.report.found)
+        return ax
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy lot` does."""
+        write_lot(self.report, folder, place)
+
+
+@for_programs
+def lot(
+    campaigns: Sequence[Campaign | str | PathLike[str]],
+    *,
+    model: str = NINE,
+    approach: str | None = None,
+    seed: int = 1,
+    cores: int = 1,
+) -> Lot:
+    """Say what the model of sensors of one type lacks.
+
+    What one campaign alone cannot show, many show together: whether anything is missing in the
+    lot, at one level for all, in how many of the sensors, how large it is, and which one is odd.
+
+    Parameters
+    ----------
+    campaigns : two or more of Campaign, or paths of folders, one per sensor
+    model : str, as in `calibrate`
+    approach : str, optional; with the robot, where a campaign has its angles
+    seed : int
+    cores : int, processes that work at once; results do not depend on it
+
+    Raises
+    ------
+    InputError
+        If fewer than two campaigns can be judged, or a name is unknown.
+    """
+    if len(campaigns) < FEWEST:
+        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+    measured = [given_campaign(one) for one in campaigns]
+    _, of_type, chosen = asked(measured[0], model, approach)
+    numbers = whole("seed", seed, bounds.SEED), whole("cores", cores, CORES)
+    return Lot(evaluate_lot(measured, of_type, chosen, *numbers))

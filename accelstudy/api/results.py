@@ -1,0 +1,91 @@
+"""What the results of all functions for programs have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from accelstudy.api.given import for_programs, path_of
+from accelstudy.files.outputs import Kind, result_folder
+from accelstudy.pages.notebook import notebook_html
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+class Result(ABC):
+    """What a function found: its state in a word, a verdict in sentences, a table and a figure.
+
+    Results are equal to themselves alone. `save` writes what the command of the same name does.
+    """
+
+    kind: ClassVar[Kind]
+
+    @property
+    @abstractmethod
+    def content(self) -> Mapping[str, Any]:
+        """Content of the JSON file that `save` writes."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What it is the result of."""
+
+    @property
+    def state(self) -> str:
+        """State in a word, as the badge of the page has it."""
+        return str(self.content["state"])
+
+    @property
+    def verdict(self) -> str:
+        """Verdict in sentences."""
+        return str(self.content["verdict"])
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """Return the main table, in SI but for columns that name another unit."""
+
+    @abstractmethod
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the main figure into given axes, or into new ones, and return them."""
+
+    @abstractmethod
+    def write(self, folder: Path, place: Path) -> None:
+        """Write all files into a folder that is there; the page names `place` as theirs."""
+
+    @for_programs
+    def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
+        """Write the files of the command of the same name.
+
+        Parameters
+        ----------
+        folder : path, made if it is not there
+        force : bool, whether to overwrite files of the same names
+
+        Raises
+        ------
+        InputError
+            If the folder has such files, or cannot be written; nothing is written then.
+        """
+        place = path_of("folder", folder)
+        with result_folder(place, self.kind, force=force) as part:
+            self.write(part, place)
+
+    def summary(self) -> str:
+        """Return a report as text: state, verdict and the main table."""
+        head = f"{type(self).__name__} of {self.name}: {self.state}"
+        return f"{head}\n{self.verdict}\n\n{self._table()}"
+
+    def _table(self) -> str:
+        """Return the main table as text."""
+        return self.to_frame().to_string(float_format="{:.5g}".format, na_rep="–")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, {self.state})"
+
+    def _repr_html_(self) -> str:
+        return notebook_html(type(self).__name__, self.verdict, self.to_frame())

@@ -1,0 +1,212 @@
+"""The verbs: what a user's few lines do, without a word of what lies below."""
+
+import json
+import sys
+from subprocess import run
+
+import numpy as np
+import pandas as pd
+import pytest
+from calling import call
+from matplotlib.figure import Figure
+from scipy import stats
+
+import accelstudy as acs
+from accelstudy.campaign.format import write_campaign
+
+KINDS = (
+    "effects",
+    "noise effects",
+    "gross errors",
+    "models",
+    "schemes",
+    "approaches",
+    "data sheets",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four campaigns of sensors of one type, of which three have a quadratic scale."""
+    root = tmp_path_factory.mktemp("verbs")
+    for i, effects in enumerate([(), *[("quadratic_scale: 0.004, -0.004, 0.004",)] * 3]):
+        campaign = acs.simulate_campaign(
+            name=f"sensor-{i}", seed=i, scheme="fibonacci-24", effects=effects, sigma=0.002
+        )
+        write_campaign(campaign, root / f"sensor-{i}")
+    return root
+
+
+@pytest.fixture(scope="module")
+def calibrations(folder):
+    return [acs.calibrate(folder / f"sensor-{i}") for i in range(4)]
+
+
+@pytest.fixture(scope="module")
+def results(folder, calibrations):
+    """A result of each verb, with the command that gives the same."""
+    for i, one in enumerate(calibrations):
+        one.save(folder / f"calibrated-{i}")
+    dates = ("2025-01-01", "2025-07-01", "2026-01-01")
+    files = [folder / f"calibrated-{i}/calibration.json" for i in range(3)]
+    three = [folder / f"sensor-{i}" for i in (1, 2, 3)]
+    return {
+        "calibrate": (calibrations[0], ["calibrate", folder / "sensor-0"]),
+        "diagnose": (
+            acs.diagnose(folder / "sensor-1", replicates=100),
+            ["diagnose", folder / "sensor-1", "--replicates", 100],
+        ),
+        "compare": (acs.compare(*calibrations[:2]), ["compare", *files[:2]]),
+        "history": (
+            acs.history(calibrations[:3], dates=dates, tilt_accuracy="50 mgon"),
+            ["history", *files, *(word for d in dates for word in ("--date", d)),
+             "--tilt-accuracy", "50mgon"],
+        ),
+        "lot": (acs.lot(three), ["lot", *three]),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("verb", ["calibrate", "diagnose", "compare", "history", "lot"])
+def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
+    result, command = results[verb]
+    result.save(tmp_path / "function")
+    answer = call(*command, "--out", tmp_path / "command")
+    assert answer.exit_code == 0, answer.output
+    assert result.verdict.split(". ")[0] in answer.output
+    names = [
+        sorted(p.relative_to(tmp_path / way).as_posix() for p in (tmp_path / way).rglob("*.*"))
+        for way in ("function", "command")
+    ]
+    assert names[0] == names[1]
+    for name in (name for name in names[0] if name.endswith(".json")):
+        function, written = (
+            json.loads((tmp_path / w / name).read_text()) for w in ("function", "command")
+        )
+        assert function == written, name
+    with pytest.raises(acs.InputError, match="force"):
+        (tmp_path / "other").mkdir()
+        (tmp_path / "other" / "report.html").write_text("mine")
+        result.save(tmp_path / "other")
+
+
+@pytest.mark.parametrize("verb", ["calibrate", "diagnose", "compare", "history", "lot"])
+def test_a_result_says_shows_and_draws_itself(results, verb):
+    result, _ = results[verb]
+    assert result.state in repr(result)
+    assert len(repr(result).splitlines()) == 1
+    text = result.summary()
+    assert result.verdict in text
+    assert len(result.to_frame()) > 0
+    for name in result.to_frame().index[:3]:
+        assert str(name) in text
+    assert "<table" in result._repr_html_()
+    ax = Figure().subplots()
+    assert result.plot(ax) is ax
+    assert ax.has_data()
+    assert (result == result, len({result, result})) == (True, 1)
+
+
+def test_intervals_and_covariance_are_those_of_the_estimates(calibrations, folder):
+    one = calibrations[0]
+    sigma = one.parameters["sigma"]
+    np.testing.assert_allclose(np.diag(one.covariance), sigma**2)
+    np.testing.assert_allclose(one.covariance, one.correlation * np.outer(sigma, sigma))
+    half = (one.intervals(0.99)["high"] - one.intervals(0.99)["low"]) / 2
+    np.testing.assert_allclose(half / sigma, stats.norm.ppf(0.995))
+    assert list(one.intervals().columns) == ["low", "high", "unit"]
+    # Without a stated sigma it is estimated from the residuals, with their redundancy.
+    unknown = acs.simulate_campaign(seed=1, scheme="fibonacci-24", sigma=0.002, sigma_known=False)
+    other = acs.calibrate(unknown, approach="gravity")
+    half = (other.intervals(0.9)["high"] - other.intervals(0.9)["low"]) / 2
+    wanted = stats.t.ppf(0.95, 24 - 9)
+    np.testing.assert_allclose(half / other.parameters["sigma"], wanted)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    """Of 9 parameters in 60 sessions, which are correlated, 80 % of the intervals hold the truth."""
+    inside = []
+    for seed in range(60):
+        truth = np.full(9, 1e-3)
+        measured = acs.simulate_campaign(
+            seed=seed, scheme="fibonacci-24", sigma=0.002, model="bias",
+            effects="scale: 0.001, 0.001, 0.001",
+        )  # fmt: skip
+        found = acs.calibrate(measured, model="bias-scale").intervals(0.8)
+        inside += [
+            found.loc[f"s_{a}", "low"] < truth[0] < found.loc[f"s_{a}", "high"] for a in "xyz"
+        ]
+    assert abs(np.mean(inside) - 0.8) < 4 * np.sqrt(0.8 * 0.2 / 60)
+
+
+def test_a_calibration_that_is_read_levels_as_before(calibrations, folder, results):
+    one, read = calibrations[0], acs.read_calibration(folder / "calibrated-0")
+    log = acs.read_log(
+        pd.DataFrame(one.fit.campaign.forces, columns=["fx", "fy", "fz"]), rate=100,
+        columns={axis: axis for axis in ("fx", "fy", "fz")},
+    )  # fmt: skip
+    pd.testing.assert_frame_equal(read.apply(log), one.apply(log))
+    pd.testing.assert_frame_equal(read.covariance, one.covariance)
+    assert (read.state, read.verdict) == (one.state, one.verdict)
+    assert acs.compare(read, folder / "calibrated-0/calibration.json").state == "unchanged"
+    assert (
+        acs.export(read, form="matrix")
+        == call("export", folder / "calibrated-0/calibration.json", "--form", "matrix").output
+    )
+    for ask in (lambda: read.residuals, read.tilt_error, read.plot):
+        with pytest.raises(
+            acs.InputError, match="a calibration that was read from a file has none"
+        ):
+            ask()
+
+
+def test_the_tilt_error_is_that_of_the_report(calibrations):
+    one = calibrations[0]
+    stated = one.content["quality"]["tilt_rms_mgon"]
+    found = one.tilt_error() / (np.pi / 200 * 1e-3)
+    assert found.tolist() == pytest.approx([stated["roll"], stated["pitch"]])
+    assert (one.tilt_error("10 gon") < one.tilt_error("50 gon")).all()
+
+
+def test_sigmas_are_checked_as_by_the_command(folder):
+    table = acs.check_sigmas(folder / "sensor-0", replicates=200)
+    assert table["ratio"].between(0.8, 1.25).all()
+
+
+def test_catalogues_are_tables():
+    for kind in KINDS:
+        table = acs.catalogue(kind)
+        assert len(table) > 0
+        assert table.index.is_unique
+    assert "warm_up" in acs.catalogue("effects").index
+    with pytest.raises(acs.InputError, match="unknown catalogue 'sensors'"):
+        acs.catalogue("sensors")
+
+
+@pytest.mark.parametrize(("line", "said"), [
+    ("acs.calibrate(3)", "campaign: expected a Campaign"),
+    ("acs.calibrate(folder / 'none')", "none"),
+    ("acs.read_calibration(folder)", "no such file"),
+    ("acs.compare(calibrations[0], 3)", "second: expected what `calibrate`"),
+    ("acs.compare(*calibrations[:2], tilt_range='5 s')", "tilt_range:"),
+    ("acs.history(calibrations[:2])", "date"),
+    ("acs.history(calibrations[:3])", "date: missing"),
+    ("acs.history(calibrations[:3], dates=['2025-01-01'])", "1 date for 3 calibrations"),
+    ("acs.lot([folder / 'sensor-0'])", "two sensors or more"),
+    ("acs.diagnose(folder / 'sensor-0', replicates=3)", "replicates: must be from 100"),
+    ("acs.export(calibrations[0], form='x')", "unknown form 'x'"),
+    ("calibrations[0].intervals(2.0)", "level: expected a probability"),
+    ("calibrations[0].save(3)", "folder: expected a path"),
+])  # fmt: skip
+def test_bad_input_is_one_line(line, said, folder, calibrations):
+    with pytest.raises(acs.InputError, match=said) as refused:
+        eval(line)
+    assert "\n" not in str(refused.value)
+
+
+def test_the_front_door_is_light_and_complete():
+    """All names are there, and none of them is imported before it is asked for."""
+    line = "import sys, accelstudy as a; print(len(a.__all__), 'numpy' in sys.modules)"
+    found = run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout
+    assert found.split() == [str(len(acs.__all__)), "False"]
+    for name in acs.__all__:
+        assert getattr(acs, name).__doc__
