@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import BY_COMMAND, InputError, shown
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import Given
 
@@ -51,6 +51,8 @@ def for_programs(function: Callable[Arguments, Result]) -> Callable[Arguments, R
 
     @wraps(function)
     def within(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        if BY_COMMAND.get():
+            return function(*args, **kwargs)
         try:
             return function(*args, **kwargs)
         except InputError as error:

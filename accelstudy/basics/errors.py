@@ -6,6 +6,10 @@ import difflib
 import reprlib
 import unicodedata
 from collections.abc import Iterable
+from contextvars import ContextVar
+
+BY_COMMAND: ContextVar[bool] = ContextVar("by_command", default=False)
+"""Whether the user came by the command line, so that messages name its options."""
 
 
 class InputError(ValueError):

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import BY_COMMAND, InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.advise import advise_command
 from accelstudy.commands.apply import apply_command
@@ -98,8 +98,12 @@ class Commands(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the command line; also its help may meet a full disk."""
-        with bad_input_as_one_line():
-            return super().main(*args, **kwargs)
+        token = BY_COMMAND.set(True)
+        try:
+            with bad_input_as_one_line():
+                return super().main(*args, **kwargs)
+        finally:
+            BY_COMMAND.reset(token)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

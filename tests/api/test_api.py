@@ -225,7 +225,7 @@ WRONG = {
     "acs.simulate_campaign(effects=3)": "effects: expected a name, or several",
     "acs.simulate_campaign(temperature=20)": "temperature: must be a list",
     "acs.simulate_campaign(colour=1)": "colour: unknown key (known: name",
-    "acs.calibrate('folder')": "campaign: expected a Campaign",
+    "acs.calibrate(3)": "campaign: expected a Campaign",
     "acs.diagnose({})": "campaign: expected a Campaign",
     "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, confidence=2)": "confidence: must be rms, or a share",
