@@ -194,6 +194,7 @@ def history(
     InputError
         If they are fewer than three, of one date, or not of one sensor.
     """
+    chosen = _confidence(confidence)
     read = [given_calibration(one) for one in calibrations]
     if dates and len(dates) != len(read):
         raise InputError(
@@ -217,7 +218,7 @@ def history(
             found,
             quantity("tilt_accuracy", tilt_accuracy, ACCURACY),
             quantity("tilt_range", tilt_range, TILT),
-            _confidence(confidence),
+            chosen,
         )
     return History(found, interval)
 

@@ -22,7 +22,7 @@ LEVELED = (
 @click.option(
     "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix or px4."
 )
-@click.option("--level", is_flag=True, hidden=True)  # of earlier versions
+@click.option("--level", is_flag=True, hidden=True, help="Retired.")
 def export_command(calibration: Path, form: str, level: bool) -> None:
     """Print a CALIBRATION in a form that a device takes.
 

@@ -120,7 +120,7 @@ def _no_slopes(context: click.Context, option: click.Parameter, value: str | Non
     type=int,
     help="Samples of a hold; adds columns on them.",
 )
-@click.option("--hold", hidden=True, expose_value=False, callback=_no_slopes)
+@click.option("--hold", hidden=True, expose_value=False, callback=_no_slopes, help="Retired.")
 @force_option
 @quiet_option
 def simulate_campaign_command(
