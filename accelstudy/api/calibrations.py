@@ -364,14 +364,10 @@ def asked(
     campaign: Any, model: Any, approach: Any, prior: Any = None, plausible: bool = True
 ) -> tuple[Campaign, SensorModel, Approach | None]:
     """Campaign, model and approach by what a program gives."""
-    measured = given_campaign(campaign, plausible)
     of_type("model", model, str, expected="the name of a model")
     if approach is not None:
         of_type("approach", approach, str, expected="the name of an approach")
-    chosen = get_model(model)
+    chosen = get_model(model), None if approach is None else get_approach(approach)
     of_sensors = None if prior is None else path_of("prior", prior)
-    return (
-        with_type(measured, of_sensors, chosen),
-        chosen,
-        None if approach is None else get_approach(approach),
-    )
+    measured = with_type(given_campaign(campaign, plausible), of_sensors, chosen[0])
+    return measured, *chosen

@@ -49,6 +49,7 @@ from accelstudy.commands.options import (
 )
 @click.option(
     "--confidence",
+    metavar="CONFIDENCE",
     default="95%",
     show_default=True,
     help="Probability with which it stays so.",

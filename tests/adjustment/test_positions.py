@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from accelstudy.diagnosis.space.groups import clusters, groups
 from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, SIGMA, draw
 
 from accelstudy.adjustment import calibrate, calibration
@@ -30,6 +29,7 @@ from accelstudy.diagnosis.evidence.noise_models import LENGTHS, quadratic_forms,
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.repeats import clusters, lack_of_fit
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
@@ -211,14 +211,12 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
             change[i, axis], change[labels[i], axis] = 1, -1
             differences.append(residuals.rows(change))
     basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
-    found = groups(examined)
+    same = lack_of_fit(residuals, examined.frame.forces)
     errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
     repeated = np.sum((errors @ basis) ** 2, axis=1)
-    assert found["repeat"].dims[0] == basis.shape[1]
-    np.testing.assert_allclose(found["repeat"].parts(errors)[:, 0], repeated, rtol=1e-9)
-    assert found["lack_of_fit"].dims[0] == residuals.redundancy - basis.shape[1]
+    assert same.dims[0] == residuals.redundancy - basis.shape[1]
     rest = np.sum(errors**2, axis=1) - repeated
-    np.testing.assert_allclose(found["lack_of_fit"].parts(errors)[:, 0], rest, rtol=1e-9)
+    np.testing.assert_allclose(same.parts(errors)[:, 0], rest, rtol=1e-9)
 
 
 def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined):
