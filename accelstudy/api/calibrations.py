@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,6 +30,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.units import GON, Given
 from accelstudy.campaign.calibration import export as forms
+from accelstudy.campaign.calibration import sigma_check
 from accelstudy.campaign.calibration.applying import (
     NO_CALIBRATION,
     calibration_of,
@@ -43,7 +45,6 @@ from accelstudy.campaign.calibration.output import (
     draw_residuals,
     write_calibration,
 )
-from accelstudy.campaign.calibration.sigma_check import check_sigmas as checked_sigmas
 from accelstudy.campaign.calibration.wording import parameter_lines
 from accelstudy.campaign.format import read_campaign as read_folder
 from accelstudy.campaign.of_type import with_type
@@ -51,7 +52,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.sensors.models import get_model
+from accelstudy.sensors.models import NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
@@ -60,8 +61,6 @@ if TYPE_CHECKING:
 SIGMA = Given("m/s^2", "", "Noise of a reading.")
 TILT = Given("rad", "", "Largest tilt.", 1e-3, np.pi / 2)
 REPLICATES = Range(2, 10**9)
-NINE = "bias-scale-nonorthogonality"
-"""Model by default."""
 
 
 class Calibration(Result):
@@ -151,7 +150,7 @@ class Calibration(Result):
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 
-    @property
+    @cached_property
     def residuals(self) -> pd.DataFrame:
         """Residuals, tests and reliability of each position, as positions.parquet has them."""
         return assessed_positions(assess(self._fitted("residuals")))
@@ -279,12 +278,7 @@ def calibrate(
     InputError
         If the campaign does not determine the model, or a name is unknown.
     """
-    return calibrated(*asked(campaign, model, approach, prior))
-
-
-def calibrated(campaign: Campaign, model: SensorModel, approach: Approach | None) -> Calibration:
-    """Calibrate a campaign with a model by an approach, and assess it."""
-    fit = fit_campaign(campaign, model, approach)
+    fit = fit_campaign(*resolve(campaign, model, approach, prior))
     return Calibration(calibration_content(fit, assess(fit)), fit)
 
 
@@ -315,8 +309,8 @@ def check_sigmas(
         adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
         sd_empirical) and n_converged.
     """
-    fit = fit_campaign(*asked(campaign, model, approach))
-    return checked_sigmas(
+    fit = fit_campaign(*resolve(campaign, model, approach))
+    return sigma_check.check_sigmas(
         fit, whole("replicates", replicates, REPLICATES), whole("seed", seed, bounds.SEED)
     )
 
@@ -334,14 +328,14 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "json"
     str
         Text of a file.
     """
-    return given_calibration(calibration).export(form)
+    return as_calibration(calibration).export(form)
 
 
 # --- what is given ------------------------------------------------------------------------------
 
 
-def given_calibration(calibration: Any, name: str = "calibration") -> Calibration:
-    """Return a calibration that is given as one, or as a path."""
+def as_calibration(calibration: Any, name: str = "calibration") -> Calibration:
+    """Return a calibration, read if it is given as a path."""
     if isinstance(calibration, str | PathLike):
         return read_calibration(calibration)
     if not isinstance(calibration, Calibration):
@@ -352,22 +346,22 @@ def given_calibration(calibration: Any, name: str = "calibration") -> Calibratio
     return calibration
 
 
-def given_campaign(campaign: Any, plausible: bool = True) -> Campaign:
-    """Return a campaign that is given as one, or as the path of its folder."""
+def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
+    """Return a campaign, read if it is given as the path of its folder."""
     if isinstance(campaign, str | PathLike):
         return read_folder(path_of("campaign", campaign), plausible=plausible)
     of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path")
     return campaign
 
 
-def asked(
+def resolve(
     campaign: Any, model: Any, approach: Any, prior: Any = None, plausible: bool = True
 ) -> tuple[Campaign, SensorModel, Approach | None]:
-    """Campaign, model and approach by what a program gives."""
+    """Read the campaign, the model and the approach that a program names."""
     of_type("model", model, str, expected="the name of a model")
     if approach is not None:
         of_type("approach", approach, str, expected="the name of an approach")
     chosen = get_model(model), None if approach is None else get_approach(approach)
     of_sensors = None if prior is None else path_of("prior", prior)
-    measured = with_type(given_campaign(campaign, plausible), of_sensors, chosen[0])
+    measured = with_type(as_campaign(campaign, plausible), of_sensors, chosen[0])
     return measured, *chosen

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from numpy.linalg import LinAlgError
 
-from accelstudy.api.calibrations import NINE, Calibration, asked
+from accelstudy.api.calibrations import Calibration, resolve
 from accelstudy.api.given import drawing, for_programs, whole
 from accelstudy.api.results import Result
 from accelstudy.basics import bounds
@@ -30,6 +30,7 @@ from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import Diagnosis as Found
 from accelstudy.drawing.style import COLUMN
 from accelstudy.files.outputs import DIAGNOSIS
+from accelstudy.sensors.models import NINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,7 +125,7 @@ def diagnose(
     approach : str, optional; with the robot, if the campaign has its angles
     seed : int
     replicates : int
-        Sessions simulated with either model, when they are asked for; fewer beyond 500 positions.
+        Sessions simulated with either model, when they are resolve for; fewer beyond 500 positions.
 
     Raises
     ------
@@ -134,5 +135,5 @@ def diagnose(
     whole("seed", seed, bounds.SEED)
     whole("replicates", replicates, SESSIONS)
     # The diagnosis, not the reader, looks for wrong units and axes.
-    given = asked(campaign, model, approach, prior, plausible=False)
+    given = resolve(campaign, model, approach, prior, plausible=False)
     return Diagnosis(diagnosed(*given, seed=seed), seed, replicates)

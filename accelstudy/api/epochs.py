@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.api.calibrations import TILT, Calibration, given_calibration
+from accelstudy.api.calibrations import TILT, Calibration, as_calibration
 from accelstudy.api.given import drawing, for_programs, of_type, quantity
 from accelstudy.api.results import Result
 from accelstudy.basics.dates import read_date
@@ -99,7 +99,7 @@ def compare(
     InputError
         If they are not of one sensor, or have no effect in common.
     """
-    pair = given_calibration(first, "first"), given_calibration(second, "second")
+    pair = as_calibration(first, "first"), as_calibration(second, "second")
     return Comparison(comparing.compare(*pair, quantity("tilt_range", tilt_range, TILT)))
 
 
@@ -195,13 +195,14 @@ def history(
         If they are fewer than three, of one date, or not of one sensor.
     """
     chosen = _confidence(confidence)
-    read = [given_calibration(one) for one in calibrations]
+    read = [as_calibration(one) for one in calibrations]
     if dates and len(dates) != len(read):
         raise InputError(
             f"--date: {counted(len(dates), 'date')} for {counted(len(read), 'calibration')}; give "
             "one for each, in their order, as 2026-03-01"
         )
-    places = [str(one) for one in calibrations] if all_paths(calibrations) else None
+    paths = all(isinstance(one, str | PathLike) for one in calibrations)
+    places = [str(one) for one in calibrations] if paths else None
     first: dict[bytes, int] = {}
     for i, one in enumerate(read):
         # Noise never repeats: the same numbers are one campaign, whatever the file is called.
@@ -221,11 +222,6 @@ def history(
             chosen,
         )
     return History(found, interval)
-
-
-def all_paths(calibrations: Sequence[object]) -> bool:
-    """Whether all of them are paths."""
-    return all(isinstance(one, str | PathLike) for one in calibrations)
 
 
 def _confidence(value: float | str) -> float:

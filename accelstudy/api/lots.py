@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.calibrations import NINE, Calibration, asked, given_campaign
+from accelstudy.api.calibrations import Calibration, as_campaign, resolve
 from accelstudy.api.given import drawing, for_programs, whole
 from accelstudy.api.results import Result
 from accelstudy.basics import bounds
@@ -22,6 +22,7 @@ from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.output import LotReport, draw_sensors, write_lot
 from accelstudy.lots.run import FEWEST, evaluate_lot
+from accelstudy.sensors.models import NINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,7 +133,7 @@ def lot(
     """
     if len(campaigns) < FEWEST:
         raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-    measured = [given_campaign(one) for one in campaigns]
-    _, of_type, chosen = asked(measured[0], model, approach)
+    measured = [as_campaign(one) for one in campaigns]
+    _, wanted, by = resolve(measured[0], model, approach)
     numbers = whole("seed", seed, bounds.SEED), whole("cores", cores, CORES)
-    return Lot(evaluate_lot(measured, of_type, chosen, *numbers))
+    return Lot(evaluate_lot(measured, wanted, by, *numbers))

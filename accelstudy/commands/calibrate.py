@@ -37,7 +37,7 @@ def calibrate_command(
     programs, positions.parquet and figures. Parameters are in the axes frd (forward, right, down),
     whatever those of the log are.
     """
-    from accelstudy.api.calibrations import asked
+    from accelstudy.api.calibrations import resolve
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.output import write_calibration
     from accelstudy.campaign.calibration.wording import (
@@ -51,7 +51,7 @@ def calibrate_command(
 
     inputs = [campaign] if prior is None else [campaign, prior]
     with result_folder(out, CALIBRATION, inputs, force) as folder, stage("calibration"):
-        fit = fit_campaign(*asked(campaign, model, approach, prior))
+        fit = fit_campaign(*resolve(campaign, model, approach, prior))
         content = write_calibration(fit, folder, campaign, out)
     for warning in fit.campaign.warnings:
         warn(warning)

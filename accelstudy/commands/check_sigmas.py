@@ -43,11 +43,11 @@ def check_sigmas_command(
     its sigmas are from. So the check finds whether the adjustment turns that noise into the right
     sigmas, and not whether the noise is right.
     """
-    from accelstudy.api.calibrations import asked
+    from accelstudy.api.calibrations import resolve
     from accelstudy.campaign.calibration.fit import fit_campaign
     from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
 
-    fit = fit_campaign(*asked(campaign, model, approach))
+    fit = fit_campaign(*resolve(campaign, model, approach))
     table = check_sigmas(fit, replicates, seed)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import warn
-from accelstudy.commands.options import PATH, example
+from accelstudy.commands.options import PATH, example, retired_option
 
 LEVELED = (
     "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the calibrated force in "
@@ -22,8 +21,8 @@ LEVELED = (
 @click.option(
     "--form", default="json", show_default=True, help="Form: json, yaml, c, matrix or px4."
 )
-@click.option("--level", is_flag=True, hidden=True, help="Retired.")
-def export_command(calibration: Path, form: str, level: bool) -> None:
+@retired_option("--level", LEVELED, is_flag=True)
+def export_command(calibration: Path, form: str) -> None:
     """Print a CALIBRATION in a form that a device takes.
 
     CALIBRATION is a calibration.json. json and yaml carry every effect: parameters with sigmas and
@@ -42,8 +41,6 @@ def export_command(calibration: Path, form: str, level: bool) -> None:
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.export import export, losses
 
-    if level:
-        raise InputError(f"--level: no longer an option; {LEVELED}")
     content = read_calibration(calibration).content
     text = export(content, form)
     if mended := content["mended"]:

@@ -141,6 +141,20 @@ model_option = click.option(
 )
 
 
+def retired_option(
+    name: str, instead: str, *, is_flag: bool = False
+) -> Callable[[Command], Command]:
+    """Add an option of earlier versions, which ends in a line that says what to do instead."""
+
+    def refuse(context: click.Context, option: click.Parameter, value: str | bool | None) -> None:
+        if value:
+            raise InputError(f"{name}: no longer an option; {instead}")
+
+    return click.option(
+        name, is_flag=is_flag, hidden=True, expose_value=False, callback=refuse, help="Retired."
+    )
+
+
 def approach_option(default: str | None) -> Callable[[Command], Command]:
     """Add --approach; without a default the command takes the robot if the campaign has one."""
     words = "" if default else "  [default: robot, if the campaign has its angles]"

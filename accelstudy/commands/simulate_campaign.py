@@ -22,6 +22,7 @@ from accelstudy.commands.options import (
     force_option,
     model_option,
     quiet_option,
+    retired_option,
 )
 
 _SECTIONS = {
@@ -31,12 +32,6 @@ _SECTIONS = {
     "The holds": ("scheme", "repeats", "repeat_first", "order", "approach", "yaw"),
     "Their conditions": ("interval", "no_time", "temperature", "temperature_order", "vibration"),
 }
-
-
-def _no_slopes(context: click.Context, option: click.Parameter, value: str | None) -> None:
-    """Refuse an option of earlier versions."""
-    if value is not None:
-        raise InputError("--hold: no longer an option; campaigns have no slopes within holds")
 
 
 @click.command(
@@ -120,7 +115,7 @@ def _no_slopes(context: click.Context, option: click.Parameter, value: str | Non
     type=int,
     help="Samples of a hold; adds columns on them.",
 )
-@click.option("--hold", hidden=True, expose_value=False, callback=_no_slopes, help="Retired.")
+@retired_option("--hold", "campaigns have no slopes within holds")
 @force_option
 @quiet_option
 def simulate_campaign_command(

@@ -15,13 +15,12 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.theory import Expected, Theory, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
-from accelstudy.sensors.models import MODELS, get_model
+from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-NINE = "bias-scale-nonorthogonality"
 PLANNED_MODELS = (
     *MODELS,
     f"{NINE}-crossaxis+quadratic_scale",

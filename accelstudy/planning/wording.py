@@ -11,10 +11,11 @@ from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_disp
 from accelstudy.basics.wording import amount, interval, number, words
 from accelstudy.pages import lines
 from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.planning.candidates import NINE, Candidate, shortest
+from accelstudy.planning.candidates import Candidate, shortest
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import PLAIN, in_use, limits, needs, spoilers
+from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
 SENTENCES = "planning/wording.txt.j2"

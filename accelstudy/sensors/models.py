@@ -25,9 +25,11 @@ MODEL_FILE = "model.yaml"
 
 _NINE = ("bias", "scale", "nonorthogonality")
 
+NINE = "bias-scale-nonorthogonality"
+"""Name of the model of nine parameters, which is taken where none is given."""
 MODELS: dict[str, tuple[str, ...]] = {
     "bias-scale": ("bias", "scale"),
-    "bias-scale-nonorthogonality": _NINE,
+    NINE: _NINE,
     "bias-scale-nonorthogonality-crossaxis": (*_NINE, "cross_axis_misalignment"),
     "bias-scale-nonorthogonality-quadratic": (*_NINE, "quadratic_scale"),
     "bias-scale-nonorthogonality-cubic": (*_NINE, "cubic_scale"),
@@ -171,24 +173,24 @@ class Preset:
     scheme: str
 
 
-_SIX_MODEL, _NINE_MODEL = "bias-scale", "bias-scale-nonorthogonality"
+_SIX_MODEL = "bias-scale"
 _CROSS_AXIS = "bias-scale-nonorthogonality-crossaxis"
 _PRETTO_TEDALDI = "[25] Pretto & Grisetti, [26] Tedaldi 2014"
 
 PRESETS: tuple[Preset, ...] = (
     Preset("loetters-1998", "[21] Lötters 1998", _SIX_MODEL, "faces-6"),
-    Preset("shin-2002", "[22] Shin & El-Sheimy 2002", _NINE_MODEL, "faces-edges-18"),
-    Preset("skog-2006", "[14] Skog & Händel 2006", _NINE_MODEL, "faces-edges-18"),
-    Preset("syed-2007", "[15] Syed 2007", _NINE_MODEL, "faces-edges-18"),
-    Preset("syed-2007-26", "[15] Syed 2007, 26", _NINE_MODEL, "faces-edges-corners-26"),
-    Preset("qureshi-2017", "[23] Qureshi 2017", _NINE_MODEL, "faces-edges-18"),
+    Preset("shin-2002", "[22] Shin & El-Sheimy 2002", NINE, "faces-edges-18"),
+    Preset("skog-2006", "[14] Skog & Händel 2006", NINE, "faces-edges-18"),
+    Preset("syed-2007", "[15] Syed 2007", NINE, "faces-edges-18"),
+    Preset("syed-2007-26", "[15] Syed 2007, 26", NINE, "faces-edges-corners-26"),
+    Preset("qureshi-2017", "[23] Qureshi 2017", NINE, "faces-edges-18"),
     Preset("fong-2008-18", "[20] Fong 2008, 18", _CROSS_AXIS, "faces-edges-18"),
     Preset("fong-2008-24", "[20] Fong 2008, 24", _CROSS_AXIS, "rings-24"),
-    Preset("zhang-2010", "[17] Zhang 2010", _NINE_MODEL, "d-optimal-9"),
-    Preset("cai-2013", "[24] Cai 2013", f"{_NINE_MODEL}-quadratic", "mclaren-24"),
-    Preset("tedaldi-2014-36", f"{_PRETTO_TEDALDI}, 36", _NINE_MODEL, "fibonacci-36"),
-    Preset("tedaldi-2014-38", f"{_PRETTO_TEDALDI}, 38", _NINE_MODEL, "xsens-38"),
-    Preset("tedaldi-2014-50", f"{_PRETTO_TEDALDI}, 50", _NINE_MODEL, "fibonacci-50"),
+    Preset("zhang-2010", "[17] Zhang 2010", NINE, "d-optimal-9"),
+    Preset("cai-2013", "[24] Cai 2013", f"{NINE}-quadratic", "mclaren-24"),
+    Preset("tedaldi-2014-36", f"{_PRETTO_TEDALDI}, 36", NINE, "fibonacci-36"),
+    Preset("tedaldi-2014-38", f"{_PRETTO_TEDALDI}, 38", NINE, "xsens-38"),
+    Preset("tedaldi-2014-50", f"{_PRETTO_TEDALDI}, 50", NINE, "fibonacci-50"),
     Preset("lv-2017", "[19] Lv 2017", _CROSS_AXIS, "icosidodecahedron-30"),
 )
 """Table 1 of Thalmann & Neuner (2018); the misalignment of [19] spans the cross-axis angles."""

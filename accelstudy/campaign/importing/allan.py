@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-SHARE = 8.0
-"""Length of a hold over the longest averaging time that its residuals about a line are used for."""
 RELIABLE = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""

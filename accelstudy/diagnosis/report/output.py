@@ -20,6 +20,7 @@ from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.of_type import with_type
+from accelstudy.diagnosis.consequences import MISSING
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.verdict import LEVEL_NOISE
@@ -167,6 +168,7 @@ def _write_report(
         " ".join(lines),
         d=diagnosis,
         doc=document,
+        missing=MISSING,
         effects=[effect_document(named) for named in diagnosis.found],
         verdict=wording.badge(diagnosis),
         headline=lines[0],

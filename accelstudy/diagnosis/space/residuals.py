@@ -191,20 +191,6 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances)), forces
 
 
-def span(columns: Array, sizes: Array | None, tolerance: float) -> tuple[Array, Array]:
-    """What columns (m, k) span: l combinations of them, (k, l), and a basis, (m, l); see `spans`.
-
-    Parameters
-    ----------
-    columns : (m, k) array
-    sizes : (k,) array, or None
-    tolerance : float
-    """
-    each = None if sizes is None else sizes[None]
-    directions, basis, (rank,) = spans(columns[None], each, tolerance)
-    return directions[0, :, :rank], basis[0, :, :rank]
-
-
 def spans(
     columns: Array, sizes: Array | None, tolerance: float
 ) -> tuple[Array, Array, NDArray[np.int_]]:
