@@ -22,12 +22,9 @@ import pandas as pd
 from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
-from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.distributions import distributions
-from accelstudy.study.monte_carlo.followed import cell_tilt_error
-from accelstudy.study.monte_carlo.replicates import simulate
-from accelstudy.study.monte_carlo.statistics import Statistics
-from accelstudy.study.summary import Result, tables_of
+from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.statistics import statistics
+from accelstudy.study.summary import tables_of
 
 CONFIG = Path(__file__).parent.parent / "config" / "config.yaml"
 NOISES = (0.002, 0.02, 0.1, 0.3)
@@ -57,12 +54,10 @@ def estimates(
 ) -> pd.DataFrame:
     """All estimates of a cell with their standard errors, as a study tabulates them."""
     cell = replace(cell, replicates=replicates, compiled=compiled)
-    tilt = cell_tilt_error(cell, LEVELING)
-    control = None if plain else Control.of(cell, tilt)
-    simulated = simulate(cell, seed, control)
-    statistics = Statistics.of(cell, simulated, control, tilt)
-    found = distributions(cell, simulated, control, tilt)
-    tables = tables_of([Result(cell, statistics, found)])
+    replicates = simulate(cell, seed)
+    if plain:
+        replicates = Replicates(replicates.simulated, None)
+    tables = tables_of([statistics(cell, replicates, LEVELING)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 
 

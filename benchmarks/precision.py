@@ -9,10 +9,9 @@ import numpy as np
 
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
-from accelstudy.study.monte_carlo.distributions import distributions, simulated_cell
-from accelstudy.study.monte_carlo.followed import TILT, cell_tilt_error
-from accelstudy.study.monte_carlo.replicates import simulate
-from accelstudy.study.monte_carlo.statistics import LEAST, Statistics
+from accelstudy.study.estimate import LEAST
+from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.statistics import TILT, simulated_statistics, statistics
 from problem import APPROACHES, SCHEME
 from timing import short, table
 from ways import WAYS
@@ -39,35 +38,33 @@ def run(speeds):
             continue
         name = cell.approach
         plain = replace(cell, replicates=PILOT, compiled=False)
-        needed[name] = _needed(*_plain(plain, leveling), PILOT)
+        needed[name] = _needed(_plain(plain, leveling), PILOT)
         rates = {way: float(np.median(each)) for way, each in speeds[name].items()}
         seconds[name] = {
             way: {what: count / rate for what, count in needed[name].items()}
             for way, rate in rates.items()
         }
         some = replace(cell, replicates=1000, compiled=False)
-        few = _needed(*simulated_cell(some, 1, leveling)[:2], 1000)
+        few = _needed(simulated_statistics(some, 1, leveling), 1000)
         controlled = {}
         for what, count in few.items():
             own = replace(cell, replicates=max(LEAST, math.ceil(count)), compiled=False)
-            simulated_cell(own, 1, leveling)  # what is traced is kept
+            simulated_statistics(own, 1, leveling)  # what is traced is kept
             start = process_time()
-            simulated_cell(own, 1, leveling)
+            simulated_statistics(own, 1, leveling)
             controlled[what] = process_time() - start, own.replicates
         seconds[name]["controlled"] = controlled
     return needed, seconds
 
 
 def _plain(cell, leveling):
-    """Statistics and distributions without linear theory."""
-    tilt, replicates = cell_tilt_error(cell, leveling), simulate(cell, 1, None)
-    found = distributions(cell, replicates, None, tilt)
-    return Statistics.of(cell, replicates, None, tilt), found
+    """Statistics without linear theory."""
+    return statistics(cell, Replicates(simulate(cell, 1).simulated, None), leveling)
 
 
-def _needed(found, bounds, count):
+def _needed(found, count):
     """Calibrations for the wanted error, from the errors of so many."""
-    bound = bounds[TILT, "both"].at(0.95)
+    bound = found.quantile(TILT, "both", 0.95)
     relative = (
         np.sqrt(np.mean((found.sd.error / found.sd.value) ** 2)),
         (found.tilt_rms.error / found.tilt_rms.value).max(),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.adjustment.calibration import Block
 from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
 from accelstudy.approaches import get_approach
 from accelstudy.basics import bounds
@@ -27,10 +26,15 @@ from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.config.blocks import LevelingConfig
-from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cell
-from accelstudy.study.monte_carlo.followed import ANGLES, TILT, Key, cell_tilt_error
-from accelstudy.study.monte_carlo.statistics import Statistics
-from accelstudy.study.summary import Result, tables_of
+from accelstudy.study.statistics import (
+    ANGLES,
+    TILT,
+    CellStatistics,
+    calibrations,
+    cell_tilt_error,
+    simulated_statistics,
+)
+from accelstudy.study.summary import tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,27 +47,21 @@ DIGITS = 12
 """Of a quantity in the configuration, so that 3.2 mgon stays that number."""
 
 
-@dataclass(frozen=True)
-class _Simulated:
-    """What the calibrations of a cell gave; without replicates where it is not estimable."""
-
-    statistics: Statistics
-    distributions: Mapping[Key, Controlled]
-    replicates: Block | None
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation:
     """Simulated calibrations of one set-up, or of several: the cells of a study.
 
     Attributes
     ----------
-    cells : tuple of Cell
-    simulated : tuple, for each cell its `statistics`, `distributions` and `replicates`
+    statistics : tuple of CellStatistics
     """
 
-    cells: tuple[Cell, ...]
-    simulated: tuple[_Simulated, ...]
+    statistics: tuple[CellStatistics, ...]
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """The set-ups."""
+        return tuple(one.cell for one in self.statistics)
 
     def __repr__(self) -> str:
         return f"Simulation({self._what})"
@@ -74,7 +72,7 @@ class Simulation:
 
     @property
     def _what(self) -> str:
-        n = sum(one.statistics.converged for one in self.simulated)
+        n = sum(one.converged for one in self.statistics)
         what = self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
         return f"{what}, {counted(n, 'calibration')}"
 
@@ -84,10 +82,7 @@ class Simulation:
 
         Their columns are those of the files of a study; units stand in their names, or in a column.
         """
-        return tables_of(
-            Result(cell, one.statistics, one.distributions)
-            for cell, one in zip(self.cells, self.simulated, strict=True)
-        )
+        return tables_of(self.statistics)
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -97,8 +92,8 @@ class Simulation:
         the name of the cell, too.
         """
         tables = []
-        for cell, one in zip(self.cells, self.simulated, strict=True):
-            bias, sd = one.statistics.bias, one.statistics.sd
+        for one in self.statistics:
+            cell, bias, sd = one.cell, one.bias, one.sd
             columns = {
                 "truth": cell.true_values,
                 "bias": bias.value,
@@ -118,17 +113,14 @@ class Simulation:
         below, each with its standard error.
         """
         tables = []
-        for one in self.simulated:
-            rms = one.statistics.tilt_rms
-            bound = [
-                one.distributions[TILT, angle].at(0.95) if one.distributions else None
-                for angle in ANGLES
-            ]
+        for one in self.statistics:
+            rms = one.tilt_rms
+            bound = [one.quantile(TILT, angle, 0.95) for angle in ANGLES]
             columns = {
                 "rms": rms.value,
                 "rms_error": rms.error,
-                "q95": [np.nan if b is None else float(b.value) for b in bound],
-                "q95_error": [np.nan if b is None else float(b.error) for b in bound],
+                "q95": [float(b.value) for b in bound],
+                "q95_error": [float(b.error) for b in bound],
             }
             tables.append(pd.DataFrame(columns, index=pd.Index(ANGLES, name="angle")))
         table = self._joined(tables)
@@ -150,17 +142,17 @@ class Simulation:
         estimate = np.full((len(self.cells), count, len(units)), np.nan)
         sigma, truth = np.full_like(estimate, np.nan), np.full_like(estimate[:, 0], np.nan)
         tilt = np.full((len(self.cells), count, len(ANGLES)), np.nan)
-        for i, (cell, one) in enumerate(zip(self.cells, self.simulated, strict=True)):
-            at = [list(units).index(name) for name in cell.parameter_units]
+        for i, (cell, one) in enumerate(zip(self.cells, self.statistics, strict=True)):
+            at = np.array([list(units).index(name) for name in cell.parameter_units])
             truth[i, at] = cell.true_values
-            if (block := one.replicates) is None:
+            if one.replicates is None:
                 continue
-            n, good = len(block.estimates), np.flatnonzero(block.converged)
-            freedom = block.redundancy if block.redundancy > 0 else np.nan
-            estimate[i, :n, at] = block.estimates.T
-            sigma[i, :n, at] = (np.sqrt(block.omega / freedom)[:, None] * block.sigma_priori).T
-            error = cell_tilt_error(cell, LEVELING)
-            tilt[i, good] = error.rms(block.estimates[good][:, : len(error.reference)])
+            block = one.replicates.simulated
+            good = np.flatnonzero(block.converged)
+            numbers = calibrations(cell, block, cell_tilt_error(cell, LEVELING))
+            estimate[i, good[:, None], at] = block.estimates[good]
+            sigma[i, good[:, None], at] = numbers["sigma_posteriori"]
+            tilt[i, good] = numbers["tilt"][:, : len(ANGLES)]
         parameters, noted = ("cell", "replicate", "parameter"), {"units": "SI, as `unit` says"}
         return xr.Dataset(
             {
@@ -253,14 +245,7 @@ def simulate(
     cells = _with_truth(study_cells(study), truth)
     if not any(cell.estimability.estimable for cell in cells):
         raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
-    return Simulation(tuple(cells), tuple(_simulated(cell, seed) for cell in cells))
-
-
-def _simulated(cell: Cell, seed: int) -> _Simulated:
-    if not cell.estimability.estimable:
-        return _Simulated(Statistics.of_none(cell), {}, None)
-    statistics, distributions, replicates = simulated_cell(cell, seed, LEVELING)
-    return _Simulated(statistics, distributions, replicates.simulated)
+    return Simulation(tuple(simulated_statistics(cell, seed, LEVELING) for cell in cells))
 
 
 def _si(name: str, value: float | str, given: Given, unit: float = 1.0) -> float:

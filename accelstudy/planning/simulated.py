@@ -19,9 +19,8 @@ from accelstudy.planning.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.distributions import Controlled, simulated_cell
-from accelstudy.study.monte_carlo.followed import ANGLES, TILT, TILTS
-from accelstudy.study.monte_carlo.statistics import Estimates
+from accelstudy.study.estimate import Estimates
+from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics, simulated_statistics
 
 Array = NDArray[np.float64]
 
@@ -41,33 +40,34 @@ class Simulated:
     Attributes
     ----------
     cell : str, name of the cell in the study of the plan
-    mean : Estimates, rms over attitudes and calibrations, (2,), rad
-    bounds : dict of `TILTS` to the distribution of the rms over attitudes, rad
-    simulated : int, calibrations
+    statistics : CellStatistics
     """
 
     cell: str
-    mean: Estimates
-    bounds: dict[str, Controlled]
-    simulated: int
+    statistics: CellStatistics
+
+    @property
+    def simulated(self) -> int:
+        """Number of calibrations."""
+        return self.statistics.simulated
 
     @property
     def rms(self) -> Array:
         """Rms over attitudes and calibrations, (2,), rad."""
-        return self.mean.value
+        return self.statistics.tilt_rms.value
 
     @property
     def error(self) -> Array:
         """Standard error of `rms`, (2,), rad."""
-        return self.mean.error
+        return self.statistics.tilt_rms.error
 
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
-        return np.array([float(self.bounds[name].at(probability).value) for name in ANGLES])
+        return np.array([float(self._bound(name, probability).value) for name in ANGLES])
 
     def of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
-        return float(self.bounds[BOTH].at(probability).value)
+        return float(self._bound(BOTH, probability).value)
 
     def accuracy(self, confidence: float | None) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
@@ -77,7 +77,10 @@ class Simulated:
         """Standard error of `accuracy`, rad, by the number of calibrations."""
         if confidence is None:
             return float(self.error[self.rms.argmax()])
-        return float(self.bounds[BOTH].at(confidence).error)
+        return float(self._bound(BOTH, confidence).error)
+
+    def _bound(self, name: str, probability: float) -> Estimates:
+        return self.statistics.quantile(TILT, name, probability)
 
 
 def study_of(
@@ -137,9 +140,8 @@ def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simul
         (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
         order.append(cell.name)
         if cell.name not in by_cell:
-            found, distributions, _ = simulated_cell(cell, study.seed, leveling, shares)
-            bounds = {name: distributions[TILT, name] for name in TILTS}
-            by_cell[cell.name] = Simulated(cell.name, found.tilt_rms, bounds, found.simulated)
+            found = simulated_statistics(cell, study.seed, leveling, shares)
+            by_cell[cell.name] = Simulated(cell.name, found)
     return [by_cell[name] for name in order]
 
 

@@ -9,10 +9,9 @@ from typing import Any
 
 from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.distributions import simulated_cell
-from accelstudy.study.monte_carlo.replicates import ESTIMATES, estimates_table
-from accelstudy.study.monte_carlo.statistics import Statistics
-from accelstudy.study.summary import Result, tables_of
+from accelstudy.study.replicates import ESTIMATES, estimates_table
+from accelstudy.study.statistics import CellStatistics, simulated_statistics
+from accelstudy.study.summary import tables_of
 from accelstudy.study.tables import TABLES
 
 log = logging.getLogger(__name__)
@@ -62,19 +61,15 @@ def simulate_batch(
     measured = ("estimate", "linear_estimate", "sigma_priori")
     with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
 
-        def results() -> Iterator[Result]:
+        def results() -> Iterator[CellStatistics]:
             for number, cell in enumerate(cells, 1):
-                at = f"{number}/{len(cells)} {cell.name}"
-                if not cell.estimability.estimable:
-                    log.info("%s: %s", at, cell.estimability.reason)
-                    yield Result(cell, Statistics.of_none(cell), {})
-                    continue
-                simulated = simulated_cell(cell, spec["seed"], spec["leveling"])
-                statistics, distributions, replicates = simulated
-                write(estimates_table(cell, replicates))
-                n, failed = statistics.simulated, statistics.simulated - statistics.converged
-                log.info("%s: %d replicates, %d not converged", at, n, failed)
-                yield Result(cell, statistics, distributions)
+                found = simulated_statistics(cell, spec["seed"], spec["leveling"])
+                n, failed = found.simulated, found.simulated - found.converged
+                if found.replicates is not None:
+                    write(estimates_table(cell, found.replicates))
+                said = cell.estimability.reason or f"{n} replicates, {failed} not converged"
+                log.info("%d/%d %s: %s", number, len(cells), cell.name, said)
+                yield found
 
         tables = tables_of(results())
     for name in TABLES:

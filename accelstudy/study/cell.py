@@ -130,6 +130,20 @@ class Cell:
         units = {p.name: p.unit for p in self.estimated_model.parameters}
         return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
 
+    @cached_property
+    def uniform_effects(self) -> dict[str, list[int]]:
+        """Estimated effects whose parameters have one unit, with the numbers of these."""
+        names, uniform = list(self.parameter_units), {}
+        for effect in self.estimated_model.effects:
+            if len({p.unit for p in effect.parameters}) == 1:
+                uniform[effect.spec] = [names.index(p.name) for p in effect.parameters]
+        return uniform
+
+    @property
+    def effect_columns(self) -> list[list[int]]:
+        """Numbers of the parameters of each of these effects."""
+        return list(self.uniform_effects.values())
+
     @property
     def n_unknowns(self) -> int:
         """Number of parameters that are estimated, gravity included."""

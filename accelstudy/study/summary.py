@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,41 +14,24 @@ from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
 from accelstudy.effects import get_effect
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.distributions import PROBABILITIES, Controlled
-from accelstudy.study.monte_carlo.followed import (
-    ANGLES,
-    ERROR,
-    POSTERIORI,
-    PRIORI,
-    TILT,
-    TILTS,
-    Key,
-)
-from accelstudy.study.monte_carlo.statistics import Estimates, Statistics
+from accelstudy.study.estimate import Estimates
+from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics
 
 COVERAGE = tuple(f"coverage_95{end}" for end in ("", "_se", "_gain", "_low", "_high"))
 VALUE = tuple(f"value{end}" for end in ("", "_se", "_gain", "_plain"))
 QUANTILES = ("quantity", "name", "unit", "probability", *VALUE)
 
 
-class Result(NamedTuple):
-    """What a cell came to: its calibrations and their distributions, empty if none converged."""
-
-    cell: Cell
-    statistics: Statistics
-    distributions: Mapping[Key, Controlled]
-
-
-def tables_of(results: Iterable[Result]) -> dict[str, pd.DataFrame]:
+def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:
     """Each of `TABLES` with the rows of some cells, in order."""
     cells, summary, leveling = [], [], []
     correlations, quantiles = [], []
-    for cell, statistics, distributions in results:
-        cells.append(_cell_row(cell, statistics))
-        summary += _summary_rows(cell, statistics)
-        correlations.append(_correlation_rows(cell, statistics))
-        leveling.append(_leveling_row(cell, statistics, distributions))
-        quantiles.append(_quantile_rows(cell, statistics, distributions))
+    for statistics in results:
+        cells.append(_cell_row(statistics))
+        summary += _summary_rows(statistics)
+        correlations.append(_correlation_rows(statistics))
+        leveling.append(_leveling_row(statistics))
+        quantiles.append(_quantile_rows(statistics))
     table = pd.DataFrame(cells)
     return {
         "cells": table,
@@ -73,7 +56,8 @@ def _labels(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _cell_row(cell: Cell, statistics: Statistics) -> dict[str, Any]:
+def _cell_row(statistics: CellStatistics) -> dict[str, Any]:
+    cell = statistics.cell
     theory = cell.estimability
     return {
         **_labels(cell),
@@ -90,7 +74,7 @@ def _cell_row(cell: Cell, statistics: Statistics) -> dict[str, Any]:
         "n_replicates": statistics.simulated,
         "n_converged": statistics.converged,
         "control": statistics.control,
-        **_columns("variance_factor", statistics.factor[0]),
+        **_columns("variance_factor", statistics.variance_factor[0]),
     }
 
 
@@ -108,42 +92,45 @@ def _columns(
     }
 
 
-def _summary_rows(cell: Cell, statistics: Statistics) -> list[dict[str, Any]]:
+def _summary_rows(statistics: CellStatistics) -> list[dict[str, Any]]:
     """Statistics of each parameter, in the units shown to people; NaN where there are none."""
-    theory, exact, followed = cell.estimability, _closed_forms(cell), statistics.followed
-    bias, sd, priori = statistics.bias, statistics.sd, statistics.mean(PRIORI)
-    posteriori = statistics.mean(POSTERIORI)
-    first = {name: statistics.first(name) for name in (ERROR, POSTERIORI)}
-    n = statistics.converged
+    cell, n = statistics.cell, statistics.converged
+    theory, exact = cell.estimability, _closed_forms(cell)
+    first_error, first_sigma = statistics.first
     freedom = sigmas_95(n - 1) if n > 1 else np.nan
     rows = []
-    for i, (name, unit) in enumerate(followed.units.items()):
+    for i, (name, unit) in enumerate(cell.parameter_units.items()):
         factor = float(to_recorded(1.0, unit))
-
-        def shown(estimates: Estimates, i: int = i, factor: float = factor) -> Estimates:
-            return estimates[i].scaled(factor)
-
-        half = freedom * bias.error[i]
+        bias, sd, priori, posteriori = (
+            each[i].scaled(factor)
+            for each in (
+                statistics.bias,
+                statistics.sd,
+                statistics.sigma_priori,
+                statistics.sigma_posteriori,
+            )
+        )
+        half = freedom * bias.error
         in_si = {
-            "bias_ci95_low": bias.value[i] - half,
-            "bias_ci95_high": bias.value[i] + half,
             "sd_linear": theory.sigma[i],
             "sd_closed_form": exact.get(name, np.nan),
-            "first_error": first[ERROR][i],
-            "first_sd_posteriori": first[POSTERIORI][i],
+            "first_error": first_error[i],
+            "first_sd_posteriori": first_sigma[i],
         }
         rows.append(
             {
                 **_labels(cell),
                 "parameter": name,
                 "unit": recorded_unit(unit),
-                "truth": float(to_recorded(followed.truth[i], unit)),
-                **_columns("bias", shown(bias), plain=True),
-                **_columns("sd_empirical", shown(sd), "sd", plain=True),
-                **_columns("sd_posteriori_mean", shown(posteriori), "sd_posteriori"),
-                **_columns("sd_priori_mean", shown(priori), "sd_priori"),
+                "truth": float(to_recorded(cell.true_values[i], unit)),
+                **_columns("bias", bias, plain=True),
+                **_columns("sd_empirical", sd, "sd", plain=True),
+                **_columns("sd_posteriori_mean", posteriori, "sd_posteriori"),
+                **_columns("sd_priori_mean", priori, "sd_priori"),
+                "bias_ci95_low": float(bias.value - half),
+                "bias_ci95_high": float(bias.value + half),
                 **{key: float(to_recorded(value, unit)) for key, value in in_si.items()},
-                **_ratio(posteriori[i], sd[i]),
+                **_ratio(statistics.sd_ratio[i]),
                 **_coverage(statistics, i),
                 "n_replicates": statistics.simulated,
                 "n_converged": n,
@@ -154,25 +141,24 @@ def _summary_rows(cell: Cell, statistics: Statistics) -> list[dict[str, Any]]:
     return rows
 
 
-def _ratio(posteriori: Estimates, sd: Estimates) -> dict[str, float]:
+def _ratio(ratio: Estimates) -> dict[str, float]:
     """Mean sigma a posteriori over empirical sd, with its 95 % confidence interval."""
-    ratio = float(posteriori.value / sd.value)
-    spread = float(np.hypot(posteriori.error / posteriori.value, sd.error / sd.value))
+    value, spread = float(ratio.value), float(ratio.error / ratio.value)
     return {
-        "sd_ratio": ratio,
-        "sd_ratio_ci95_low": ratio * math.exp(-Z95 * spread),
-        "sd_ratio_ci95_high": ratio * math.exp(Z95 * spread),
+        "sd_ratio": value,
+        "sd_ratio_ci95_low": value * math.exp(-Z95 * spread),
+        "sd_ratio_ci95_high": value * math.exp(Z95 * spread),
     }
 
 
-def _coverage(statistics: Statistics, i: int) -> dict[str, float]:
+def _coverage(statistics: CellStatistics, i: int) -> dict[str, float]:
     """Share of the nominal 95 % intervals that hold the truth, with its 95 % interval.
 
     Without a gain the interval is Wilson's. With one, few intervals hold the truth in simulation
     and not in linear theory, or the other way round; one more of these than there were is allowed
     for, as none may have been seen.
     """
-    n, inside = statistics.converged, statistics.inside[i]
+    n, inside = statistics.converged, statistics.coverage[i]
     if statistics.redundancy <= 0 or n == 0:
         return dict.fromkeys(COVERAGE, np.nan)
     plain = min(max(float(inside.plain), 0.0), 1.0)  # a mean of ones may round to more than one
@@ -209,70 +195,58 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
     }
 
 
-def _correlation_rows(cell: Cell, statistics: Statistics) -> pd.DataFrame:
+def _correlation_rows(statistics: CellStatistics) -> pd.DataFrame:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
-    names = list(statistics.followed.units) if statistics.simulated else []
-    pairs = len(names) ** 2
-    empirical = statistics.correlation
+    cell, empirical = statistics.cell, statistics.correlation
+    names = np.array(list(cell.parameter_units) if statistics.simulated else [], object)
+    u = len(names)
+    known = not np.isnan(empirical.plain).all()
+
+    def whole(below: Any, diagonal: float) -> Any:
+        matrix = np.full((u, u), diagonal if known else np.nan)
+        if u:
+            matrix[np.tril_indices(u, -1)] = below
+            matrix.T[np.tril_indices(u, -1)] = below
+        return matrix.ravel()
+
     return pd.DataFrame(
         {
-            "cell": np.full(pairs, cell.name, object),
-            "parameter_1": np.repeat(np.array(names, object), len(names)),
-            "parameter_2": np.tile(np.array(names, object), len(names)),
-            "adjustment": statistics.mean_correlation.ravel()[:pairs],
-            "empirical": empirical.value.ravel()[:pairs],
-            "empirical_se": empirical.error.ravel()[:pairs],
-            "empirical_gain": empirical.gain.ravel()[:pairs],
-            "empirical_plain": empirical.plain.ravel()[:pairs],
+            "cell": np.full(u * u, cell.name, object),
+            "parameter_1": np.repeat(names, u),
+            "parameter_2": np.tile(names, u),
+            "adjustment": statistics.mean_correlation.ravel()[: u * u],
+            "empirical": whole(empirical.value, 1.0),
+            "empirical_se": whole(empirical.error, 0.0),
+            "empirical_gain": whole(empirical.gain, np.nan),
+            "empirical_plain": whole(empirical.plain, 1.0),
         }
     )
 
 
-def _quantile_rows(
-    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
-) -> pd.DataFrame:
+def _quantile_rows(statistics: CellStatistics) -> pd.DataFrame:
     """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
-    units = {**statistics.followed.units, **dict.fromkeys(TILTS, "rad")}
-    n = statistics.converged
-    tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
-    chosen = np.flatnonzero((tail >= 0.0249) | (n * tail >= 0.999))
-    names, estimates = [], []
-    for (quantity, name), distribution in distributions.items():
-        if name in units:  # of effects there are claims, but no quantiles
-            factor = float(to_recorded(1.0, units[name]))
-            at = distribution.quantile(chosen).scaled(factor)
-            names.append((quantity, name, recorded_unit(units[name])))
-            estimates.append([at.value, at.error, at.gain, at.plain])
-    if not names:
-        return pd.DataFrame(columns=[*_labels(cell), *QUANTILES]).assign(
-            **_labels(cell), n_converged=n
-        )
-    size = len(chosen)
-    each = np.repeat(np.array(names, dtype=object), size, axis=0).T
-    columns = [
-        *each,
-        np.tile(PROBABILITIES[chosen], len(names)),
-        *np.moveaxis(np.array(estimates), 1, 0).reshape(4, -1),
-    ]
-    quantiles = dict(zip(QUANTILES, columns, strict=True))
-    return pd.DataFrame({**_labels(cell), **quantiles, "n_converged": n})
+    cell, labels = statistics.cell, _labels(statistics.cell)
+    units = {**cell.parameter_units, **dict.fromkeys(TILTS, "rad")}
+    parts: list[list[Any]] = [[] for _ in QUANTILES]
+    size = len(statistics.levels)
+    for (quantity, name), quantiles in statistics.quantiles.items():
+        shown = quantiles.scaled(float(to_recorded(1.0, units[name])))
+        same = (quantity, name, recorded_unit(units[name]))
+        columns: list[Any] = [[each] * size for each in same]
+        columns += [statistics.levels, shown.value, shown.error, shown.gain, shown.plain]
+        for part, column in zip(parts, columns, strict=True):
+            part.extend(column)
+    table = pd.DataFrame(dict(zip(QUANTILES, parts, strict=True)))
+    return pd.DataFrame({**labels, **table, "n_converged": statistics.converged}, table.index)
 
 
-def _leveling_row(
-    cell: Cell, statistics: Statistics, distributions: Mapping[Key, Controlled]
-) -> dict[str, Any]:
+def _leveling_row(statistics: CellStatistics) -> dict[str, Any]:
     """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
     rms = statistics.tilt_rms.scaled(1 / MGON)
-    row: dict[str, Any] = _labels(cell)
-    nothing = Estimates(*np.full(4, np.nan))
-    bounds = {
-        name: distributions[TILT, name].at(0.95).scaled(1 / MGON)
-        if (TILT, name) in distributions
-        else nothing
-        for name in TILTS
-    }
+    row: dict[str, Any] = _labels(statistics.cell)
     for i, angle in enumerate(ANGLES):
         row |= _columns(f"{angle}_rms_mgon", rms[i], f"{angle}_rms", plain=True)
     for name in TILTS:
-        row |= _columns(f"{name}_rms_q95_mgon", bounds[name], f"{name}_rms_q95", plain=True)
+        bound = statistics.quantile(TILT, name, 0.95).scaled(1 / MGON)
+        row |= _columns(f"{name}_rms_q95_mgon", bound, f"{name}_rms_q95", plain=True)
     return {**row, "n_converged": statistics.converged}

@@ -5,10 +5,8 @@ from accelstudy.files.tables import collect, read_table
 from accelstudy.study.batches import batches, simulate_batch
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
-from accelstudy.study.monte_carlo.distributions import distributions
-from accelstudy.study.monte_carlo.followed import cell_tilt_error
-from accelstudy.study.monte_carlo.replicates import simulate
-from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.statistics import statistics
 from accelstudy.study.tables import TABLES
 
 NINE = "bias-scale-nonorthogonality"
@@ -48,14 +46,12 @@ LEVELING = {"max_tilt_gon": 50, "attitudes": 200}
 
 def simulated(cell, seed=1):
     """All replicates of a cell."""
-    return simulate(cell, seed, None).simulated
+    return simulate(cell, seed).simulated
 
 
 def plain(cell, seed):
-    """Statistics and distributions of a cell as plain averages, without linear theory."""
-    tilt, replicates = cell_tilt_error(cell, LEVELING), simulate(cell, seed, None)
-    found = distributions(cell, replicates, None, tilt)
-    return Statistics.of(cell, replicates, None, tilt), found
+    """Statistics of a cell without linear theory."""
+    return statistics(cell, Replicates(simulated(cell, seed), None), LEVELING)
 
 
 def simulate_cells(folder, cells, seed=1, leveling=LEVELING):

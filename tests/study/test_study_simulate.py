@@ -35,8 +35,8 @@ from accelstudy.files.tables import (
 )
 from accelstudy.study import batches as module
 from accelstudy.study.batches import batches, memory
-from accelstudy.study.monte_carlo.distributions import simulated_cell
-from accelstudy.study.monte_carlo.replicates import ESTIMATES
+from accelstudy.study.replicates import ESTIMATES
+from accelstudy.study.statistics import simulated_statistics
 from accelstudy.study.tables import read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
@@ -234,9 +234,9 @@ def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return simulated_cell(cell, *which)
+        return simulated_statistics(cell, *which)
 
-    monkeypatch.setattr(module, "simulated_cell", broken)
+    monkeypatch.setattr(module, "simulated_statistics", broken)
     with pytest.raises(KeyboardInterrupt):
         simulate_cells(tmp_path, make_cells(grid()).values())
     assert calls == [GRAVITY, ROBOT]

@@ -14,10 +14,10 @@ from scipy.stats import binom
 from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
+from accelstudy.study import replicates as module
 from accelstudy.study import summary as module_of_tables
 from accelstudy.study.compiling import calibrator
-from accelstudy.study.monte_carlo import replicates as module
-from accelstudy.study.monte_carlo.statistics import Estimates
+from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import read_estimates
 
 STANDARD_ERRORS = 4.5
@@ -119,7 +119,7 @@ def test_coverage_of_the_confidence_intervals(summary):
 def test_wilson_interval_of_the_coverage():
     """Of plain averages."""
     inside = Estimates(*(np.array([x]) for x in (0.93, 1e-2, 1.0, 0.93)))
-    statistics = SimpleNamespace(converged=500, redundancy=3, inside=inside)
+    statistics = SimpleNamespace(converged=500, redundancy=3, coverage=inside)
     row = module_of_tables._coverage(statistics, 0)
     p, n, z = row["coverage_95"], 500, 1.959964
     centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
@@ -131,7 +131,7 @@ def test_wilson_interval_of_the_coverage():
 def test_a_coverage_that_rounds_to_more_than_one():
     """A mean of ones is made of differences and of linear theory's, each rounded."""
     inside = Estimates(*(np.array([x]) for x in (0.95, 1e-4, 9.0, np.nextafter(1, 2))))
-    statistics = SimpleNamespace(converged=30, redundancy=3, inside=inside)
+    statistics = SimpleNamespace(converged=30, redundancy=3, coverage=inside)
     row = module_of_tables._coverage(statistics, 0)
     assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
     assert row["coverage_95_se"] == 0

@@ -36,7 +36,7 @@ def names():
     ("leveling/error.py", BUT_OVERVIEW),
     ("study/config/schema.py", {"sensitivity", "claims", "figures"}),
     ("study/batches.py", {"simulate"}),
-    ("study/monte_carlo/distributions.py", {"simulate", "claims"}),
+    ("study/quantiles.py", {"simulate", "claims"}),
     ("leveling/sensitivity.py", {"sensitivity", "claims", "figures"}),
     ("design/closed_forms.py", {"simulate"}),
     ("drawing/style.py", {"figures", "calibrate"}),

@@ -11,20 +11,16 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.monte_carlo.control import Control
-from accelstudy.study.monte_carlo.distributions import (
-    EDGES,
-    PROBABILITIES,
-    Controlled,
-    Sample,
-    apart_by_quantile,
-)
-from accelstudy.study.monte_carlo.followed import EFFECT, cell_tilt_error
-from accelstudy.study.monte_carlo.replicates import Replicates, read_replicates
-from accelstudy.study.monte_carlo.statistics import Statistics
+from accelstudy.study.estimate import MEAN, controlled
+from accelstudy.study.known import KnownValues
+from accelstudy.study.quantiles import controlled_quantiles, share_below
+from accelstudy.study.replicates import read_replicates
+from accelstudy.study.statistics import calibrations, cell_tilt_error
 
 Array = NDArray[np.float64]
-CENTRAL = [PROBABILITIES.tolist().index(p) for p in (0.975, 0.5, 0.025)]
+LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
+CENTRAL = (0, 3, 6)
+"""The ends of the central 95 %, and the median."""
 
 
 def reductions(
@@ -49,92 +45,87 @@ def reductions(
         `half` of its 95 % interval; of single simulations `single_low`, `median` and `single_high`
         (the central 95 %) and `percentile`, the share below the paper's number.
     """
-    calibrations: dict[tuple[str, str], _Calibrations] = {}
+    sigmas: dict[tuple[str, str], _Sigmas] = {}
     for cell in cells:
-        read = _Calibrations.read(cell, estimates, leveling)
-        if read is not None and read.statistics.redundancy > 0 and read.statistics.converged:
-            calibrations[cell.scheme, cell.approach] = read
-    rows: list[dict[str, Any]] = []
+        read = _Sigmas.read(cell, estimates, leveling)
+        if read is not None:
+            sigmas[cell.scheme, cell.approach] = read
+    rows = []
     for effect, paper in papers.items():
-        for (scheme, approach), gravity in calibrations.items():
-            robot = calibrations.get((scheme, "robot"))
-            if approach == "gravity" and robot is not None:
-                numbers = _reduction(gravity, robot, effect, paper)
-                rows.append({"scheme": scheme, "effect": effect, **numbers})
+        for scheme in (name for name, approach in sigmas if approach == "gravity"):
+            if (scheme, "robot") in sigmas:
+                pair = sigmas[scheme, "gravity"], sigmas[scheme, "robot"]
+                reduction = _reduction(*pair, effect, paper)
+                rows.append({"scheme": scheme, "effect": effect, **reduction})
     return pd.DataFrame(rows)
 
 
-class _Calibrations(NamedTuple):
-    """The calibrations of a cell."""
+class _Sigmas(NamedTuple):
+    """Mean sigma a posteriori of each effect in each calibration of a cell.
 
-    statistics: Statistics
-    control: Control | None
-    replicates: Replicates
+    `own` is (c, e) in the calibrations that converged, `theory` (R, e) by linear theory.
+    """
+
+    effects: list[str]
+    own: Array
+    theory: Array | None
+    known: KnownValues | None
+    converged: NDArray[np.bool_]
 
     @classmethod
     def read(
         cls, cell: Cell, estimates: Sequence[str | Path], leveling: Mapping[str, Any]
-    ) -> _Calibrations | None:
-        """Read those of a cell; None if there are none."""
-        if not cell.estimability.estimable:
+    ) -> _Sigmas | None:
+        """Read those of a cell; None if it has none."""
+        replicates = read_replicates(estimates, cell) if cell.estimability.estimable else None
+        if replicates is None or replicates.simulated.redundancy <= 0:
             return None
-        tilt = cell_tilt_error(cell, leveling)
-        control = Control.of(cell, tilt)
-        replicates = read_replicates(estimates, cell, control)
-        if replicates is None:
+        simulated, linear = replicates
+        if not simulated.converged.any():
             return None
-        return cls(Statistics.of(cell, replicates, control, tilt), control, replicates)
+        theory = None if linear is None else calibrations(cell, linear)["effect_sigma"]
+        known = None
+        if cell.linear_theory is not None:
+            known = KnownValues(cell, cell.linear_theory, cell_tilt_error(cell, leveling))
+        own = calibrations(cell, simulated)["effect_sigma"]
+        return cls(list(cell.uniform_effects), own, theory, known, simulated.converged)
 
-    def mean(self, effect: str) -> tuple[float, float]:
-        """Mean sigma a posteriori of an effect with its standard error, SI."""
-        mean = self.statistics.mean(EFFECT)[list(self.statistics.followed.effects).index(effect)]
-        return float(mean.value), float(mean.error)
+    def mean(self, effect: int) -> tuple[float, float]:
+        """Mean sigma of an effect with its standard error, SI."""
+        known = np.nan if self.known is None else self.known.effect_sigma
+        mean = controlled(MEAN, self.own, self.theory, known, self.converged)
+        return float(mean.value[effect]), float(mean.error[effect])
 
-    def sigmas(self, effect: str) -> tuple[Array, Array]:
-        """Sigma of an effect in the calibrations that converged, and by linear theory."""
-        followed, (simulated, linear) = self.statistics.followed, self.replicates
-        column = followed.keys.index((EFFECT, effect))
-        own = followed.values(simulated)[:, column]
-        if linear is None:
-            return own, own
-        return own, followed.values(linear)[simulated.converged, column]
+    def paired(self, effect: int, n: int) -> tuple[Array, Array | None]:
+        """Sigmas of an effect in the first n calibrations that converged, and by linear theory."""
+        theory = None if self.theory is None else self.theory[self.converged][:n, effect]
+        return self.own[:n, effect], theory
 
 
-def _reduction(
-    gravity: _Calibrations, robot: _Calibrations, effect: str, paper: float
-) -> dict[str, float]:
-    """Columns of `reductions` for one scheme and effect."""
-    (below, error_below), (above, error_above) = gravity.mean(effect), robot.mean(effect)
-    mean, ratio = 100 * (1 - above / below), _ratio(gravity, robot, effect)
-    low, median, high = 100 * (1 - ratio.quantile(np.array(CENTRAL)).value)
+def _reduction(gravity: _Sigmas, robot: _Sigmas, effect: str, paper: float) -> dict[str, float]:
+    """Columns of `reductions` for one scheme and effect.
+
+    Sessions are independent; single calibrations are paired by their number.
+    """
+    at = gravity.effects.index(effect)
+    (below, error_below), (above, error_above) = gravity.mean(at), robot.mean(at)
+    mean, n = 100 * (1 - above / below), min(len(gravity.own), len(robot.own))
+    (own_above, theory_above), (own_below, theory_below) = (
+        robot.paired(at, n),
+        gravity.paired(at, n),
+    )
+    ratio, theory, known = own_above / own_below, None, None
+    if theory_above is not None and theory_below is not None:
+        theory = theory_above / theory_below
+    if robot.known is not None and gravity.known is not None:
+        known = robot.known.effect_ratio_quantiles(gravity.known, at, LEVELS)
+    quantiles = controlled_quantiles(LEVELS, ratio, theory, known)
+    high, median, low = 100 * (1 - quantiles.value[[*CENTRAL]])
     return {
         "mean": mean,
         "half": 1.96 * (100 - mean) * float(np.hypot(error_above / above, error_below / below)),
         "single_low": float(low),
         "median": float(median),
         "single_high": float(high),
-        "percentile": float(100 * (1 - ratio.share_below(1 - paper / 100))),
+        "percentile": float(100 * (1 - share_below(1 - paper / 100, ratio, quantiles))),
     }
-
-
-def _ratio(gravity: _Calibrations, robot: _Calibrations, effect: str) -> Controlled:
-    """Ratio of the sigma of an effect, robot-aided over gravity-based, of independent sessions.
-
-    Calibrations are paired by their number.
-    """
-    n = min(gravity.statistics.converged, robot.statistics.converged)
-    above, linear_above = robot.sigmas(effect)
-    below, linear_below = gravity.sigmas(effect)
-    ratio = above[:n] / below[:n]
-    numerator, denominator = robot.control, gravity.control
-    if numerator is None or denominator is None:
-        return Controlled(Sample(ratio), n)
-    linear = linear_above[:n] / linear_below[:n]
-
-    def known(probabilities: Array) -> Array:
-        return numerator.ratio_quantiles(denominator, effect, probabilities)
-
-    apart = apart_by_quantile(ratio - linear, linear, known(EDGES))
-    return Controlled(
-        Sample(ratio), n, linear=Sample(linear), known=known(PROBABILITIES), apart=apart
-    )

@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
+from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.tables import REMEDY
 from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
-from accelstudy.study.monte_carlo.control import Control
 
 Array = NDArray[np.float64]
 
@@ -43,26 +43,34 @@ ESTIMATES = pa.schema(
 """One row per cell, replicate and parameter, SI. Columns that follow from these are not stored: the
 error is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
 (`read_estimates` adds them). `linear_estimate` and `linear_omega` are those of linear theory of the
-same noise; null without a control. Columns that repeat within a replicate need next to no space."""
+same noise; null where there is none. Columns that repeat within a replicate hardly
+need space."""
 
 
 class Replicates(NamedTuple):
-    """Calibrations as they were simulated and as linear theory has them; None without a control."""
+    """All that passes from the simulation of a cell to its statistics.
+
+    Attributes
+    ----------
+    simulated : Block, the calibrations
+    linear : Block, those of linear theory of the same noise; None if there is no linear theory, as
+        the session without noise has no calibration
+    """
 
     simulated: Block
     linear: Block | None
 
 
-def simulate(cell: Cell, seed: int, control: Control | None) -> Replicates:
+def simulate(cell: Cell, seed: int) -> Replicates:
     """Simulate and calibrate all replicates of an estimable cell.
 
     Parameters
     ----------
     cell : Cell
     seed : int, of the study
-    control : Control or None
     """
     calibrate, angles = calibrator(cell), cell.conditions.uses_angles
+    theory = cell.linear_theory
     drawn = cell.ideal.draw_blocks(
         cell.noise,
         cell.replicates,
@@ -74,9 +82,28 @@ def simulate(cell: Cell, seed: int, control: Control | None) -> Replicates:
     simulated, linear = [], []
     for errors, observed in drawn:
         simulated.append(calibrate(cell.estimated_model, cell.conditions, observed))
-        if control is not None:
-            linear.append(control.block(errors, angles))
+        if theory is not None:
+            noise = errors.force
+            if angles:
+                assert errors.angle is not None
+                noise = np.concatenate([noise, errors.angle], axis=-1)
+            shift, omega = theory.errors(noise, errors.gravity)
+            linear.append(_linear_block(theory, theory.reference + shift, omega))
     return Replicates(Block.joined(simulated), Block.joined(linear) if linear else None)
+
+
+def _linear_block(theory: LinearTheory, estimates: Array, omega: Array) -> Block:
+    """Calibrations of linear theory with given estimates (R, u) and Ω (R,)."""
+    count, u = estimates.shape
+    return Block(
+        estimates=estimates,
+        sigma_priori=np.broadcast_to(theory.sigma, (count, u)),
+        omega=omega,
+        redundancy=theory.redundancy,
+        iterations=np.ones(count, int),
+        converged=np.ones(count, bool),
+        correlation_sum=np.full((u, u), np.nan),
+    )
 
 
 def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
@@ -115,16 +142,13 @@ def _coded(codes: Any, names: list[str]) -> pa.DictionaryArray:
     return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array(names))
 
 
-def read_replicates(
-    paths: Iterable[str | Path], cell: Cell, control: Control | None
-) -> Replicates | None:
+def read_replicates(paths: Iterable[str | Path], cell: Cell) -> Replicates | None:
     """Read the stored replicates of a cell; None if the files hold none of it.
 
     Parameters
     ----------
     paths : files of estimates; they may hold other cells too
     cell : Cell
-    control : Control or None
 
     Returns
     -------
@@ -135,9 +159,7 @@ def read_replicates(
     InputError
         If a file is missing or damaged.
     """
-    columns = ["estimate", "sigma_priori", "omega", "redundancy", "iterations", "converged"]
-    if control is not None:
-        columns += ["linear_estimate", "linear_omega"]
+    columns = [*ESTIMATES.names[5:]]
     tables = []
     for path in paths:
         with whole_parquet(path, REMEDY) as file:
@@ -162,10 +184,11 @@ def read_replicates(
         converged=per_replicate("converged"),
         correlation_sum=np.full((u, u), np.nan),
     )
-    if control is None:
+    theory = cell.linear_theory
+    if theory is None:
         return Replicates(simulated, None)
-    linear = control.kept(per_parameter("linear_estimate"), per_replicate("linear_omega"))
-    return Replicates(simulated, linear)
+    linear = per_parameter("linear_estimate"), per_replicate("linear_omega")
+    return Replicates(simulated, _linear_block(theory, *linear))
 
 
 def _cell_of(file: pq.ParquetFile, number: int) -> str:

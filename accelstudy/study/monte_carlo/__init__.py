@@ -1,1 +1,0 @@
-"""Simulated calibrations of a cell, and the statistics that follow from them."""

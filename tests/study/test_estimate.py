@@ -1,0 +1,266 @@
+"""Estimates with linear theory as control variate: right, and as far off as they state."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+from study_helpers import LEVELING, grid, make_cells, plain, run_study
+
+from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, controlled
+from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles, share_below
+from accelstudy.study.replicates import simulate
+from accelstudy.study.statistics import TILT, simulated_statistics
+
+STANDARD_ERRORS = 4.5
+OFTEN = 200
+"""Samples over which errors are compared with the scatter, to 5 %."""
+
+
+def cell_of(sigma=0.002, approach="gravity", replicates=1000, **keys):
+    """The paper's set-up with the noise of forces and angles scaled."""
+    (cell,) = make_cells(grid(approaches=approach, replicates=replicates), **keys).values()
+    factor = sigma / cell.noise.sigma_force
+    angle = factor * cell.noise.sigma_angle
+    return replace(cell, noise=replace(cell.noise, sigma_force=sigma, sigma_angle=angle))
+
+
+# --- one estimator for every statistic -----------------------------------------------------------
+
+SIGMA = np.array([1.0, 2.0, 0.5])
+ROOT = np.linalg.cholesky(np.array([[1.0, 0.6, 0.0], [0.6, 1.0, -0.3], [0.0, -0.3, 1.0]]))
+KNOWN = {
+    "mean": (MEAN, np.zeros(3)),
+    "share": (MEAN, np.full(3, 0.95)),
+    "sd": (SD, SIGMA),
+    "rms": (ROOT_MEAN, SIGMA),
+    "correlation": (CORRELATION, np.array([0.6, 0.0, -0.3])),
+    "ratio": (RATIO, np.sqrt(2 / np.pi) * SIGMA / SIGMA),
+}
+"""Statistics of the normal y = SIGMA · ROOT · z, of which the ratio is E|y| / sd(y)."""
+
+
+def numbers(kind, x):
+    """The numbers of which `kind` is a statistic."""
+    inside = np.abs(x) <= stats.norm.ppf(0.975) * SIGMA
+    kinds = {"share": inside.astype(float), "rms": x**2, "ratio": np.hstack([np.abs(x), x])}
+    return kinds.get(kind, x)
+
+
+def samples(n, apart, kind, seeds=OFTEN):
+    """Estimates of x = y + apart · ε for many samples: (values, errors, gains)."""
+    statistic, known = KNOWN[kind]
+    found = []
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        y = rng.standard_normal((n, 3)) @ ROOT.T * SIGMA
+        x = y + apart * SIGMA * rng.standard_normal((n, 3))
+        found.append(controlled(statistic, numbers(kind, x), numbers(kind, y), known))
+    return (
+        np.array([getattr(each, name) for each in found]) for name in ("value", "error", "gain")
+    )
+
+
+def expected(kind, apart):
+    """The statistics of x."""
+    wider = np.hypot(1, apart)
+    correlation = np.array([0.6, 0.0, -0.3]) / wider**2
+    share = np.full(3, 2 * stats.norm.cdf(stats.norm.ppf(0.975) / wider) - 1)
+    of = {"sd": SIGMA * wider, "rms": SIGMA * wider, "correlation": correlation, "share": share}
+    return of.get(kind, KNOWN[kind][1])
+
+
+@pytest.mark.parametrize(
+    ("kind", "n", "apart"),
+    [
+        *((kind, *each) for kind in KNOWN for each in [(100, 0.1), (1000, 3.0)]),
+        *((kind, 20, 0.01) for kind in KNOWN if kind != "share"),  # of 20, often all are inside
+    ],
+)
+def test_every_statistic_is_as_far_off_as_it_states(kind, n, apart):
+    values, errors, gains = samples(n, apart, kind)
+    scatter = values.std(axis=0, ddof=1)
+    if kind == "share":  # of few differences an error may be 0
+        scatter, errors = np.hypot(scatter, 1 / n), np.hypot(errors, 1 / n)
+    ratio = np.sqrt(np.mean((scatter / np.sqrt(np.mean(errors**2, axis=0))) ** 2))
+    assert 0.85 < ratio < 1.15
+    # Off by no more than the scatter of the mean, and a little that only few replicates have.
+    off = np.abs(values.mean(axis=0) - expected(kind, apart))
+    assert (off < STANDARD_ERRORS * scatter / np.sqrt(OFTEN) + 0.3 * scatter / np.sqrt(n)).all()
+    if apart < 1 and kind != "share":
+        assert np.median(gains) > 0.1 / apart**2
+
+
+def test_plain_statistics_have_their_textbook_errors():
+    rng = np.random.default_rng(1)
+    x = rng.standard_normal((10_000, 3)) @ ROOT.T * SIGMA
+    mean, sd, rms = (controlled(each, of) for each, of in ((MEAN, x), (SD, x), (ROOT_MEAN, x**2)))
+    np.testing.assert_allclose(mean.error, SIGMA / 100, rtol=0.05)
+    np.testing.assert_allclose(sd.error, SIGMA / 100 / np.sqrt(2), rtol=0.05)
+    np.testing.assert_allclose(rms.error, sd.error, rtol=0.05)
+    correlation = controlled(CORRELATION, x)
+    np.testing.assert_allclose(
+        correlation.error, (1 - KNOWN["correlation"][1] ** 2) / 100, rtol=0.05
+    )
+    np.testing.assert_allclose(correlation.plain, np.corrcoef(x.T)[np.tril_indices(3, -1)])
+    for each in (mean, sd, rms, correlation):
+        assert (each.gain == 1).all()
+        assert (each.value == each.plain).all()
+
+
+def test_a_mean_is_that_of_the_regression_on_linear_theory():
+    rng = np.random.default_rng(2)
+    y = rng.standard_normal((400, 1))
+    x = 0.8 * y + 0.1 * rng.standard_normal((400, 1)) + 0.3
+    found = controlled(MEAN, x, y, np.zeros(1))
+    slope = np.cov(x[:, 0], y[:, 0])[0, 1] / y.var(ddof=1)
+    assert found.value[0] == pytest.approx((x - slope * y).mean(), rel=1e-9)
+    assert found.error[0] == pytest.approx((x - slope * y).std(ddof=1) / 20, rel=0.01)
+
+
+def test_what_linear_theory_does_not_know_stays_plain():
+    """Its constants tell nothing either, as of 19 replicates or fewer."""
+    rng = np.random.default_rng(3)
+    x = 1 + 0.1 * rng.standard_normal((50, 2))
+    for theory, known in ((x, [np.nan, np.nan]), (np.ones((50, 2)), [1.0, 1.0])):
+        found = controlled(MEAN, x, theory, np.array(known))
+        assert (found.gain == 1).all()
+        np.testing.assert_allclose(found.value, x.mean(axis=0))
+        np.testing.assert_allclose(found.error, x.std(axis=0, ddof=1) / np.sqrt(50))
+    assert (controlled(MEAN, x[:19], x[:19], np.ones(2)).gain == 1).all()
+
+
+@pytest.mark.parametrize("statistic", [MEAN, SD])
+def test_failures_that_hang_on_the_noise_are_no_bias(statistic):
+    """What fails is what would have been large: the statistic of the rest is not that of all."""
+    truncated = stats.truncnorm(-np.inf, 1.5)
+    true, known = {MEAN: (truncated.mean(), 0.0), SD: (truncated.std(), 1.0)}[statistic]
+    values, errors = [], []
+    for seed in range(OFTEN):
+        rng = np.random.default_rng(seed)
+        y = rng.standard_normal((500, 1))
+        converged = y[:, 0] < 1.5
+        x = y[converged] + 0.01 * rng.standard_normal((converged.sum(), 1))
+        found = controlled(statistic, x, y, np.array([known]), converged)
+        values.append(found.value[0])
+        errors.append(found.error[0])
+        assert found.gain[0] > 0.95
+    scatter = np.std(values)
+    assert np.mean(values) == pytest.approx(
+        true, abs=STANDARD_ERRORS * scatter / np.sqrt(OFTEN) + 1e-3
+    )
+    assert scatter == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.15)
+
+
+@pytest.mark.parametrize("apart", [1e-4, 1e-2, 0.3, 3.0])
+def test_quantiles_of_a_normal_sum(apart):
+    """x = y + ε, whose quantiles are known: as far off as is stated."""
+    levels = PROBABILITIES[np.abs(PROBABILITIES - 0.5) <= 0.475]
+    known = stats.norm.ppf(levels)
+    rng = np.random.default_rng(6)
+    z, gains = [], []
+    for _ in range(200):
+        y = rng.standard_normal(1000)
+        x = y + apart * rng.standard_normal(1000)
+        found = controlled_quantiles(levels, x, y, known)
+        z.append((found.value - known * np.hypot(1, apart)) / found.error)
+        gains.append(found.gain)
+        assert share_below(found.value[-1], x, found) == pytest.approx(levels[-1], abs=0.002)
+    rms = np.sqrt(np.mean(np.square(z), axis=0))
+    assert (rms < 1.25).all()
+    assert (rms > 0.5).all()
+    assert np.min(gains) >= 1
+    assert np.median(gains) > {1e-4: 1e4, 1e-2: 50, 0.3: 2, 3.0: 1}[apart] * 0.99
+
+
+# --- the statistics of cells ---------------------------------------------------------------------
+
+STATISTICS = ("bias", "sd", "sd_ratio", "correlation", "variance_factor", "tilt_rms")
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.3])
+@pytest.mark.parametrize("approach", ["gravity", "robot"])
+def test_stated_errors_are_those_over_seeds(noise, approach):
+    cell = cell_of(noise, approach, replicates=100)
+    many = [simulated_statistics(cell, seed, LEVELING, [0.5, 0.95]) for seed in range(40)]
+    for name in STATISTICS:
+        values = np.array([getattr(one, name).value for one in many])
+        errors = np.array([getattr(one, name).error for one in many])
+        ratio = values.std(axis=0, ddof=1) / np.sqrt(np.mean(errors**2, axis=0))
+        low, high = (0.8, 1.2) if values.shape[1] > 2 else (0.6, 1.45)
+        assert low < np.sqrt(np.mean(ratio**2)) < high, name
+    bounds = [one.quantile(TILT, "roll", 0.95) for one in many]
+    scatter = np.std([each.value for each in bounds])
+    assert 0.5 < scatter / np.sqrt(np.mean([each.error**2 for each in bounds])) < 1.5
+
+
+LACKING = {"simulated_effects": ["bias", "scale", "nonorthogonality", "quadratic_scale"]}
+DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
+
+
+@pytest.mark.parametrize(
+    ("noise", "approach", "keys", "gain"),
+    [
+        (0.002, "gravity", {}, 1e5),
+        (0.3, "robot", {}, 10),
+        # Linear theory is taken where the noise-free session is calibrated, not at the truth.
+        (0.002, "gravity", LACKING, 1000),
+        # The control is the normal noise on which effects act; its distribution stays known.
+        (0.002, "gravity", DISTURBED, 1),
+        (0.002, "gravity", {"noise": {"effects": ["quantisation"]}}, 1),
+    ],
+)
+def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, keys, gain):
+    few = simulated_statistics(cell_of(noise, approach, 400, **keys), 1, LEVELING)
+    many = plain(cell_of(noise, approach, 10_000, **keys), 2)
+    assert (few.control, many.control) == ("linear", "none")
+    limit = 6 if keys is DISTURBED else STANDARD_ERRORS  # heavy tails of squares
+    for name in ("bias", "sd", "tilt_rms", "variance_factor"):
+        one, other = getattr(few, name), getattr(many, name)
+        assert (other.gain == 1).all()
+        assert (one.gain > 0.9).all()
+        z = (one.value - other.value) / np.hypot(one.error, other.error)
+        assert np.abs(z).max() < limit, name
+    assert few.sd.gain.min() > gain * 0.9
+    for name in ("roll", "pitch", "both"):
+        one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
+        assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
+
+
+def test_where_calibrations_fail_what_is_left_is_estimated():
+    cell = cell_of(1.5, replicates=1000)
+    found = simulated_statistics(cell, 1, LEVELING)
+    assert 3 < found.simulated - found.converged < 300
+    many = plain(replace(cell, replicates=10_000), 2)
+    for name in ("bias", "sd", "coverage", "correlation", "tilt_rms"):
+        one, other = getattr(found, name), getattr(many, name)
+        error = np.hypot(np.hypot(one.error, other.error), 1 / 1000 if name == "coverage" else 0)
+        assert np.abs((one.value - other.value) / error).max() < STANDARD_ERRORS, name
+
+
+def test_plain_statistics_stand_beside():
+    cell = cell_of(0.1, replicates=300)
+    found, alone = simulated_statistics(cell, 1, LEVELING), plain(cell, 1)
+    errors = simulate(cell, 1).simulated.estimates - cell.true_values
+    np.testing.assert_allclose(found.bias.plain, errors.mean(axis=0))
+    np.testing.assert_allclose(found.sd.plain, errors.std(axis=0, ddof=1))
+    for name in STATISTICS:
+        np.testing.assert_array_equal(getattr(found, name).plain, getattr(alone, name).value)
+        assert np.median(getattr(found, name).gain) > 10
+    one, other = found.quantile(TILT, "both", 0.95), alone.quantile(TILT, "both", 0.95)
+    assert one.plain == other.value
+
+
+def test_few_replicates_have_no_control(tmp_path):
+    """A coefficient of a handful of replicates would fit them."""
+    tables = run_study(tmp_path, grids=[grid(replicates=19)])
+    assert set(tables["cells"]["control"]) == {"none"}
+    assert (tables["summary"]["sd_gain"] == 1).all()
+    assert tables["quantiles"]["value_se"].isna().all()
+
+
+def test_a_standard_deviation_that_hardly_varies_is_its_mean(tmp_path):
+    """Linear theory has one standard deviation a priori for all replicates, up to rounding."""
+    rows = run_study(tmp_path, grids=[grid(schemes="random-38", replicates=100)])["summary"]
+    np.testing.assert_allclose(rows["sd_priori_mean"], rows["sd_linear"], rtol=1e-4)
+    assert (rows["sd_priori_gain"] == 1).all()
