@@ -245,6 +245,7 @@ def test_verdict_on_the_correlation(tables, rejudge):
 
 
 def test_a_scheme_without_redundancy_has_no_reduction(reduced, rejudge):
+    assert list(reductions([], [], LEVELING, papers_reductions())) == [*reduced]
     claims, by_scheme = rejudge(reduced[reduced["scheme"] != "rings-24"])
     schemes = by_scheme.filter(like="reduction", axis=0).index.get_level_values("scheme")
     assert set(schemes) == {"mclaren-24"}

@@ -30,6 +30,7 @@ from accelstudy.study.figures import (
 )
 from accelstudy.study.figures.calibrations import correlation_matrix, single_runs
 from accelstudy.study.figures.factors import FACTORS
+from accelstudy.study.figures.panels import Panel, panels
 from accelstudy.study.figures.table_1 import preset_table
 from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
 
@@ -325,6 +326,24 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
     }  # fmt: skip
     needed = {key: nothing[key] for key in figure_tables(name)}
     paint(draw(name, needed, paper))
+
+
+@pytest.mark.parametrize("shared", [{}, {"sharex": True, "sharey": True}])
+def test_an_empty_panel_has_neither_ticks_nor_numbers_of_its_own(shared):
+    full, empty = Panel([1.0, 2.0]), Panel([])
+
+    def shown(grid):
+        drawn, axes = panels(grid, lambda ax, data: ax.plot(data), 40, **shared)
+        paint(drawn)
+        ticks = [tick for axis in (axes[0, 0].xaxis, axes[0, 0].yaxis) for tick in axis.majorTicks]
+        length = {tick.tick1line.get_markersize() for tick in ticks}
+        return length, {tick.label1.get_visible() for tick in ticks}
+
+    assert shown([[empty, empty]]) == ({0.0}, {False})
+    # The numbers of an axis in common stand at the left and at the bottom, whatever is there.
+    assert shown([[empty], [full]])[0] == {0.0}
+    assert shown([[empty, full]])[1] == {bool(shared)}
+    assert shown([[full, empty]])[1] == {True}
 
 
 def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own():

@@ -19,6 +19,9 @@ from accelstudy.study.statistics import calibrations, cell_tilt_error
 
 Array = NDArray[np.float64]
 LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
+COLUMNS = (
+    *("scheme", "effect", "mean", "half", "single_low", "median", "single_high", "percentile"),
+)
 CENTRAL = (0, 3, 6)
 """The ends of the central 95 %, and the median."""
 
@@ -57,7 +60,7 @@ def reductions(
                 pair = sigmas[scheme, "gravity"], sigmas[scheme, "robot"]
                 reduction = _reduction(*pair, effect, paper)
                 rows.append({"scheme": scheme, "effect": effect, **reduction})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 class _Sigmas(NamedTuple):

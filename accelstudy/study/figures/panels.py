@@ -86,6 +86,8 @@ def panels(
     axes = drawn.subplots(len(grid), max(map(len, grid)), squeeze=False, **shared)
     for ax in axes.flat:
         ax.set_axis_off()
+    # An empty panel has no numbers of its own, but those of a row or column may stand at it.
+    numbered = bool(shared) and any(len(panel.data) for row in grid for panel in row)
     for row, places in zip(grid, axes, strict=True):
         for panel, ax in zip(row, places, strict=False):
             ax.set_axis_on()
@@ -96,8 +98,10 @@ def panels(
                 draw(ax, panel.data)
             else:
                 say_empty(ax, panel.nothing)
-                if not shared:
-                    ax.set(xticks=[], yticks=[])
+                ax.grid(False)
+                ax.tick_params(which="both", length=0)
+                if not numbered:
+                    ax.tick_params(which="both", labelbottom=False, labelleft=False)
     return drawn, axes
 
 
