@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from accelstudy.api.simulations import Simulation, simulate
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.session import Campaign
+    from accelstudy.study.run import run_study
 
     __version__: str
 
@@ -69,6 +70,7 @@ _PLACES = {
     ),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
+    "study.run": ("run_study",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
@@ -96,6 +98,7 @@ __all__ = [
     "read_calibration",
     "read_campaign",
     "read_log",
+    "run_study",
     "simulate",
     "simulate_campaign",
 ]

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.importing.public import next_attempt
-from accelstudy.files.outputs import BATCH_JOB, LOT
 
 
 include: "rules/start.smk"
@@ -13,6 +12,7 @@ include: "rules/start.smk"
 BATCH, RESULTS = configured(
     parse_batch, "batch", "no campaigns; name them with --configfile config/campaigns.yaml"
 )
+VERSION = code_version()
 TASKS = {task.name: task for task in BATCH.tasks()}
 OUTPUTS = [
     f"{RESULTS}/campaigns.parquet",
@@ -23,9 +23,7 @@ RECORDS = [
     f"{RESULTS}/public/{task.source}.json" for task in TASKS.values() if task.kind == "public"
 ]
 
-FOLDERS = {f"{RESULTS}/campaigns/{name}": BATCH_JOB for name in TASKS}
 TOGETHER = [] if BATCH.lot is None else [f"{RESULTS}/lot"]
-look_at_earlier(OUTPUTS + RECORDS, folders=FOLDERS | dict.fromkeys(TOGETHER, LOT))
 
 
 wildcard_constraints:
@@ -38,7 +36,7 @@ MEASURED = {
     name: (
         {"record": f"{RESULTS}/public/{task.source}.json"}
         if task.kind == "public"
-        else {"files": [given(path) for path in task.files() if "{" not in path]}
+        else {"files": [local(path) for path in task.files() if "{" not in path]}
     )
     for name, task in TASKS.items()
 }
@@ -67,7 +65,7 @@ rule public:
         "envs/accelstudy.yaml"
     params:
         folder=BATCH.public_folder,
-        attempt=lambda wildcards: next_attempt(placed(f"{RESULTS}/public/{wildcards.public}.json")),
+        attempt=lambda wildcards: next_attempt(f"{RESULTS}/public/{wildcards.public}.json"),
     message:
         "Download the public data {wildcards.public}"
     script:
@@ -81,18 +79,13 @@ rule calibrate:
         directory(f"{RESULTS}/campaigns/{{campaign}}"),
     log:
         f"{RESULTS}/logs/campaigns/{{campaign}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/campaigns/{{campaign}}.tsv"
     conda:
         "envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
         braced=lambda wildcards: BRACED[wildcards.campaign],
         angle_unit=angle_unit(),
-        code=code_of("calibrate"),
+        version=VERSION,
     message:
         "Calibrate {wildcards.campaign}"
     script:
@@ -108,16 +101,11 @@ rule overview:
         page=f"{RESULTS}/overview.html",
     log:
         f"{RESULTS}/logs/overview.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/overview.tsv"
     conda:
         "envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         angle_unit=angle_unit(),
-        code=code_of("overview"),
+        version=VERSION,
     message:
         "Summarise the campaigns"
     script:
@@ -132,16 +120,12 @@ rule lot:
         directory(f"{RESULTS}/lot"),
     log:
         f"{RESULTS}/logs/lot.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/lot.tsv"
     conda:
         "envs/accelstudy.yaml"
     threads: workflow.cores or 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         angle_unit=angle_unit(),
-        code=code_of("lot"),
+        version=VERSION,
     message:
         "Evaluate all campaigns together"
     script:

@@ -3,7 +3,6 @@
 from dataclasses import asdict
 
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.files.outputs import CAMPAIGN, DIAGNOSIS
 from accelstudy.schemes import is_scheme_file
 
 
@@ -15,7 +14,7 @@ TRIP, RESULTS = configured(
     "campaign.name",
     "no campaign; give it with --configfile config/diagnose-example.yaml",
 )
-look_at_earlier([], folders={f"{RESULTS}/campaign": CAMPAIGN, f"{RESULTS}/diagnosis": DIAGNOSIS})
+VERSION = code_version()
 
 
 rule round_trip:
@@ -26,22 +25,17 @@ rule round_trip:
 
 rule simulate_campaign:
     input:
-        [given(TRIP.campaign.scheme)] if is_scheme_file(TRIP.campaign.scheme) else [],
+        [local(TRIP.campaign.scheme)] if is_scheme_file(TRIP.campaign.scheme) else [],
     output:
         campaign=directory(f"{RESULTS}/campaign"),
         truth=f"{RESULTS}/truth.yaml",
     log:
         f"{RESULTS}/logs/simulate_campaign.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/simulate_campaign.tsv"
     conda:
         "envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         settings=asdict(TRIP.campaign),
-        code=code_of("simulate_campaign"),
+        version=VERSION,
     message:
         "Simulate the campaign"
     script:
@@ -55,13 +49,8 @@ rule diagnose:
         directory(f"{RESULTS}/diagnosis"),
     log:
         f"{RESULTS}/logs/diagnose.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/diagnose.tsv"
     conda:
         "envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         settings={
             "model": TRIP.model,
@@ -70,7 +59,7 @@ rule diagnose:
             "replicates": TRIP.replicates,
         },
         angle_unit=angle_unit(),
-        code=code_of("diagnose"),
+        version=VERSION,
     message:
         "Diagnose the campaign"
     script:

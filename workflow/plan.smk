@@ -9,7 +9,7 @@ include: "rules/start.smk"
 EXAMPLE, RESULTS = configured(
     parse_example, "study", "nothing to plan; name it with --configfile config/plan-example.yaml"
 )
-config["seed"] = EXAMPLE.seed  # for the jobs, if it is the default
+VERSION = code_version()
 OUTPUTS = []
 section = in_a_line()(parse_section)
 
@@ -17,9 +17,6 @@ section = in_a_line()(parse_section)
 for name in EXAMPLE.sections:
 
     include: f"rules/{name}.smk"
-
-
-look_at_earlier(OUTPUTS, seed=EXAMPLE.seed)
 
 
 rule plan_example:

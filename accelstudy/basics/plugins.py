@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -32,7 +32,7 @@ HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under
 """What a message adds to the names that are known."""
 LARGEST = 1_000_000
 """Bytes of the largest file of code."""
-_CODE = (".py", ".yaml", ".yml", ".json")
+_CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
@@ -202,7 +202,9 @@ def digests() -> dict[str, str]:
     found = dict(_files)
     for group in entry_points().groups:
         if group.startswith(PREFIX):
-            found |= {label(p): _digest_of(p) for p in installed(group.removeprefix(PREFIX))}
+            found |= {
+                label(p): code_digest(*_folders(p)) for p in installed(group.removeprefix(PREFIX))
+            }
     return found
 
 
@@ -214,12 +216,12 @@ def _folders(point: EntryPoint) -> list[Path]:
     return [Path(folder) for folder in spec.submodule_search_locations or [str(spec.origin)]]
 
 
-def _digest_of(point: EntryPoint) -> str:
-    """Digest of all code of a package."""
+def code_digest(*folders: Path, without: Collection[Path] = ()) -> str:
+    """Digest of all code in some folders `without` others; a package may be one file instead."""
     digest = hashlib.sha256()
-    for folder in _folders(point):
+    for folder in folders:
         for path in sorted(folder.rglob("*")) if folder.is_dir() else [folder]:
-            if path.suffix in _CODE:
+            if path.suffix in _CODE and not any(map(path.is_relative_to, without)):
                 digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

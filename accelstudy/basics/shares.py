@@ -9,11 +9,10 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 Array = NDArray[np.float64]
 
-Z95 = float(special.ndtri(0.975))
+Z95 = 1.959963984540054
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
@@ -29,7 +28,11 @@ def sigmas_95(redundancy: int | None = None) -> float:
         That of the residuals that the standard deviation was estimated from; NaN is returned where
         there is none. By default it is known.
     """
-    return Z95 if redundancy is None else float(special.stdtrit(redundancy, 0.975))
+    if redundancy is None:
+        return Z95
+    from scipy import special  # a job that only draws goes without
+
+    return float(special.stdtrit(redundancy, 0.975))
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
@@ -37,6 +40,8 @@ def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tupl
 
     Where n is 0 nothing is known, and the interval is from 0 to 1.
     """
+    from scipy import special
+
     count, n = np.asarray(count, dtype=float), np.asarray(n, dtype=float)
     tail = (1 - level) / 2
     low = special.betaincinv(np.maximum(count, 1), n - count + 1, tail)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -58,9 +58,8 @@ def git_commit() -> str:
 def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance that is written into each file.
 
-    `provenance` holds `config_hash` and `seed`, and `setup` where the file is of a batch (see
-    `accelstudy.jobs.job`). Commit and versions of what numbers depend on are added, and digests of
-    the plug-ins that there are.
+    `provenance` holds `config_hash` and `seed`. Commit and versions of what numbers depend on are
+    added, and digests of the plug-ins that there are.
     """
     return {
         **provenance,
@@ -71,6 +70,7 @@ def origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+@cache
 def _version(name: str) -> str | None:
     """Version of an installed library; None if it is not installed."""
     try:
@@ -119,42 +119,40 @@ def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.Da
     Raises
     ------
     InputError
-        If a file is missing, or is not whole as it was written, or a folder holds files that were
-        made with different seeds.
+        If a file is missing, or is not whole as it was written, or files were made with different
+        seeds.
     """
     import pandas as pd
 
     if not isinstance(path, str | Path):
+        _check_seeds(path)
         return pd.concat([read_table(each, **options) for each in path], ignore_index=True)
     path = Path(path)
     if path.is_dir():
-        paths = sorted(path.glob("*.parquet"))
+        paths = tables_in(path)
         if not paths:
             raise InputError(f"{path}: holds no tables")
-        _check_seeds(paths)
         return read_table(paths, **options)
     return read_frame(path, REMEDY, **options)
 
 
-def _check_seeds(paths: Sequence[Path]) -> None:
-    """Check that files belong to one study: a stopped run leaves some of an earlier one."""
-    seeds: dict[Any, Path] = {}
+def tables_in(folder: Path) -> list[Path]:
+    """Tables in a folder and the folders below it, without those that are being written."""
+    paths = {path.relative_to(folder): path for path in folder.rglob("*.parquet")}
+    return [paths[name] for name in sorted(paths) if not any(p[0] == "." for p in name.parts)]
+
+
+def _check_seeds(paths: Iterable[str | Path]) -> None:
+    """Check that files belong to one study: an earlier configuration may have left some."""
+    seeds: dict[Any, str | Path] = {}
     for path in paths:
         seeds.setdefault(read_origin(path)["seed"], path)
     if len(seeds) > 1:
         (one, first), (other, second) = list(seeds.items())[:2]
         raise InputError(
-            f"{second.parent}: holds files of different studies, {first.name} of seed {one} and "
-            f"{second.name} of seed {other}; run the study again: it removes or names those that "
-            "are not its own"
+            f"{first} is of seed {one}, and {second} of seed {other}; delete what is not of your "
+            "study, and run it again"
         )
-
-
-def collect(parts: Sequence[str | Path], output: str | Path, provenance: Mapping[str, Any]) -> None:
-    """Join the parts of a table into one."""
-    import pandas as pd
-
-    write_table(output, pd.concat(map(read_table, parts), ignore_index=True), provenance)
 
 
 def read_origin(path: str | Path) -> dict[str, Any]:

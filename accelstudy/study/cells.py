@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from accelstudy.study.config import Grid, StudyConfig
 
 
+MEGABYTES, BYTES_PER_ESTIMATE = 1000, 120
+"""Memory of a job: at least, and for each estimate of its largest cell."""
+
+
 def study_cells(study: StudyConfig) -> list[Cell]:
     """All cells of a study, in the order of its configuration, without repetition.
 
@@ -34,6 +38,21 @@ def study_cells(study: StudyConfig) -> list[Cell]:
             if earlier is None or cell.replicates > earlier.replicates:
                 cells[cell.name] = cell
     return with_compiled(list(cells.values()))
+
+
+def fanned_out(cells: Sequence[Cell], pattern: str) -> dict[str, list[Cell]]:
+    """Cells by what they have in common, named by a pattern such as "{model}/{approach}"."""
+    groups: dict[str, list[Cell]] = {}
+    for cell in cells:
+        name = pattern.format(model=cell.model, scheme=cell.scheme, approach=cell.approach)
+        groups.setdefault(name, []).append(cell)
+    return groups
+
+
+def memory(cells: Sequence[Cell]) -> int:
+    """Memory that a job of cells needs, megabytes."""
+    estimates = max(cell.replicates * cell.n_unknowns for cell in cells)
+    return MEGABYTES + round(BYTES_PER_ESTIMATE * estimates / 1e6)
 
 
 def _grid_cells(study: StudyConfig, grid: Grid) -> Iterable[Cell]:

@@ -3,7 +3,7 @@
 Both give the same numbers to 1e-10 of a standard deviation or better, but not the same bits. A
 study must have the same bits however it is run. So the choice is made once, when its cells are
 planned, and is a part of each cell. It depends on the configuration and on whether the compiler is
-installed, and never on batches, on cores or on what was compiled before. It is among the parameters
+installed, and never on jobs, on cores or on what was compiled before. It is among the parameters
 of the jobs, so Snakemake runs a cell again when it changes. A job that should compile and has no
 compiler ends with an error.
 

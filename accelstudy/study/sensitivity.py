@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import to_si
-from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import leveling_shares
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.study.config import StudyConfig
 
-Tables: TypeAlias = str | Path | Sequence[str | Path]
-
 APPROACHES = ("gravity", "robot")
 """The approaches with whose calibrations the sensitivity is analysed."""
 
 
-def analyse_sensitivity(
-    study: StudyConfig, summary: Tables, output: str | Path, provenance: Mapping[str, Any]
-) -> None:
-    """Analyse the sensitivity of leveling and write the table.
+def sensitivity_table(study: StudyConfig, summary: pd.DataFrame) -> pd.DataFrame:
+    """Analyse the sensitivity of leveling.
 
     Its `analysis` is "forces" for the parameter-free model (figure 4), or the approach whose
     calibration gives the sds of the parameters (figures 5 and 6).
@@ -35,9 +28,7 @@ def analyse_sensitivity(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    summary : paths of tables of that name with all cells that are analysed
-    output : path of the table to write
-    provenance : see `accelstudy.files.tables.origin`
+    summary : DataFrame, the table of that name, with all cells that are analysed
     """
     settings = study.sensitivity
     assert settings is not None
@@ -60,17 +51,13 @@ def analyse_sensitivity(
         )
         table.insert(0, "analysis", analysis)
         tables.append(table)
-    write_table(output, pd.concat(tables, ignore_index=True), provenance)
+    return pd.concat(tables, ignore_index=True)
 
 
-def analyse_shapley(
-    study: StudyConfig,
-    summary: Tables,
-    correlations: Tables,
-    output: str | Path,
-    provenance: Mapping[str, Any],
-) -> None:
-    """Divide the variance of roll and pitch among correlated parameters, and write the table.
+def shapley_table(
+    study: StudyConfig, summary: pd.DataFrame, correlations: pd.DataFrame
+) -> pd.DataFrame:
+    """Divide the variance of roll and pitch among correlated parameters.
 
     The covariance matrix of a calibration has the sds of the Monte Carlo, as for the total effects,
     and the mean correlations of the adjustment's Σ_xx.
@@ -78,18 +65,16 @@ def analyse_shapley(
     Parameters
     ----------
     study : StudyConfig, with `sensitivity`
-    summary, correlations : paths of tables of those names, as in `analyse_sensitivity`
-    output : path of the table to write
-    provenance : see `accelstudy.files.tables.origin`
+    summary, correlations : DataFrame, the tables of those names, as of `sensitivity_table`
     """
     settings = study.sensitivity
     assert settings is not None
     model, truth = _sensor(study)
-    names, pairs = list(model.parameter_names), read_table(correlations)
+    names = list(model.parameter_names)
     tables = []
     for approach in APPROACHES:
         sigma = _empirical_sigma(study, approach, summary)
-        of_cell = pairs[pairs["cell"] == _cell(study, approach)]
+        of_cell = correlations[correlations["cell"] == _cell(study, approach)]
         matrix = of_cell.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
         table = leveling_shares(
             settings.roll_gon,
@@ -104,7 +89,7 @@ def analyse_shapley(
         )
         table.insert(0, "analysis", approach)
         tables.append(table)
-    write_table(output, pd.concat(tables, ignore_index=True), provenance)
+    return pd.concat(tables, ignore_index=True)
 
 
 def _sensor(study: StudyConfig) -> tuple[SensorModel, np.ndarray]:
@@ -122,12 +107,11 @@ def _cell(study: StudyConfig, approach: str) -> str:
     return "/".join([settings.model, settings.scheme, approach])
 
 
-def _empirical_sigma(study: StudyConfig, approach: str, summary: Tables) -> np.ndarray:
+def _empirical_sigma(study: StudyConfig, approach: str, summary: pd.DataFrame) -> np.ndarray:
     """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
     model, _ = _sensor(study)
     cell = _cell(study, approach)
-    rows = read_table(summary)
-    rows = rows[rows["cell"] == cell].set_index("parameter")
+    rows = summary[summary["cell"] == cell].set_index("parameter")
     if rows.empty or rows["sd_empirical"].isna().any():
         raise InputError(f"sensitivity: the study has no estimates of the cell {cell}")
     sigma, units = rows["sd_empirical"].to_dict(), rows["unit"].astype(str).to_dict()

@@ -36,9 +36,9 @@ def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:
     return {
         "cells": table,
         "summary": pd.DataFrame(summary),
-        "correlations": pd.concat(correlations, ignore_index=True),
+        "correlations": pd.concat(correlations, ignore_index=True).infer_objects(),
         "leveling": pd.DataFrame(leveling)[table["estimable"]].reset_index(drop=True),
-        "quantiles": pd.concat(quantiles, ignore_index=True),
+        "quantiles": pd.concat(quantiles, ignore_index=True).infer_objects(),
     }
 
 

@@ -1,6 +1,5 @@
 # Simulate campaigns with hidden effects, diagnose each, and score the diagnoses:
 # snakemake --cores 2 --snakefile studies/hidden/hidden.smk
-from accelstudy.jobs.job import setup_digest
 from studies.hidden.cells import number_of_chunks
 from studies.hidden.config import parse_hidden
 from studies.hidden.scoring.page import PARTS, TABLES
@@ -13,31 +12,21 @@ include: "../../workflow/rules/start.smk"
 
 
 STUDY, RESULTS = configured(parse_hidden, "study")
-# Jobs get the checked configuration, with all defaults.
-config.update(STUDY.model_dump(mode="json"))
-
-
+VERSION = code_version(workflow.basedir)
+# That of the diagnoses, which take hours: to score them in another way does not run them anew.
+UNUSED = "api commands drawing epochs lots pages planning sequential study/figures study/explorer"
+DIAGNOSING = code_version(
+    workflow.basedir, without=[*UNUSED.split(), f"{workflow.basedir}/scoring"]
+)
 # What the jobs use of it.
 PLANNED = STUDY.model_dump(
     mode="json", exclude={"study", "model", "seed", "diagnosis_seed", "baselines_every"}
 )
 DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "baselines_every"})
 COMPARED = STUDY.model_dump(mode="json", exclude={"study", "diagnosis_seed"})
-CODE = {
-    stage: code_hash(workflow.source_path(f"scripts/hidden_{stage}.py"), "studies")
-    for stage in ("plan", "diagnose", "baselines", "score")
-}
 NUMBERS = [f"{i:04d}" for i in range(number_of_chunks(STUDY))]
 CHUNKS = {part: expand(f"{RESULTS}/{part}/{{chunk}}.parquet", chunk=NUMBERS) for part in PARTS}
-# Digest of what each table of a chunk depends on. It tells those of another configuration.
-SETUPS = {
-    path: setup_digest(COMPARED if part == "baselines" else DIAGNOSED)
-    for part, paths in CHUNKS.items()
-    for path in paths
-}
 SCORED = {table: f"{RESULTS}/{table}.parquet" for table in TABLES}
-
-look_at_earlier([f"{RESULTS}/plan.json", *SETUPS, *SCORED.values()], SETUPS, STUDY.seed)
 
 
 onstart:
@@ -62,10 +51,10 @@ rule hidden_plan:
     conda:
         "../../workflow/envs/accelstudy.yaml"
     resources:
-        mem_mb=megabytes(4000),
+        mem_mb=4000,
     params:
         cells=PLANNED,
-        code=CODE["plan"],
+        version=DIAGNOSING,
     message:
         "Choose the campaigns to simulate"
     script:
@@ -81,11 +70,9 @@ rule hidden_diagnose:
         f"{RESULTS}/logs/diagnose/{{chunk}}.log",
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=megabytes(2000),
     params:
         spec=DIAGNOSED,
-        code=CODE["diagnose"],
+        version=DIAGNOSING,
     message:
         "Simulate and diagnose the campaigns of chunk {wildcards.chunk}"
     script:
@@ -101,11 +88,9 @@ rule hidden_baselines:
         f"{RESULTS}/logs/baselines/{{chunk}}.log",
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=megabytes(2000),
     params:
         spec=COMPARED,
-        code=CODE["baselines"],
+        version=DIAGNOSING,
     message:
         "Diagnose the campaigns of chunk {wildcards.chunk} by simpler methods"
     script:
@@ -123,12 +108,10 @@ rule hidden_score:
         f"{RESULTS}/logs/score.log",
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=megabytes(2000),
     params:
         # What the tables of the chunks do not have: sessions in which nothing is hidden.
         limits=STUDY.model_dump(mode="json", include={"model", "seed", "designs", "approaches"}),
-        code=CODE["score"],
+        version=VERSION,
     message:
         "Score the diagnoses of all campaigns"
     script:

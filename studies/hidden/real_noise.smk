@@ -1,6 +1,5 @@
 # Put known effects into the readings of public logs, diagnose them, and score the diagnoses:
 # snakemake --cores 2 --snakefile studies/hidden/real_noise.smk
-from accelstudy.jobs.job import setup_digest
 from studies.hidden.real_noise import parse_real_noise
 
 
@@ -11,13 +10,10 @@ include: "../../workflow/rules/start.smk"
 
 
 STUDY, RESULTS = configured(parse_real_noise, "study")
-# Jobs get the checked configuration, with all defaults.
-config.update(STUDY.model_dump(mode="json"))
+VERSION = code_version(workflow.basedir)
 # What a log's job uses of it; where the logs are does not matter.
 DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "public_folder"})
-SETUPS = {f"{RESULTS}/logs/{name}.parquet": setup_digest(DIAGNOSED) for name in STUDY.logs}
-
-look_at_earlier([*SETUPS, f"{RESULTS}/campaigns.parquet"], SETUPS, STUDY.seed)
+LOGS = [f"{RESULTS}/logs/{name}.parquet" for name in STUDY.logs]
 
 
 wildcard_constraints:
@@ -37,11 +33,9 @@ rule real_noise_log:
         f"{RESULTS}/logs/{{log}}.log",
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=megabytes(2000),
     params:
         spec=DIAGNOSED,
-        code=code_hash(workflow.source_path("scripts/real_noise_log.py"), "studies"),
+        version=VERSION,
     message:
         "Put effects into {wildcards.log}, and diagnose it"
     script:
@@ -50,7 +44,7 @@ rule real_noise_log:
 
 rule real_noise_score:
     input:
-        [*SETUPS],
+        LOGS,
     output:
         campaigns=f"{RESULTS}/campaigns.parquet",
         page=f"{RESULTS}/score.md",
@@ -58,10 +52,8 @@ rule real_noise_score:
         f"{RESULTS}/logs/score.log",
     conda:
         "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=megabytes(2000),
     params:
-        code=code_hash(workflow.source_path("scripts/real_noise_score.py"), "studies"),
+        version=VERSION,
     message:
         "Score the diagnoses of all logs"
     script:

@@ -18,7 +18,7 @@ from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.reading import config_hash
 from accelstudy.files.tables import read_origin
-from accelstudy.jobs.code import code_hash
+from accelstudy.jobs import code_version
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
@@ -283,21 +283,14 @@ def test_a_new_study_names_those_it_was_set_up_with(template):
     assert plugins.loaded_files() == [str(Path("ripple.py").resolve())]
 
 
-def hashes():
-    scripts = ROOT / "workflow" / "scripts"
-    return {name: code_hash(scripts / f"{name}.py") for name in ("simulate", "collect")}
-
-
-def test_what_can_use_a_registry_depends_on_its_content():
-    before = hashes()
+def test_what_is_loaded_is_part_of_the_version_of_code():
+    before = code_version()
     plugins.load_files(["ripple.py"])
-    with_it = hashes()
-    assert with_it["simulate"] != before["simulate"]
-    assert with_it["collect"] == before["collect"]
+    assert code_version() != before
 
 
 def test_jobs_load_it_and_run_again_when_it_changes(tmp_path):
-    table = "results/mine/batches/0000/summary.parquet"
+    table = "results/mine/tables/bias-scale+ripple(period=8)/fibonacci-24/gravity/summary.parquet"
 
     def run(*words):
         """As a new process does: nothing is loaded."""
@@ -350,13 +343,11 @@ def test_an_installed_package_is_found_when_it_is_looked_for():
 
 
 def test_jobs_depend_on_the_content_of_a_package(package):
-    before = hashes()
+    before = code_version()
     assert "our_sensors" not in sys.modules
     with (package / "ripple.py").open("a") as file:
         file.write("# an edit\n")
-    after = hashes()
-    assert after["simulate"] != before["simulate"]
-    assert after["collect"] == before["collect"]
+    assert code_version() != before
 
 
 @pytest.mark.parametrize(("content", "reason"), [

@@ -1,7 +1,6 @@
 """The workflow of a diagnosis: all is made, once, and what cannot be used is said in a line."""
 
 import json
-import os
 import re
 import shutil
 from functools import partial
@@ -80,19 +79,6 @@ def test_a_second_run_does_nothing(made):
 def test_another_unit_of_angles_makes_the_page_again(made, monkeypatch):
     monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
     assert jobs(run(made, TINY, "--dry-run").stdout) == {"diagnose": 1}
-
-
-def test_what_was_damaged_since_is_refused(made, tmp_path):
-    folder = Path(shutil.copytree(made, tmp_path / "copy"))
-    page = folder / "results/tiny/diagnosis/report.html"
-    stamp = page.stat().st_mtime_ns
-    page.write_text(page.read_text(encoding="utf-8")[:-100], encoding="utf-8")
-    os.utime(page, ns=(stamp, stamp))
-    result = run(folder, TINY)
-    assert result.returncode != 0
-    one_line(result.stdout, "results/tiny/diagnosis: report.html is damaged; delete it and run")
-    shutil.rmtree(page.parent)
-    assert jobs(run(folder, TINY, "--dry-run").stdout) == {"diagnose": 1}
 
 
 def test_a_campaign_that_is_too_small(made, tmp_path):

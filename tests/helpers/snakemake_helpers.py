@@ -38,7 +38,6 @@ def snakemake(folder, *words, environment=ENVIRONMENT):
             patch.delenv(name)
         for name, value in environment.items():
             patch.setenv(name, value)
-        patch.setattr(sys, "executable", sys.executable)  # which the workflow quotes
         patch.setattr(sys, "path", sys.path.copy())
         # Jobs print where this process does, whatever was there when Snakemake was imported.
         patch.setattr(sys.modules["snakemake.shell"], "STDOUT", None)

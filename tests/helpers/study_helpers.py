@@ -1,13 +1,13 @@
 """A small study without Snakemake: configured and simulated as the workflow does it."""
 
 from accelstudy.basics.units import MGON
-from accelstudy.files.tables import collect, read_table
-from accelstudy.study.batches import batches, simulate_batch
-from accelstudy.study.cells import study_cells
+from accelstudy.files.tables import read_table, write_table
+from accelstudy.study import results
+from accelstudy.study.cells import fanned_out, study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.replicates import Replicates, simulate
 from accelstudy.study.statistics import statistics
-from accelstudy.study.tables import TABLES
+from accelstudy.study.tables import TABLES, collect
 
 NINE = "bias-scale-nonorthogonality"
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
@@ -55,26 +55,31 @@ def plain(cell, seed):
 
 
 def simulate_cells(folder, cells, seed=1, leveling=LEVELING):
-    """Simulate a batch; the paths of the estimates and the tables."""
+    """Simulate cells as a job; the paths of the estimates and the tables."""
     paths = {name: folder / f"{name}.parquet" for name in ("estimates", *TABLES)}
-    spec = {"seed": seed, "cells": [cell.to_dict() for cell in cells], "leveling": leveling}
-    simulate_batch(spec, paths, PROVENANCE)
+    plain = [cell.to_dict() for cell in cells]
+    results.simulate_cells(plain, leveling, paths, {**PROVENANCE, "seed": seed})
     return paths
 
 
-def run_study(folder, batch_size=400_000, **keys):
-    """Tables of a study, {name: DataFrame}, estimates included."""
+def run_study(folder, pattern="{model}", **keys):
+    """Tables of a study, {name: DataFrame}, estimates included; `pattern` names the jobs."""
     study = make_study(**keys)
+    cells = study_cells(study)
     parts = [
-        simulate_cells(folder / f"{i:04d}", cells, study.seed, study.leveling.model_dump())
-        for i, cells in enumerate(batches(study_cells(study), batch_size))
+        simulate_cells(folder / name, each, study.seed, study.leveling.model_dump())
+        for name, each in fanned_out(cells, pattern).items()
     ]
+    names = [cell.name for cell in cells]
+    tables = {
+        name: collect([part[name] for part in parts], names) for name in (*TABLES, "estimates")
+    }
     for name in TABLES:
-        collect([part[name] for part in parts], folder / f"{name}.parquet", PROVENANCE)
-    tables = {name: read_table(folder / f"{name}.parquet") for name in TABLES}
-    return {**tables, "estimates": read_table([part["estimates"] for part in parts])}
+        write_table(folder / f"{name}.parquet", tables[name], PROVENANCE)
+        tables[name] = read_table(folder / f"{name}.parquet")
+    return tables
 
 
 def estimates_in(folder):
     """Files of estimates in the folder of `run_study`."""
-    return sorted(folder.glob("*/estimates.parquet"))
+    return sorted(folder.rglob("estimates.parquet"))

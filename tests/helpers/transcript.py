@@ -117,7 +117,7 @@ def _in_a_line(loop):
 
 # --- what came of them ---------------------------------------------------------------------------
 
-UNREAD = re.compile(r"/(\.\w+|__pycache__|batches|benchmarks|estimates|logs|parts)/")
+UNREAD = re.compile(r"/(\.\w+|__pycache__|benchmarks|tables|estimates|logs|parts)/")
 """Folders of times, and of what lies between the steps of a workflow."""
 MANY = 3
 """Folders alike that are read, each; of more, the first."""

@@ -1,20 +1,14 @@
 """The study of hidden effects: its configuration, its cells and seeds, and its jobs."""
 
-import shutil
-
 import numpy as np
-import pandas as pd
 import pytest
 from calling import refused
 from places import ROOT
-from snakemake_helpers import one_line, snakemake
 
-import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.files.reading import overlay, read_layer
-from accelstudy.files.tables import read_table, write_table
-from accelstudy.jobs.code import code_hash
+from accelstudy.files.tables import read_table
 from studies.hidden import campaigns, diagnosing
 from studies.hidden.baselines import METHODS, run_baselines
 from studies.hidden.campaigns import KEY
@@ -253,55 +247,7 @@ def test_simpler_methods(plan, tmp_path):
     assert named.str.startswith('["hysteresis"').all()
 
 
-def hash_of(stage):
-    return code_hash(ROOT / "studies" / "hidden" / "scripts" / f"{stage}.py", "studies")
-
-
-def test_what_runs_again_after_an_edit(monkeypatch, tmp_path):
-    """To score anew, or to tune the diagnosis, takes no more than it must."""
-    stages = ("hidden_plan", "hidden_diagnose", "hidden_baselines", "hidden_score")
-    for package in ("accelstudy", "studies"):
-        shutil.copytree(ROOT / package, tmp_path / package)
-    monkeypatch.setattr(accelstudy, "__file__", str(tmp_path / "accelstudy" / "__init__.py"))
-    for name, expected in {
-        "accelstudy/diagnosis/pipeline.py": {"hidden_diagnose"},
-        "studies/hidden/scoring/targets.yaml": {"hidden_score"},
-        "studies/hidden/scoring/judging.py": {"hidden_score"},
-        "studies/hidden/baselines.py": {"hidden_baselines"},
-        "studies/hidden/physics/measuring.py": {*stages},
-        "accelstudy/effects/bias_drift.py": {*stages},
-        "accelstudy/commands/main.py": set(),
-        "accelstudy/study/summary.py": set(),
-    }.items():
-        before = {stage: hash_of(stage) for stage in stages}
-        with (tmp_path / name).open("a") as file:
-            file.write("# an edit\n")
-        assert {stage for stage in stages if hash_of(stage) != before[stage]} == expected, name
-
-
 def test_seeds_depend_on_the_seed_of_the_study():
     cell = Cell(Case("null", "snub-24", "robot", True), 2)
     states = [cell.seed(s, k).generate_state(2) for s in (1, 2) for k in (0, 1)]
     assert len(np.unique(states, axis=0)) == 4
-
-
-def test_what_an_earlier_run_left_is_looked_at(tmp_path):
-    layers = [
-        ROOT / "studies/hidden/config/hidden-effects.yaml",
-        ROOT / "studies/hidden/config/hidden-smoke.yaml",
-    ]
-    words = [
-        "--snakefile",
-        ROOT / "studies/hidden/hidden.smk",
-        "--configfile",
-        *layers,
-        "--dry-run",
-    ]
-    path = tmp_path / "results/hidden-smoke/outcomes/0000.parquet"
-    write_table(path, pd.DataFrame({"cell": ["a"]}), {"config_hash": "of another", "seed": 1})
-    text = snakemake(tmp_path, *words).stdout
-    one_line(text, "1 of 1 tables are of another configuration: results/hidden-smoke/outcomes/0000")
-    path.write_bytes(path.read_bytes()[:-1])
-    result = snakemake(tmp_path, *words)
-    assert result.returncode != 0
-    one_line(result.stdout, "results/hidden-smoke/outcomes/0000.parquet: not a whole Parquet file")

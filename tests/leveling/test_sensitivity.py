@@ -5,14 +5,13 @@ import pytest
 from SALib.analyze.sobol import analyze
 from SALib.sample.sobol import sample
 from scipy.stats import norm
-from study_helpers import NINE, PAPER_TRUTH, PROVENANCE, grid, make_study, run_study
+from study_helpers import NINE, PAPER_TRUTH, grid, make_study, run_study
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.files.tables import read_table
 from accelstudy.leveling.sensitivity import FORCES, leveling_sensitivity, total_effects
 from accelstudy.sensors.models import get_model
-from accelstudy.study.sensitivity import analyse_sensitivity
+from accelstudy.study.sensitivity import sensitivity_table
 
 SETTINGS = {"base_samples": 1024, "resamples": 50, "seed": 1}
 # Confidence intervals are of 95 %: 2.5 half widths are 4.9 standard deviations.
@@ -180,10 +179,8 @@ def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
     """The same shares, of the sds that a Monte Carlo of the calibration shows."""
     sensitivity = {"base_samples": 512, "resamples": 20, "roll_gon": [0], "pitch_gon": [0]}
     keys = {"grids": [grid(replicates=2000)], "sensitivity": sensitivity}
-    run_study(tmp_path, **keys)
-    study, summary = make_study(**keys), tmp_path / "summary.parquet"
-    analyse_sensitivity(study, summary, tmp_path / "sensitivity.parquet", PROVENANCE)
-    table = read_table(tmp_path / "sensitivity.parquet").query("output == 'roll'")
+    summary = run_study(tmp_path, **keys)["summary"]
+    table = sensitivity_table(make_study(**keys), summary).query("output == 'roll'")
     by_analysis = table.set_index("input").groupby("analysis")["total_effect"]
     tables = {str(name): its for name, its in by_analysis}
     assert [*tables] == ["forces", "gravity", "robot"]
@@ -196,7 +193,7 @@ def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
 
 def test_a_cell_without_estimates_is_an_input_error(tmp_path):
     sensitivity = {"base_samples": 16, "resamples": 5, "roll_gon": [0], "pitch_gon": [0]}
-    run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])
+    summary = run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])["summary"]
     study = make_study(sensitivity=sensitivity)
     with pytest.raises(InputError, match=f"no estimates of the cell {NINE}/mclaren-24/gravity"):
-        analyse_sensitivity(study, tmp_path / "summary.parquet", tmp_path / "out", PROVENANCE)
+        sensitivity_table(study, summary)

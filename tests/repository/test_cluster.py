@@ -36,10 +36,9 @@ def test_the_profile_names_rules_that_there_are_and_groups_those_of_a_study():
     assert set(settings["group-components"]) == set(settings["groups"].values())
 
 
-@pytest.mark.parametrize("rule", [name for name, text in STUDY.items() if "script:" in text])
-def test_a_rule_says_what_it_takes(rule):
-    assert re.search(r"^    threads: \d+$", STUDY[rule], re.MULTILINE)
-    assert re.search(r"^        mem_mb=(megabytes\(|lambda )", STUDY[rule], re.MULTILINE)
+def test_another_attempt_gets_more_memory():
+    assert "attempt" in profile("slurm")["default-resources"]["mem_mb"]
+    assert re.search(r"mem_mb=lambda wildcards, attempt: .* \* attempt,", STUDY["simulate"])
 
 
 def test_without_slurm_one_line_says_what_to_install(monkeypatch, capsys):

@@ -31,14 +31,13 @@ from accelstudy.epochs.comparison import compare
 from accelstudy.epochs.history import history_of
 from accelstudy.epochs.history_output import history_document, history_table
 from accelstudy.epochs.output import comparison_document
-from accelstudy.files.tables import read_table
 from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
 from accelstudy.lots.lot import Lot
 from accelstudy.lots.mixture import Anything
 from accelstudy.lots.output import lot_document
 from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
-from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
@@ -58,13 +57,9 @@ def test_each_column_of_a_study_is_described(tmp_path, pages):
     described = {name: list(columns) for name, (_, columns) in pages.study_tables().items()}
     keys = {"grids": [grid(replicates=20)], "sensitivity": SENSITIVITY}
     written = run_study(tmp_path, **keys)
-    study, summary = make_study(**keys), tmp_path / "summary.parquet"
-    path = tmp_path / "sensitivity.parquet"
-    analyse_sensitivity(study, summary, path, PROVENANCE)
-    written["sensitivity"] = read_table(path)
-    correlations, path = tmp_path / "correlations.parquet", tmp_path / "shapley.parquet"
-    analyse_shapley(study, summary, correlations, path, PROVENANCE)
-    written["shapley"] = read_table(path)
+    study, summary = make_study(**keys), written["summary"]
+    written["sensitivity"] = sensitivity_table(study, summary)
+    written["shapley"] = shapley_table(study, summary, written["correlations"])
     for name, table in written.items():
         assert described[name] == list(table), name
 

@@ -15,46 +15,38 @@ import psutil
 import pytest
 from snakemake_helpers import ENVIRONMENT, one_line, remains
 from study_helpers import NINE, grid
-from test_workflow import TABLE_PATHS, TINY, command, in_batches, run, succeed
+from test_workflow import SET_UPS, TABLE_PATHS, TINY, command, run, succeed
 
 from accelstudy.basics.errors import InputError
 from accelstudy.study.tables import read_estimates
 
-# Eight cells in four batches, each long enough to be caught while it writes.
+# Eight cells in four jobs, each long enough to be caught while it writes.
 STUDY = {
     **TINY,
     "grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 4000, approaches="all")],
 }
 FEWER = {**STUDY, "seed": 2, "grids": [{**STUDY["grids"][0], "schemes": ["mclaren-24"]}]}
 ESTIMATES = Path("results/tiny/estimates")
-FILES = [f"{number:04d}.parquet" for number in range(4)]
 
 
 def content(folder):
     """All tables and estimates, to the bit."""
     results = folder / "results" / "tiny"
-    paths = [*results.glob("*.parquet"), *results.glob("estimates/*.parquet")]
+    paths = [*results.glob("*.parquet"), *results.glob("estimates/*/*.parquet")]
     return {path.relative_to(results).as_posix(): path.read_bytes() for path in paths}
-
-
-def study(folder, config=STUDY):
-    """Arguments of a run of the study in small batches."""
-    path = in_batches(folder)
-    path.write_text(path.read_text().replace("most=240", "most=8100"))
-    return {"snakefile": path, "config": config}
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
-    succeed(folder, *TABLE_PATHS, **study(folder))
+    succeed(folder, *TABLE_PATHS, config=STUDY)
     return content(folder)
 
 
 @pytest.fixture(scope="module")
 def fewer(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fewer")
-    succeed(folder, *TABLE_PATHS, **study(folder, FEWER))
+    succeed(folder, *TABLE_PATHS, config=FEWER)
     return content(folder)
 
 
@@ -62,15 +54,15 @@ def started(folder, *arguments):
     """A run that goes on in the background, and the file of what it says."""
     said = folder / "said.txt"
     with said.open("w") as file:
-        words = command(folder, *TABLE_PATHS, *arguments, **study(folder))
+        words = command(folder, *TABLE_PATHS, *arguments, config=STUDY)
         process = subprocess.Popen(
             words, cwd=folder, env=ENVIRONMENT, stdout=file, stderr=subprocess.STDOUT
         )
     return process, said
 
 
-def caught_job(process, writing=()):
-    """A job of simulation, stopped; if files of estimates are given, while it writes one."""
+def caught_job(process, writing=False):
+    """A job of simulation, stopped; if asked for, while it writes estimates."""
     while process.poll() is None:
         for job in psutil.Process(process.pid).children(recursive=True):
             try:
@@ -78,10 +70,7 @@ def caught_job(process, writing=()):
                 if words[0].endswith("bash") or not words[-1].endswith(".simulate.py"):
                     continue
                 job.suspend()
-                files = [Path(file.path) for file in job.open_files()]
-                if not writing or any(
-                    file.name in writing and file.parts[-3] == "estimates" for file in files
-                ):
+                if not writing or any("/estimates/" in file.path for file in job.open_files()):
                     return job
                 job.resume()
             except (psutil.Error, IndexError):
@@ -100,10 +89,10 @@ def orphans():
             job.kill()
 
 
-def kill_run(folder, orphans, files=FILES):
+def kill_run(folder, orphans):
     """Start a run, kill Snakemake itself, and give a job of it that is stopped while it writes."""
     process, _ = started(folder)
-    orphan = caught_job(process, files)
+    orphan = caught_job(process, writing=True)
     orphans.append(orphan)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -128,48 +117,37 @@ def test_killed_jobs_and_runs(whole, orphans, tmp_path):
     one_line(said.read_text(), "A job was killed", "goes on where this run stopped", "--cores 1")
 
     orphan = kill_run(tmp_path, orphans)
-    locked = run(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    locked = run(tmp_path, *TABLE_PATHS, config=STUDY)
     assert locked.returncode != 0
-    one_line(locked.stdout, "results/tiny is locked", "`make unlock`")
+    assert "--unlock" in locked.stdout
     assert "Traceback" not in locked.stdout
-    succeed(tmp_path, "--unlock", **study(tmp_path))
+    succeed(tmp_path, "--unlock", config=STUDY)
 
     # Two at once, though Snakemake would not let them, beside the stopped job of the killed run.
     pair = [started(tmp_path, "--nolock")[0] for _ in range(2)]
     assert [process.wait() in (0, 1) for process in pair] == [True, True]
-    succeed(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    succeed(tmp_path, *TABLE_PATHS, config=STUDY)
     assert content(tmp_path) == whole
     let_end(orphan)
-    succeed(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    succeed(tmp_path, *TABLE_PATHS, config=STUDY)
     assert content(tmp_path) == whole
     assert remains(tmp_path) == []
 
 
 def test_a_job_that_outlives_its_run_and_its_configuration(fewer, orphans, tmp_path):
-    both = FILES[:2]  # that the smaller study has too
-    orphan = kill_run(tmp_path, orphans, both)
-    (late,) = {Path(file.path).name for file in orphan.open_files()}.intersection(both)
-    now = study(tmp_path, FEWER)
-    succeed(tmp_path, "--unlock", **now)
-    text = succeed(tmp_path, *TABLE_PATHS, **now)
-    assert "tables are of another configuration" in text
-    assert "removed" in text
+    orphan = kill_run(tmp_path, orphans)
+    succeed(tmp_path, "--unlock", config=FEWER)
+    succeed(tmp_path, *TABLE_PATHS, config=FEWER)
     assert content(tmp_path) == fewer
     let_end(orphan)  # it replaces what the run has made
 
-    with pytest.raises(InputError, match=r"holds files of different studies"):
+    with pytest.raises(InputError, match=r"of seed \d+; delete what is not of your study"):
         read_estimates(tmp_path / ESTIMATES)
-    again = run(tmp_path, *TABLE_PATHS, **now)
-    one_line(again.stdout, f"tables are of another configuration: {ESTIMATES / late}.")
+    again = run(tmp_path, *TABLE_PATHS, config=FEWER)
     assert again.returncode != 0
-    one_line(again.stdout, "error: results/tiny/", "is of another configuration; delete it")
-    (tmp_path / ESTIMATES / late).unlink()
-    succeed(
-        tmp_path,
-        *TABLE_PATHS,
-        *(str(ESTIMATES / Path(name).name) for name in fewer if "/" in name),
-        **now,
-    )
+    one_line(again.stdout, "error: results/tiny/tables/", "delete what is not of your study")
+    anew = [f"{ESTIMATES}/{name}.parquet" for name in SET_UPS]
+    succeed(tmp_path, *TABLE_PATHS, "--forcerun", *anew, config=FEWER)
     assert content(tmp_path) == fewer
 
 
@@ -190,7 +168,7 @@ def disk(tmp_path):
 
 
 def test_a_full_and_a_closed_disk(whole, disk, tmp_path):
-    full = run(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    full = run(tmp_path, *TABLE_PATHS, config=STUDY)
     assert full.returncode != 0
     assert re.search(
         r"^error: results/tiny/\S+: cannot be written: No space left on device; free some space "
@@ -202,10 +180,10 @@ def test_a_full_and_a_closed_disk(whole, disk, tmp_path):
     assert remains(tmp_path) == []
 
     disk("ro")
-    closed = run(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    closed = run(tmp_path, *TABLE_PATHS, config=STUDY)
     assert closed.returncode != 0
     one_line(closed.stdout, "results/tiny: cannot hold results: results/tiny is not writable")
 
     disk("rw,size=50m")
-    succeed(tmp_path, *TABLE_PATHS, **study(tmp_path))
+    succeed(tmp_path, *TABLE_PATHS, config=STUDY)
     assert content(tmp_path) == whole

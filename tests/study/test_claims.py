@@ -40,7 +40,8 @@ from accelstudy.study.claims.judging import (
 )
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.claims.reductions import reductions
-from accelstudy.study.sensitivity import analyse_shapley
+from accelstudy.study.replicates import read_replicates
+from accelstudy.study.sensitivity import shapley_table
 
 STANDARD_ERRORS = 4.5
 REPLICATES = 2000
@@ -72,17 +73,19 @@ def tables(folder):
     )  # fmt: skip
     sensitivity.insert(0, "analysis", "gravity")
     write_table(folder / "sensitivity.parquet", sensitivity, PROVENANCE)
-    path = folder / "shapley.parquet"
     keys = {**KEYS, "sensitivity": {**KEYS["sensitivity"], "pitch_gon": [0, 25]}}
-    named = (folder / f"{name}.parquet" for name in ("summary", "correlations"))
-    analyse_shapley(make_study(**keys), *named, path, PROVENANCE)
-    return {**found, "sensitivity": sensitivity, "shapley": read_table(path)}
+    shapley = shapley_table(make_study(**keys), found["summary"], found["correlations"])
+    write_table(folder / "shapley.parquet", shapley, PROVENANCE)
+    return {**found, "sensitivity": sensitivity, "shapley": shapley}
 
 
 @pytest.fixture(scope="module")
 def reduced(tables, folder):
-    cells = study_cells(make_study(**KEYS))
-    return reductions(cells, estimates_in(folder), LEVELING, papers_reductions())
+    replicates = [
+        (cell, read_replicates(estimates_in(folder), cell))
+        for cell in study_cells(make_study(**KEYS))
+    ]
+    return reductions(replicates, LEVELING, papers_reductions())
 
 
 @pytest.fixture(scope="module")
@@ -245,7 +248,7 @@ def test_verdict_on_the_correlation(tables, rejudge):
 
 
 def test_a_scheme_without_redundancy_has_no_reduction(reduced, rejudge):
-    assert list(reductions([], [], LEVELING, papers_reductions())) == [*reduced]
+    assert list(reductions([], LEVELING, papers_reductions())) == [*reduced]
     claims, by_scheme = rejudge(reduced[reduced["scheme"] != "rings-24"])
     schemes = by_scheme.filter(like="reduction", axis=0).index.get_level_values("scheme")
     assert set(schemes) == {"mclaren-24"}

@@ -19,7 +19,6 @@ from accelstudy.effects import effect_names
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import scheme_names
 from accelstudy.sensors.models import MODELS
-from accelstudy.study.batches import batches
 from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
@@ -505,8 +504,8 @@ VALID = st.fixed_dictionaries(
 
 
 @settings(max_examples=25)
-@given(keys=VALID, size=st.integers(1, 20_000))
-def test_cells_of_any_valid_study(keys, size):
+@given(keys=VALID)
+def test_cells_of_any_valid_study(keys):
     study = make_study(**keys)
     assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
 
@@ -519,11 +518,6 @@ def test_cells_of_any_valid_study(keys, size):
     # One cell, one set-up.
     setups = {(c.effects, c.scheme, c.approach, c.noise, c.model) for c in cells}
     assert len(setups) == len(cells)
-
-    divided = batches(cells, size)
-    assert [cell for batch in divided for cell in batch] == cells
-    for batch in divided:
-        assert len(batch) == 1 or sum(cell.replicates for cell in batch) <= size
 
 
 @pytest.mark.parametrize(("keys", "message"), [

@@ -15,7 +15,6 @@ from study_helpers import run_study
 from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
-from accelstudy.files.tables import read_table
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
 from accelstudy.study.config import StudyConfig, parse_study
 from accelstudy.study.figures import (
@@ -32,7 +31,7 @@ from accelstudy.study.figures.calibrations import correlation_matrix, single_run
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.figures.panels import Panel, panels
 from accelstudy.study.figures.table_1 import preset_table
-from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 PROVENANCE = {"config_hash": "test", "seed": 1}
 NINE = "bias-scale-nonorthogonality"
@@ -61,13 +60,8 @@ def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
     """All tables of a study."""
     study, tables = parse_study(keys), run_study(folder, **keys)
     if study.sensitivity:
-        summary, correlations, *written = (
-            folder / f"{name}.parquet"
-            for name in ("summary", "correlations", "sensitivity", "shapley")
-        )
-        analyse_sensitivity(study, summary, written[0], PROVENANCE)
-        analyse_shapley(study, summary, correlations, written[1], PROVENANCE)
-        tables |= {path.stem: read_table(path) for path in written}
+        tables["sensitivity"] = sensitivity_table(study, tables["summary"])
+        tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     return tables
 
 
@@ -450,7 +444,7 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
 IMPORTED = """\
 import sys
 import accelstudy.study.figures, accelstudy.study.cells
-import accelstudy.jobs.earlier, accelstudy.jobs.job
+import accelstudy.jobs
 print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
 """
 

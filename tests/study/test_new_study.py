@@ -39,7 +39,7 @@ def test_the_configuration_is_a_study_with_figures(folder):
 def test_the_workflow_takes_it_from_there(folder):
     planned = snakemake(folder, "--dry-run", "--cores", "1")
     assert planned.returncode == 0, planned.stdout
-    for rule in ("simulate", "collect", "figures", "study"):
+    for rule in ("simulate", "collect", "figure", "study"):
         assert f"\n{rule} " in planned.stdout
 
 

@@ -12,8 +12,7 @@ from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON
 from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
-from accelstudy.study.batches import batches
-from accelstudy.study.cells import study_cells
+from accelstudy.study.cells import fanned_out, study_cells
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -121,13 +120,13 @@ def test_presets_are_the_rows_of_table_1():
         assert row in names
 
 
-def test_batches():
-    cells = [*make_cells(grid(schemes="all", replicates=40)).values()]
-    cells[3] = replace(cells[3], replicates=1000)
-    shared = batches(cells[:8], 100)
-    sizes = [[cell.replicates for cell in batch] for batch in shared]
-    assert sizes == [[40, 40], [40], [1000], [40, 40], [40, 40]]
-    assert batches([], 100) == []
+def test_cells_fan_out_by_what_they_have_in_common():
+    cells = [*make_cells(grid(["bias-scale", NINE], ["mclaren-24", "faces-6"])).values()]
+    groups = fanned_out(cells, "{model}/{approach}")
+    assert [*groups] == [f"{m}/{a}" for m in ("bias-scale", NINE) for a in ("gravity", "robot")]
+    assert [cell.scheme for cell in groups[f"{NINE}/robot"]] == ["mclaren-24", "faces-6"]
+    assert len(fanned_out(cells, "{model}/{scheme}/{approach}")) == len(cells)
+    assert fanned_out([], "{model}") == {}
 
 
 # --- seeds ---------------------------------------------------------------------------------------
@@ -192,8 +191,8 @@ def base(tmp_path_factory):
 
 
 def test_other_cells_and_another_order_change_no_number(base, tmp_path):
-    """Bitwise: more cells, other grids, another order, more replicates, batches of other sizes."""
-    other = run_study(tmp_path, batch_size=200, **BIGGER)
+    """Bitwise: more cells, other grids, another order, more replicates, other jobs."""
+    other = run_study(tmp_path, "{model}/{scheme}", **BIGGER)
     keys = ["cell", "replicate", "parameter"]
     small, large = (
         run["estimates"].astype({"cell": str, "parameter": str, "unit": str})
@@ -206,9 +205,9 @@ def test_other_cells_and_another_order_change_no_number(base, tmp_path):
     )
 
 
-@pytest.mark.parametrize("size", [1, 130, 10_000])
-def test_batches_change_nothing(base, size, tmp_path):
-    other = run_study(tmp_path, batch_size=size, **BASE)
+@pytest.mark.parametrize("pattern", ["{scheme}", "{approach}", "{model}/{scheme}/{approach}"])
+def test_how_cells_fan_out_changes_nothing(base, pattern, tmp_path):
+    other = run_study(tmp_path, pattern, **BASE)
     for name, table in base.items():
         expected = table
         if name == "estimates":  # their categories are those of the file

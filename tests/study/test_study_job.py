@@ -2,29 +2,29 @@
 
 import errno
 import logging
-import shlex
+import re
+import subprocess
 import sys
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from types import SimpleNamespace
 
-import pandas as pd
 import pytest
+from places import ROOT
 from study_helpers import make_study
 
+from accelstudy import jobs
 from accelstudy.basics.errors import InputError
-from accelstudy.files.tables import write_table
-from accelstudy.jobs.job import job, killed_notice, prepare_jobs, setup_digest
+from accelstudy.jobs import code_version, job, killed_notice
 
 
 @contextmanager
-def a_job(log, inputs=(), params=None, **config):
+def a_job(log, **config):
     """A job in a process that has not set up its logging."""
     handlers, level = logging.root.handlers, logging.root.level
     logging.root.handlers = []
     snakemake = SimpleNamespace(
         log=[str(log)], config=make_study(**config).model_dump(mode="json"), rule="simulate",
-        input=[str(path) for path in inputs], output=["results/tiny/summary.parquet"],
-        params=params or {},
+        output=["results/tiny/summary.parquet"], params={},
     )  # fmt: skip
     try:
         with job(snakemake) as given:
@@ -86,32 +86,6 @@ def test_a_killed_job_is_one_line(said, tmp_path):
     assert killed_notice([]) is None  # Snakemake could write none
 
 
-# --- what comes in -------------------------------------------------------------------------------
-
-
-def test_the_set_up_of_a_batch_is_recorded(log):
-    with a_job(log, params={"spec": {"seed": 1, "cells": []}}) as provenance:
-        assert provenance["setup"] == setup_digest({"cells": [], "seed": 1})
-    assert setup_digest({"seed": 2, "cells": []}) != provenance["setup"]
-
-
-@pytest.mark.parametrize(("made", "refused"), [
-    ({"seed": 1}, False),
-    ({"seed": 2}, True),
-    ({"seed": 1, "setup": setup_digest("this")}, False),
-    ({"seed": 1, "setup": setup_digest("other")}, True),
-])  # fmt: skip
-def test_a_table_of_another_configuration_is_refused(made, refused, log, tmp_path, capsys):
-    """As a job leaves it that outlived its run, and ended after that of the next run."""
-    path = tmp_path / "estimates.parquet"
-    write_table(path, pd.DataFrame({"a": [1]}), {"config_hash": "", **made})
-    params = {"setups": [setup_digest("this")]}
-    with pytest.raises(SystemExit) if refused else nullcontext(), a_job(log, [path], params):
-        pass
-    expected = f"error: {path}: is of another configuration; delete it and run again\n"
-    assert capsys.readouterr().err == (expected if refused else "")
-
-
 def test_a_defect_leaves_its_traceback_in_the_log(log):
     with pytest.raises(ZeroDivisionError), a_job(log):
         raise ZeroDivisionError("a defect")
@@ -120,8 +94,47 @@ def test_a_defect_leaves_its_traceback_in_the_log(log):
     assert "ZeroDivisionError: a defect" in text
 
 
-def test_the_path_of_python_may_have_a_space(monkeypatch):
-    for path in ("/usr/bin/python", "/tmp/with space/bin/python"):
-        monkeypatch.setattr(sys, "executable", path)
-        prepare_jobs()
-        assert shlex.split(sys.executable) == [path]
+# --- what makes results anew ---------------------------------------------------------------------
+
+
+def test_the_version_of_code_changes_with_code_and_nothing_else(monkeypatch, tmp_path):
+    package = tmp_path / "accelstudy"
+    for name in ("jobs/__init__.py", "study/cell.py", "drawing/style.py", "drawing/page.html.j2"):
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        (package / name).write_text("")
+    monkeypatch.setattr(jobs, "__file__", str(package / "jobs" / "__init__.py"))
+
+    def versions():
+        return code_version(), code_version(without=["drawing"]), code_version(tmp_path / "beside")
+
+    first = versions()
+    (package / "notes.txt").write_text("no code")
+    assert versions() == first
+    (package / "drawing" / "page.html.j2").write_text("another look")
+    second = versions()
+    assert [a == b for a, b in zip(first, second, strict=True)] == [False, True, False]
+    (tmp_path / "beside").mkdir()
+    (tmp_path / "beside" / "more.py").write_text("")
+    assert [a == b for a, b in zip(second, versions(), strict=True)] == [True, True, False]
+
+
+LOADED = """\
+import sys
+import {modules}
+rooms = "{rooms}".replace("/", ".").split()
+print([name for name in sys.modules if name.startswith(tuple(f"accelstudy.{{x}}" for x in rooms))])
+"""
+
+
+@pytest.mark.parametrize(("snakefile", "list_of_rooms", "modules"), [
+    ("workflow/Snakefile", "NO_NUMBERS", "accelstudy.study.results, accelstudy.study.sensitivity"),
+    ("studies/hidden/hidden.smk", "UNUSED", "studies.hidden.diagnosing, studies.hidden.baselines"),
+])  # fmt: skip
+def test_numbers_hang_on_no_code_that_their_version_leaves_out(snakefile, list_of_rooms, modules):
+    text = (ROOT / snakefile).read_text(encoding="utf-8")
+    (rooms,) = re.findall(rf'^{list_of_rooms} = "(.+)"$', text, re.MULTILINE)
+    assert all((ROOT / "accelstudy" / room).is_dir() for room in rooms.split())
+    code = LOADED.format(modules=modules, rooms=f"{rooms} study/figures study/explorer")
+    words = [sys.executable, "-c", code]
+    ran = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert ran.stdout.strip() == "[]"

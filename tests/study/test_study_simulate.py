@@ -25,7 +25,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
 from accelstudy.files import tables
 from accelstudy.files.tables import (
-    collect,
     git_commit,
     parquet_writer,
     read_origin,
@@ -33,11 +32,11 @@ from accelstudy.files.tables import (
     whole_file,
     write_table,
 )
-from accelstudy.study import batches as module
-from accelstudy.study.batches import batches, memory
+from accelstudy.study import results as module
+from accelstudy.study.cells import memory
 from accelstudy.study.replicates import ESTIMATES
 from accelstudy.study.statistics import simulated_statistics
-from accelstudy.study.tables import read_estimates
+from accelstudy.study.tables import collect, read_estimates
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -227,7 +226,7 @@ def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
     assert path.read_text() == "new"
 
 
-def test_nothing_is_left_of_an_interrupted_batch(monkeypatch, tmp_path):
+def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
     calls = []
 
     def broken(cell, *which):
@@ -261,11 +260,29 @@ def test_reading_files_and_folders(tmp_path):
     paths = [tmp_path / f"{name}.parquet" for name in "ab"]
     for i, path in enumerate(paths):
         write_table(path, pd.DataFrame({"x": [i, i + 10]}), PROVENANCE)
+    (tmp_path / ".accelstudy-1.part").mkdir()
+    (tmp_path / ".accelstudy-1.part" / "c.parquet").write_bytes(b"half")
     assert read_table(paths[1])["x"].tolist() == [1, 11]
     assert read_table(paths)["x"].tolist() == read_table(tmp_path)["x"].tolist() == [0, 10, 1, 11]
     assert read_table(paths, filters=[("x", ">", 5)])["x"].tolist() == [10, 11]
-    collect(paths, tmp_path / "c.parquet", PROVENANCE)
-    assert read_table(tmp_path / "c.parquet")["x"].tolist() == [0, 10, 1, 11]
+
+
+def test_parts_are_joined_in_the_order_of_the_cells(tmp_path):
+    paths = [tmp_path / f"{name}.parquet" for name in "ab"]
+    for path, cells in zip(paths, (["c", "a", "a"], ["d", "b"]), strict=True):
+        write_table(path, pd.DataFrame({"cell": cells, "x": range(len(cells))}), PROVENANCE)
+    table = collect(paths, ["a", "b", "c", "d"])
+    assert table["cell"].tolist() == ["a", "a", "b", "c", "d"]
+    assert table["x"].tolist() == [1, 2, 1, 0, 0]
+
+
+def test_a_cell_in_two_files_of_a_folder_is_an_error(tmp_path):
+    """As a study leaves them that fans out otherwise than before."""
+    for name in ("model", "model/scheme"):
+        path = tmp_path / name / "gravity.parquet"
+        write_table(path, pd.DataFrame({"cell": ["a", "b"]}), PROVENANCE)
+    with pytest.raises(InputError, match=r"gravity.parquet both hold the cell a; delete"):
+        read_estimates(tmp_path)
 
 
 def test_estimates_of_some_cells(written):
@@ -284,10 +301,6 @@ def test_sigmas_that_no_weights_span_are_said():
     assert "the sigmas differ too much" in found.reason
 
 
-def test_a_study_has_batches_of_many_small_cells():
-    cells = [*make_cells(grid(schemes="all", approaches="robot", replicates=20_000)).values()]
-    shared = batches(cells)
-    assert [cell for each in shared for cell in each] == cells
-    assert max(sum(cell.replicates for cell in each) for each in shared) <= 400_000
-    assert len(shared) == -(-len(cells) // 20)
-    assert memory(shared[0]) == 1000 + round(120e-6 * 20_000 * 9)
+def test_a_job_asks_for_the_memory_of_its_largest_cell():
+    cells = make_cells(grid(replicates=20_000), grid(schemes="rings-24", replicates=10)).values()
+    assert memory([*cells]) == 1000 + round(120e-6 * 20_000 * 9)

@@ -17,29 +17,23 @@ from places import ROOT
 from snakemake_helpers import ENVIRONMENT, SNAKEMAKE, jobs, one_line, remains, snakemake
 
 import accelstudy
+import accelstudy.jobs as jobs_of_package
 from accelstudy.basics.errors import InputError
 from accelstudy.files import outputs
 from accelstudy.files.outputs import check_writable
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.study import batches
-from accelstudy.study.figures import get_figure
+from accelstudy.study.config import parse_study
+from accelstudy.study.figures import figure_names, get_figure
 from accelstudy.study.tables import TABLES
 
 TINY = read_layer(ROOT / ".test" / "config" / "config.yaml")
 """Eight cells, of which one cannot be estimated."""
+MODELS = TINY["grids"][0]["models"]
 TABLE_PATHS = [f"results/tiny/{name}.parquet" for name in TABLES]
 
-IN_BATCHES = f"""\
-from functools import partial
-from accelstudy.study import batches
-batches.batches = partial(batches.batches, most=240)
-include: "{ROOT}/workflow/Snakefile"
-rule study:
-    default_target: True
-    input: rules.all.input
-"""
-"""The workflow with two batches of four cells."""
+SET_UPS = [f"{model}/{approach}" for model in MODELS for approach in ("gravity", "robot")]
+"""What a job simulates."""
 MODULE = """\
 from accelstudy.files.shipped import shipped
 configfile: "outer.yaml"
@@ -65,13 +59,6 @@ SOURCES = {
     "installed": 'str(shipped("workflow/Snakefile"))',
     "on GitHub": 'github("someone/accelstudy", path="workflow/Snakefile", branch="main")',
 }
-RETRIED = f"""\
-include: "{ROOT}/workflow/rules/start.smk"
-rule retried:
-    output: "done"
-    resources: mem_mb=megabytes(100)
-    shell: "test {{resources.mem_mb}} = 200 && touch {{output}}"
-"""
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -104,12 +91,6 @@ def refuse(folder, *arguments, **options):
     return result.stdout
 
 
-def in_batches(folder):
-    path = folder / "Snakefile"
-    path.write_text(IN_BATCHES)
-    return path
-
-
 def content(folder):
     """All tables and estimates of a finished study, as they are."""
     results = folder / "results" / "tiny"
@@ -127,7 +108,7 @@ def assert_same(one, other):
 
 @pytest.fixture(scope="module")
 def single(tmp_path_factory):
-    """The study run on one core, in one batch, with everything that `all` asks for."""
+    """The study run on one core, with everything that `all` asks for."""
     folder = tmp_path_factory.mktemp("single")
     succeed(folder, cores=1)
     return folder
@@ -158,7 +139,12 @@ def test_all_is_made(single):
     hashes = {read_origin(path)["config_hash"] for path in results.rglob("*.parquet")}
     assert len(hashes) == 1
     assert not list(results.glob("claims*"))
-    assert (results / "logs" / "simulate" / "0000.log").read_text().count(" replicates, ") == 7
+    estimates = results.glob("estimates/**/*.parquet")
+    assert {p.relative_to(results / "estimates").with_suffix("").as_posix() for p in estimates} == {
+        *SET_UPS
+    }
+    logs = [(results / "logs" / "simulate" / f"{name}.log").read_text() for name in SET_UPS]
+    assert sum(log.count(" replicates, ") for log in logs) == 7
     assert remains(single) == []
     assert linked_figures(results) == {*results.glob("figures/*.svg")}
 
@@ -169,17 +155,23 @@ def test_a_second_run_does_nothing(single):
     assert {path: path.stat().st_mtime_ns for path in (single / "results").rglob("*")} == before
 
 
-def test_killed_and_resumed(single, tmp_path, monkeypatch):
-    """In batches, on two cores, in two runs: what comes out is the same."""
-    monkeypatch.setattr(batches, "batches", batches.batches)  # which the workflow replaces
-    snakefile = in_batches(tmp_path)
+def test_a_study_in_memory_has_the_same_tables(single):
+    tables = accelstudy.run_study(ROOT / ".test" / "config" / "config.yaml")
+    assert [*tables] == [*TABLES]
+    for name, table in tables.items():
+        written = read_table(single / "results" / "tiny" / f"{name}.parquet")
+        pd.testing.assert_frame_equal(table, written, check_exact=True)
+
+
+def test_killed_and_resumed(single, tmp_path):
+    """On two cores, in two runs: what comes out is the same."""
     estimates = tmp_path / "results" / "tiny" / "estimates"
     with subprocess.Popen(
-        command(tmp_path, *TABLE_PATHS, snakefile=snakefile),
+        command(tmp_path, *TABLE_PATHS),
         cwd=tmp_path, env=ENVIRONMENT, start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     ) as process:  # fmt: skip
-        while not list(estimates.glob("[0-9]*.parquet")):
+        while not list(estimates.glob("*/[a-z]*.parquet")):
             assert process.poll() is None
             time.sleep(0.02)
         os.killpg(process.pid, signal.SIGKILL)
@@ -187,12 +179,12 @@ def test_killed_and_resumed(single, tmp_path, monkeypatch):
     assert not any((tmp_path / path).exists() for path in TABLE_PATHS)
     assert len(read_table(estimates)) > 0  # what is there is whole
 
-    locked = run(tmp_path, *TABLE_PATHS, snakefile=snakefile)
+    locked = run(tmp_path, *TABLE_PATHS)
     assert locked.returncode != 0
-    one_line(locked.stdout, "results/tiny is locked", "`make unlock`")
-    succeed(tmp_path, "--unlock", snakefile=snakefile)
-    succeed(tmp_path, *TABLE_PATHS, snakefile=snakefile)
-    assert len(list(estimates.iterdir())) == 2
+    assert "--unlock" in locked.stdout
+    succeed(tmp_path, "--unlock")
+    succeed(tmp_path, *TABLE_PATHS)
+    assert len(list(estimates.glob("*/*"))) == len(SET_UPS)
     assert_same(content(tmp_path), content(single))
     for path in TABLE_PATHS:
         assert pq.read_schema(tmp_path / path).equals(pq.read_schema(single / path))
@@ -208,23 +200,51 @@ def planned(folder, **options):
 
 
 def test_dry_run(tmp_path):
-    plan = planned(tmp_path)
-    once = ("simulate", "collect", "figures", "explorer")
-    assert plan == dict.fromkeys(once, 1)
+    figures = len(figure_names(parse_study(TINY)))
+    assert planned(tmp_path) == {"simulate": 4, "collect": 1, "figure": figures, "page": 1}
     assert not (tmp_path / "results").exists()
 
 
 def test_another_unit_of_angles_draws_again(single, monkeypatch):
     monkeypatch.setitem(ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT", "deg")
-    assert planned(single).keys() == {"explorer", "figures"}
+    assert planned(single).keys() == {"page", "figure"}
 
 
-def test_an_edit_of_the_package_runs_what_depends_on_it(single, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("file", "anew"), [
+    ("drawing/style.py", {"page", "figure"}),
+    ("leveling/error.py", {"simulate", "collect", "page", "figure"}),
+])  # fmt: skip
+def test_an_edit_of_the_package_runs_what_depends_on_it(file, anew, single, tmp_path, monkeypatch):
     copy = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "accelstudy"))
-    with (copy / "drawing" / "style.py").open("a") as file:
-        file.write("# an edit\n")
-    monkeypatch.setattr(accelstudy, "__file__", str(copy / "__init__.py"))
-    assert planned(single).keys() == {"explorer", "figures"}
+    with (copy / file).open("a") as edited:
+        edited.write("# an edit\n")
+    monkeypatch.setattr(jobs_of_package, "__file__", str(copy / "jobs" / "__init__.py"))
+    assert planned(single).keys() == anew
+
+
+def test_another_leveling_or_seed_simulates_anew_and_a_further_model_alone(single):
+    assert "simulate" in planned(single, config={**TINY, "seed": 1})
+    assert "simulate" in planned(single, config={**TINY, "leveling": {"attitudes": 30}})
+    grid = {**TINY["grids"][0], "models": [*MODELS, "bias-scale-nonorthogonality-cubic"]}
+    assert planned(single, config={**TINY, "grids": [grid]})["simulate"] == 2
+
+
+def test_one_figure_is_drawn_alone(finished):
+    folder = finished / "results" / "tiny" / "figures"
+    for path in folder.iterdir():
+        path.unlink()
+    text = succeed(finished, "results/tiny/figures/closed-forms.svg")
+    assert jobs(text) == {"figure": 1}
+    assert {path.name for path in folder.iterdir()} == {
+        f"closed-forms.{kind}" for kind in ("svg", "png", "rst")
+    }
+
+
+def test_with_one_model_schemes_fan_out(tmp_path):
+    config = {**TINY, "grids": [{**TINY["grids"][0], "models": MODELS[0]}]}
+    text = succeed(tmp_path, "--dry-run", config=config)
+    assert jobs(text)["simulate"] == 4
+    assert f"results/tiny/estimates/{MODELS[0]}/faces-6/robot.parquet" in text
 
 
 # --- bad input -----------------------------------------------------------------------------------
@@ -267,14 +287,12 @@ def test_results_cannot_be_written(tmp_path, monkeypatch):
 
 def test_truncated_estimates(finished):
     results = finished / "results" / "tiny"
-    estimates = results / "estimates" / "0000.parquet"
+    name = f"results/tiny/estimates/{SET_UPS[0]}.parquet"
+    estimates = finished / name
     whole = estimates.read_bytes()
-    stamp = estimates.stat().st_mtime_ns
     estimates.write_bytes(whole[: len(whole) // 2])
-    os.utime(estimates, ns=(stamp, stamp))
-    text = refuse(finished, *TABLE_PATHS)
-    name = "results/tiny/estimates/0000.parquet"
-    one_line(text, f"{name}: not a whole Parquet file", "delete it and run again")
+    with pytest.raises(InputError, match=f"{SET_UPS[0]}.parquet: not a whole Parquet file"):
+        read_table(results / "estimates")
 
     # And so it is, though no table asks for it.
     estimates.unlink()
@@ -306,13 +324,6 @@ def test_every_rule_has_a_name_of_its_own():
     text = "\n".join(path.read_text(encoding="utf-8") for path in files)
     names = re.findall(r"^(?:use rule \w+ as|rule) (\w+)", text, re.MULTILINE)
     assert sorted(names) == sorted({*names})
-
-
-def test_another_attempt_gets_more_memory(tmp_path):
-    (tmp_path / "Snakefile").write_text(RETRIED)
-    result = snakemake(tmp_path, "--cores", 1, "--retries", 1)
-    assert result.returncode == 0, result.stdout
-    assert (tmp_path / "done").exists()
 
 
 def check_report(folder, results):

@@ -12,19 +12,14 @@ rule designs:
         png=DESIGNS_FILES["png"],
     log:
         f"{RESULTS}/logs/designs/efficiency.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/designs/efficiency.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(1000),
     params:
         # As written, with the paths of files, and as read, with the content of the files.
         section=EXAMPLE.designs,
         read=DESIGNS.model_dump(),
         seed=EXAMPLE.seed,
-        code=code_of("designs"),
+        version=VERSION,
     message:
         "Compare position schemes with optimal designs"
     script:

@@ -10,19 +10,14 @@ rule plan:
         [f"{RESULTS}/plan/cases/{{plan}}/{path}" for path in PLAN_FILES],
     log:
         f"{RESULTS}/logs/plan/cases/{{plan}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/plan/cases/{{plan}}.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         case=lambda wildcards: PLAN.cases[wildcards.plan].model_dump(mode="json"),
         replicates=PLAN.replicates,
         seed=EXAMPLE.seed,
         angle_unit=angle_unit(),
-        code=code_of("plan"),
+        version=VERSION,
     message:
         "Plan the calibration {wildcards.plan}"
     script:

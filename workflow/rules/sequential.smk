@@ -11,19 +11,14 @@ rule sequential_sessions:
         f"{RESULTS}/sequential/sessions/{{approach}}.parquet",
     log:
         f"{RESULTS}/logs/sequential/{{approach}}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/sequential/{{approach}}.tsv"
     wildcard_constraints:
         approach="|".join(SEQUENTIAL.approaches),
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(1000),
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
         seed=EXAMPLE.seed,
-        code=code_of("sequential_sessions"),
+        version=VERSION,
     message:
         "Simulate sessions that choose their positions: {wildcards.approach}"
     script:
@@ -41,17 +36,12 @@ rule sequential:
         png=f"{RESULTS}/sequential/positions.png",
     log:
         f"{RESULTS}/logs/sequential/summary.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/sequential/summary.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(1000),
     params:
         config=SEQUENTIAL.model_dump(mode="json"),
         seed=EXAMPLE.seed,
-        code=code_of("sequential_summary"),
+        version=VERSION,
     message:
         "Summarise how many positions the promised accuracy takes, and how often it is reached"
     script:

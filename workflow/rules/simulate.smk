@@ -1,42 +1,45 @@
 rule simulate:
+    input:
+        # Schemes and plug-ins; the prefix of a module does not move what is `local`.
+        map(local, named_files(config)),
     output:
-        **{name: f"{BATCH}/{name}.parquet" for name in TABLES},
-        estimates=ESTIMATES,
+        **{name: f"{RESULTS}/tables/{SET_UP}/{name}.parquet" for name in TABLES},
+        estimates=f"{RESULTS}/estimates/{SET_UP}.parquet",
     log:
-        f"{RESULTS}/logs/simulate/{{batch}}.log",
+        f"{RESULTS}/logs/simulate/{SET_UP}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/simulate/{{batch}}.tsv"
+        f"{RESULTS}/benchmarks/simulate/{SET_UP}.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
     resources:
-        mem_mb=lambda wildcards, attempt: memory(BATCHES[wildcards.batch]) * attempt,
+        mem_mb=lambda wildcards, attempt: memory(SET_UPS[SET_UP.format(**wildcards)]) * attempt,
     params:
-        spec=lambda wildcards: batch_spec(wildcards.batch),
-        code=code_of("simulate"),
+        cells=lambda wildcards: [c.to_dict() for c in SET_UPS[SET_UP.format(**wildcards)]],
+        leveling=STUDY.leveling.model_dump(),
+        seed=STUDY.seed,
+        version=NUMBERS,
     message:
-        "Simulate and calibrate batch {wildcards.batch}"
+        "Simulate and calibrate {wildcards}"
     script:
         "../scripts/simulate.py"
 
 
 rule collect:
     input:
-        **{table: expand(f"{BATCH}/{table}.parquet", batch=BATCHES) for table in TABLES},
+        **{
+            name: expand(f"{RESULTS}/tables/{{set_up}}/{name}.parquet", set_up=SET_UPS)
+            for name in TABLES
+        },
     output:
-        **{table: f"{RESULTS}/{table}.parquet" for table in TABLES},
+        **{name: f"{RESULTS}/{name}.parquet" for name in TABLES},
     log:
         f"{RESULTS}/logs/collect.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/collect.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(1000),
     params:
-        code=code_of("collect"),
+        cells=[cell.name for cell in CELLS],
+        version=NUMBERS,
     message:
-        "Join the tables of all batches"
+        "Join the tables of all set-ups"
     script:
         "../scripts/collect.py"

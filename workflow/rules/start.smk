@@ -1,5 +1,5 @@
 # What every workflow starts with; it is included after `configfile`.
-import os
+import re
 from contextlib import contextmanager
 from operator import attrgetter
 
@@ -8,14 +8,11 @@ from snakemake.utils import min_version
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import attitude_unit
-from accelstudy.files.reading import read_layer
 from accelstudy.files.outputs import check_writable
-from accelstudy.jobs.code import code_hash
-from accelstudy.jobs.earlier import earlier_run
-from accelstudy.jobs.job import killed_notice, prepare_jobs
+from accelstudy.files.reading import read_layer
+from accelstudy.jobs import code_version, killed_notice
 
 min_version("9.10")
-prepare_jobs()
 
 SOURCE = ", ".join(map(str, workflow.configfiles)) or "config"
 
@@ -50,38 +47,10 @@ def configured(parse, name, without=None):
         read_layer(path)  # Snakemake's own reading is less strict
     checked = parse(config, SOURCE)
     results = f"results/{attrgetter(name)(checked)}"
-    check_writable(placed(results))
+    check_writable(results)
     return checked, results
 
 
-@in_a_line()
-def look_at_earlier(outputs, setups={}, seed=None, folders={}):
-    """Check earlier results before Snakemake decides what to make.
-
-    On a cluster, jobs read the workflow again; they skip the check.
-    """
-    if workflow.is_main_process:
-        outputs = [placed(path) for path in outputs]
-        setups, folders = ({placed(path): of[path] for path in of} for of in (setups, folders))
-        for line in earlier_run(placed(RESULTS), outputs, setups, seed, folders):
-            logger.warning(line)
-
-
-def placed(path):
-    """Where a file of this workflow is: a module of another workflow may have a prefix."""
-    return str(workflow.modifier.path_modifier.replace_prefix(path))
-
-
-def given(path):
-    """A file of the user as an input, which no prefix moves."""
-    return path if placed(path) == path else os.path.abspath(path)
-
-
-def code_of(script):
-    """Hash of the code that a script of the workflow runs."""
-    return code_hash(workflow.source_path(f"../scripts/{script}.py"))
-
-
-def megabytes(least):
-    """Memory of a job; the next attempt gets more, as want of memory may have ended the last."""
-    return lambda wildcards, attempt: least * attempt
+def one_of(names):
+    """Pattern of a wildcard that is one of some names."""
+    return "|".join(map(re.escape, dict.fromkeys(names)))

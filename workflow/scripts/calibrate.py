@@ -2,7 +2,7 @@ import logging
 
 from accelstudy.campaign.batch.config import Task
 from accelstudy.campaign.batch.run import run_task
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 
 with logged(snakemake):
     error = run_task(

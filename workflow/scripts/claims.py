@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import job, lists
+from accelstudy.jobs import job, lists
 from accelstudy.study.claims.judging import TABLES, judge_claims
 from accelstudy.study.config import StudyConfig
 

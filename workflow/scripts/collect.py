@@ -1,6 +1,7 @@
-from accelstudy.files.tables import collect
-from accelstudy.jobs.job import job, lists
+from accelstudy.files.tables import write_table
+from accelstudy.jobs import job, lists
+from accelstudy.study.tables import collect
 
 with job(snakemake) as provenance:
-    for table, parts in lists(snakemake.input).items():
-        collect(parts, snakemake.output[table], provenance)
+    for name, parts in lists(snakemake.input).items():
+        write_table(snakemake.output[name], collect(parts, snakemake.params.cells), provenance)

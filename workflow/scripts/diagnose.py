@@ -2,7 +2,7 @@ import logging
 
 from accelstudy.diagnosis.report.output import diagnose_folder
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 
 with logged(snakemake):
     diagnosis = diagnose_folder(

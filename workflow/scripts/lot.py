@@ -1,5 +1,5 @@
 from accelstudy.campaign.batch.config import parse_batch
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 from accelstudy.lots.run import run_lot
 
 with logged(snakemake):

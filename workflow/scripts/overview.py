@@ -1,6 +1,6 @@
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.batch.overview import counts, summarise_campaigns
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 
 with logged(snakemake):
     batch = parse_batch(snakemake.config)

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from accelstudy.planning.output import make_plan
 
 with job(snakemake) as provenance:

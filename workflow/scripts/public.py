@@ -1,5 +1,5 @@
 from accelstudy.campaign.importing.public import record_public
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 
 with logged(snakemake):
     record_public(

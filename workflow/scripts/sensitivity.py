@@ -1,9 +1,12 @@
-from accelstudy.jobs.job import job, lists
+from accelstudy.files.tables import read_table, write_table
+from accelstudy.jobs import job, lists
 from accelstudy.study.config import StudyConfig
-from accelstudy.study.sensitivity import analyse_sensitivity, analyse_shapley
+from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 with job(snakemake) as provenance:
     study = StudyConfig.model_validate(snakemake.config)
-    tables, output = lists(snakemake.input), snakemake.output
-    analyse_sensitivity(study, tables["summary"], output.sensitivity, provenance)
-    analyse_shapley(study, tables["summary"], tables["correlations"], output.shapley, provenance)
+    tables = {name: read_table(paths) for name, paths in lists(snakemake.input).items()}
+    sensitivity = sensitivity_table(study, tables["summary"])
+    shapley = shapley_table(study, tables["summary"], tables["correlations"])
+    write_table(snakemake.output.sensitivity, sensitivity, provenance)
+    write_table(snakemake.output.shapley, shapley, provenance)

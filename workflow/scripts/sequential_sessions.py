@@ -1,5 +1,5 @@
 from accelstudy.files.tables import write_table
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.sequential.simulation import sessions_table
 

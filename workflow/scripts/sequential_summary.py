@@ -1,7 +1,7 @@
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from accelstudy.sequential.config import SequentialConfig
 from accelstudy.sequential.figure import sequential_figure
 from accelstudy.sequential.simulation import summary_table

@@ -1,5 +1,6 @@
-from accelstudy.jobs.job import job
-from accelstudy.study.batches import simulate_batch
+from accelstudy.jobs import job
+from accelstudy.study.results import simulate_cells
 
 with job(snakemake) as provenance:
-    simulate_batch(snakemake.params.spec, dict(snakemake.output.items()), provenance)
+    cells, leveling = snakemake.params.cells, snakemake.params.leveling
+    simulate_cells(cells, leveling, dict(snakemake.output.items()), provenance)

@@ -1,6 +1,6 @@
 from accelstudy.campaign.simulated import CampaignSettings
 from accelstudy.diagnosis.round_trip import write_simulated
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 
 with logged(snakemake):
     write_simulated(

@@ -21,12 +21,14 @@ from accelstudy.study.beyond_linear_theory import (
     knows_all,
     noise_when_off,
 )
+from accelstudy.study.cell import Cell
 from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_page
 from accelstudy.study.claims.quantities import Evidence, Numbers
 from accelstudy.study.claims.reductions import reductions
 from accelstudy.study.config import StudyConfig
+from accelstudy.study.replicates import read_replicates
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 HOLDS, FAILS, OPEN = "holds", "does not hold", "not decided"
@@ -73,19 +75,24 @@ def judge_claims(
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
-    settings = study.sensitivity
-    assert settings is not None
-    cells = [
-        cell
-        for cell in study_cells(study)
-        if cell.name == "/".join([settings.model, cell.scheme, cell.approach])
-    ]
-    reduced = reductions(cells, estimates, study.leveling.model_dump(), papers_reductions())
+    calibrations = []
+    for cell in study_cells(study):
+        if is_claimed(study, cell) and cell.estimability.estimable:
+            replicates = read_replicates(estimates, cell)
+            if replicates is not None:
+                calibrations.append((cell, replicates))
+    reduced = reductions(calibrations, study.leveling.model_dump(), papers_reductions())
     claims, by_scheme = judge(study, {name: read_table(tables[name]) for name in TABLES}, reduced)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], by_scheme, provenance)
     with whole_file(outputs["html"]) as path:
         path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
+
+
+def is_claimed(study: StudyConfig, cell: Cell) -> bool:
+    """Whether the claims use the estimates of a cell: it has their model, and the usual noise."""
+    assert study.sensitivity is not None
+    return cell.name == "/".join([study.sensitivity.model, cell.scheme, cell.approach])
 
 
 def papers_reductions() -> dict[str, float]:

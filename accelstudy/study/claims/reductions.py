@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +13,9 @@ from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import MEAN, controlled
 from accelstudy.study.known import KnownValues
 from accelstudy.study.quantiles import controlled_quantiles, share_below
-from accelstudy.study.replicates import read_replicates
-from accelstudy.study.statistics import calibrations, cell_tilt_error
+from accelstudy.study.replicates import Replicates
+from accelstudy.study.statistics import calibrations as numbers_of
+from accelstudy.study.statistics import cell_tilt_error
 
 Array = NDArray[np.float64]
 LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
@@ -27,8 +27,7 @@ CENTRAL = (0, 3, 6)
 
 
 def reductions(
-    cells: Iterable[Cell],
-    estimates: Sequence[str | Path],
+    calibrations: Iterable[tuple[Cell, Replicates]],
     leveling: Mapping[str, Any],
     papers: Mapping[str, float],
 ) -> pd.DataFrame:
@@ -36,8 +35,7 @@ def reductions(
 
     Parameters
     ----------
-    cells : cells with the model of the claims
-    estimates : files with the estimates of these cells
+    calibrations : cells with the model of the claims, and their replicates
     leveling : mapping with max_tilt_gon and attitudes
     papers : the paper's number for each effect
 
@@ -49,10 +47,10 @@ def reductions(
         (the central 95 %) and `percentile`, the share below the paper's number.
     """
     sigmas: dict[tuple[str, str], _Sigmas] = {}
-    for cell in cells:
-        read = _Sigmas.read(cell, estimates, leveling)
-        if read is not None:
-            sigmas[cell.scheme, cell.approach] = read
+    for cell, replicates in calibrations:
+        simulated = replicates.simulated
+        if simulated.redundancy > 0 and simulated.converged.any():
+            sigmas[cell.scheme, cell.approach] = _Sigmas.of(cell, replicates, leveling)
     rows = []
     for effect, paper in papers.items():
         for scheme in (name for name, approach in sigmas if approach == "gravity"):
@@ -76,21 +74,14 @@ class _Sigmas(NamedTuple):
     converged: NDArray[np.bool_]
 
     @classmethod
-    def read(
-        cls, cell: Cell, estimates: Sequence[str | Path], leveling: Mapping[str, Any]
-    ) -> _Sigmas | None:
-        """Read those of a cell; None if it has none."""
-        replicates = read_replicates(estimates, cell) if cell.estimability.estimable else None
-        if replicates is None or replicates.simulated.redundancy <= 0:
-            return None
+    def of(cls, cell: Cell, replicates: Replicates, leveling: Mapping[str, Any]) -> _Sigmas:
+        """Take those of a cell."""
         simulated, linear = replicates
-        if not simulated.converged.any():
-            return None
-        theory = None if linear is None else calibrations(cell, linear)["effect_sigma"]
+        theory = None if linear is None else numbers_of(cell, linear)["effect_sigma"]
         known = None
         if cell.linear_theory is not None:
             known = KnownValues(cell, cell.linear_theory, cell_tilt_error(cell, leveling))
-        own = calibrations(cell, simulated)["effect_sigma"]
+        own = numbers_of(cell, simulated)["effect_sigma"]
         return cls(list(cell.uniform_effects), own, theory, known, simulated.converged)
 
     def mean(self, effect: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from accelstudy.simulation.sessions import Noise
 from accelstudy.study.config.blocks import HOLD_KEYS, Grid
 from accelstudy.study.config.schema import StudyConfig
 
-__all__ = ["Grid", "StudyConfig", "config_schema", "parse_study", "read_study"]
+__all__ = ["Grid", "StudyConfig", "config_schema", "named_files", "parse_study", "read_study"]
 
 
 def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConfig:
@@ -54,6 +54,18 @@ def read_study(*paths: str | Path) -> StudyConfig:
     for path in paths:
         content = overlay(content, read_layer(path))
     return parse_study(content, ", ".join(str(path) for path in paths))
+
+
+def named_files(content: Any) -> list[str]:
+    """Files that a configuration names: of schemes, models and plug-ins."""
+    if isinstance(content, str):
+        named = content.endswith((".yaml", ".yml", ".py")) and Path(content).is_file()
+        return [content] if named else []
+    if isinstance(content, Mapping):
+        content = [*content, *content.values()]
+    if not isinstance(content, list):
+        return []
+    return sorted({path for each in content for path in named_files(each)})
 
 
 def config_schema() -> dict[str, Any]:

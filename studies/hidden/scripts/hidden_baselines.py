@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from studies.hidden.baselines import run_baselines
 from studies.hidden.cells import planned
 from studies.hidden.config import parse_hidden

@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import logged
+from accelstudy.jobs import logged
 from studies.hidden.cells import write_plan
 from studies.hidden.config import parse_hidden
 

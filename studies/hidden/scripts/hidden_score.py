@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import job, lists
+from accelstudy.jobs import job, lists
 from studies.hidden.config import parse_hidden
 from studies.hidden.scoring.page import write_score
 

@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from studies.hidden.real_noise import parse_real_noise, run_log
 
 with job(snakemake) as provenance:

@@ -1,4 +1,4 @@
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from studies.hidden.real_noise import parse_real_noise
 from studies.hidden.scoring.logs import write_real_score
 

@@ -1,32 +1,29 @@
-# It needs a few cells only, and what waits for it takes longer than all else that is left. So it
-# starts before the tables of all batches are there.
+# What is judged by the cells of one model.
+JUDGED = [
+    name
+    for name, cells in SET_UPS.items()
+    if STUDY.sensitivity and any(cell.model == STUDY.sensitivity.model for cell in cells)
+]
+
+
+# Much waits for it, and it needs a few cells only. So it starts before all tables are there.
 rule sensitivity:
     input:
-        **(
-            {
-                table: expand(f"{BATCH}/{table}.parquet", batch=batches_of_claims())
-                for table in ("summary", "correlations")
-            }
-            if STUDY.sensitivity
-            else {}
-        ),
+        summary=expand(f"{RESULTS}/tables/{{set_up}}/summary.parquet", set_up=JUDGED),
+        correlations=expand(f"{RESULTS}/tables/{{set_up}}/correlations.parquet", set_up=JUDGED),
     output:
         sensitivity=f"{RESULTS}/sensitivity.parquet",
         shapley=f"{RESULTS}/shapley.parquet",
     log:
         f"{RESULTS}/logs/sensitivity.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/sensitivity.tsv"
     priority: 2
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(2000),
     params:
         settings=STUDY.sensitivity.model_dump() if STUDY.sensitivity else None,
-        sensor=STUDY.model_dump(include={"seed", "gravity_mps2", "noise", "sensor"}),
-        code=code_of("sensitivity"),
+        sensor=STUDY.model_dump(include={"gravity_mps2", "noise", "sensor"}),
+        seed=STUDY.seed,
+        version=NUMBERS,
     message:
         "Analyse the sensitivity of roll and pitch"
     script:
@@ -35,7 +32,7 @@ rule sensitivity:
 
 rule claims:
     input:
-        estimates=expand(ESTIMATES, batch=batches_of_claims()) if STUDY.paper else [],
+        estimates=expand(f"{RESULTS}/estimates/{{set_up}}.parquet", set_up=JUDGED),
         cells=f"{RESULTS}/cells.parquet",
         summary=f"{RESULTS}/summary.parquet",
         correlations=f"{RESULTS}/correlations.parquet",
@@ -52,15 +49,10 @@ rule claims:
         ),
     log:
         f"{RESULTS}/logs/claims.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/claims.tsv"
     conda:
         "../envs/accelstudy.yaml"
-    threads: 1
-    resources:
-        mem_mb=megabytes(1000),
     params:
-        code=code_of("claims"),
+        version=VERSION,
     message:
         "Judge the paper's claims, and what simulation adds"
     script:

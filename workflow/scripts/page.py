@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from accelstudy.files.tables import read_table
-from accelstudy.jobs.job import job
+from accelstudy.jobs import job
 from accelstudy.study.config import StudyConfig
 from accelstudy.study.explorer.page import write_explorer
 

@@ -1,0 +1,63 @@
+"""A study in memory, without Snakemake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from accelstudy.study.cell import Cell
+from accelstudy.study.cells import study_cells
+from accelstudy.study.claims.judging import is_claimed, judge, papers_reductions
+from accelstudy.study.claims.reductions import reductions
+from accelstudy.study.config import StudyConfig, read_study
+from accelstudy.study.replicates import Replicates
+from accelstudy.study.sensitivity import sensitivity_table, shapley_table
+from accelstudy.study.statistics import CellStatistics, simulated_statistics
+from accelstudy.study.summary import tables_of
+
+
+def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
+    """Run a study without Snakemake.
+
+    Parameters
+    ----------
+    *configurations : str or Path
+        YAML files as of the workflow; later ones overlay earlier ones key by key.
+
+    Returns
+    -------
+    dict of DataFrame
+        The tables that the workflow writes, by their names: cells, summary, correlations, leveling
+        and quantiles; with `sensitivity` also sensitivity and shapley, with `paper` also claims and
+        claims_by_scheme.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read or does not fit the schema.
+    """
+    return study_tables(read_study(*configurations))
+
+
+def study_tables(study: StudyConfig) -> dict[str, pd.DataFrame]:
+    """Run a checked study in memory; see `run_study`."""
+    leveling = study.leveling.model_dump()
+    calibrations: list[tuple[Cell, Replicates]] = []
+
+    def results() -> Iterator[CellStatistics]:
+        for cell in study_cells(study):
+            found = simulated_statistics(cell, study.seed, leveling)
+            if found.replicates is not None and study.paper and is_claimed(study, cell):
+                calibrations.append((cell, found.replicates))
+            yield found
+
+    tables = tables_of(results())
+    if study.sensitivity is not None:
+        tables["sensitivity"] = sensitivity_table(study, tables["summary"])
+        tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
+    if study.paper:
+        reduced = reductions(calibrations, leveling, papers_reductions())
+        tables["claims"], tables["claims_by_scheme"] = judge(study, tables, reduced)
+    return tables

@@ -1,0 +1,51 @@
+rule figure:
+    input:
+        unpack(lambda w: {name: f"{RESULTS}/{name}.parquet" for name in figure_tables(w.figure)}),
+    output:
+        svg=report(
+            f"{RESULTS}/figures/{{figure}}.svg",
+            caption="../report/caption.rst",
+            category=lambda wildcards: get_figure(wildcards.figure).category,
+            labels=lambda wildcards: {"content": get_figure(wildcards.figure).title},
+        ),
+        png=f"{RESULTS}/figures/{{figure}}.png",
+        caption=f"{RESULTS}/figures/{{figure}}.rst",
+    log:
+        f"{RESULTS}/logs/figures/{{figure}}.log",
+    priority: 1
+    conda:
+        "../envs/accelstudy.yaml"
+    params:
+        caption=lambda wildcards: captions([wildcards.figure], STUDY)[wildcards.figure],
+        study=SHOWN,
+        angle_unit=UNIT,
+        version=VERSION,
+    message:
+        "Draw {wildcards.figure}"
+    script:
+        "../scripts/figure.py"
+
+
+rule page:
+    input:
+        **{name: f"{RESULTS}/{name}.parquet" for name in TABLES},
+    output:
+        report(
+            f"{RESULTS}/explorer.html",
+            caption="../report/explorer.rst",
+            category="Study",
+            labels={"content": "Explorer: choose set-ups and see what they give"},
+        ),
+    log:
+        f"{RESULTS}/logs/page.log",
+    conda:
+        "../envs/accelstudy.yaml"
+    params:
+        figures=FIGURES,
+        study=SHOWN,
+        angle_unit=UNIT,
+        version=VERSION,
+    message:
+        "Make the page of all set-ups"
+    script:
+        "../scripts/page.py"
