@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import gc
 import logging
-import os
 import sys
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -75,7 +74,6 @@ def job(snakemake: Any) -> Iterator[dict[str, Any]]:
 @contextmanager
 def logged(snakemake: Any) -> Iterator[None]:
     """Run the body of a script of any workflow, with angles in the unit of its rule, if any."""
-    os.environ["MPLBACKEND"] = "agg"  # figures go to files, whatever the user looks at
     # A job ends soon and makes few cycles. The collector would look at all modules again and again.
     gc.freeze()
     gc.set_threshold(COLLECT_AFTER)

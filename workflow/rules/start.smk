@@ -1,4 +1,5 @@
 # What every workflow starts with; it is included after `configfile`.
+import os
 import re
 from contextlib import contextmanager
 from operator import attrgetter
@@ -13,6 +14,7 @@ from accelstudy.files.reading import read_layer
 from accelstudy.jobs import code_version, killed_notice
 
 min_version("9.10")
+os.environ.update(MPLBACKEND="agg")  # figures of jobs go to files, whatever the user looks at
 
 SOURCE = ", ".join(map(str, workflow.configfiles)) or "config"
 
