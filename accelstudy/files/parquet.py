@@ -50,15 +50,6 @@ def read_frame(path: str | Path, remedy: str = "", **options: Any) -> pd.DataFra
         return table.to_pandas()
 
 
-def read_row_groups(path: str | Path, remedy: str = "") -> Iterator[pa.Table]:
-    """Read a table row group by row group; `remedy` and errors as in `whole_parquet`."""
-    with whole_parquet(path, remedy) as file:
-        for number in range(file.num_row_groups):
-            with _whole(path, remedy):
-                group = file.read_row_group(number)
-            yield group
-
-
 @contextmanager
 def whole_parquet(path: str | Path, remedy: str = "", **options: Any) -> Iterator[pq.ParquetFile]:
     """Open a file whose pages are verified when they are read.

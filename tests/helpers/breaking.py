@@ -102,7 +102,9 @@ def places(one: Fault) -> list[str]:
 
 def run(tests: list[str], package: Path) -> tuple[int, str]:
     """Exit status of pytest with a package, and the first test that fails."""
+    # The folder that pyproject.toml puts first would have the package unbroken.
     options = ["-q", "-x", "-rfE", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
+    options += ["--override-ini", "pythonpath=tests/helpers"]
     lines = (done := python("-m", "pytest", *options, *tests, package=package)).stdout.splitlines()
     failed = [line.split()[1] for line in lines if line.startswith(("FAILED", "ERROR"))]
     return done.returncode, " ".join(failed)
@@ -112,7 +114,7 @@ def python(*words: str, package: Path) -> subprocess.CompletedProcess[str]:
     """Run Python with a package, and with nothing of this folder."""
     environment = {
         **os.environ,
-        "PYTHONPATH": str(package.parent),
+        "PYTHONPATH": os.pathsep.join(map(str, (package.parent, ROOT))),  # studies/ is there alone
         "PYTHONDONTWRITEBYTECODE": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }

@@ -4,4 +4,5 @@ from studies.hidden.scoring.logs import write_real_score
 
 with job(snakemake) as provenance:
     config = parse_real_noise(snakemake.config)
+    provenance["config_hash"] = config.fingerprint
     print(write_real_score(config, snakemake.input, snakemake.output, provenance), end="")
