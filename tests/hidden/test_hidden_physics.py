@@ -379,6 +379,26 @@ def test_the_noise_is_what_it_is_said_to_be(kind):
         assert np.mean(scaled**4) > 4.5
 
 
+@pytest.mark.parametrize(("share", "seen"), [(1e-6, True), (1e-16, False)])
+def test_what_is_only_rounding_of_the_readings_cannot_be_seen(share, seen):
+    """A processor rounds as it likes; what is left of rounding is as large as the rounding."""
+    of_design = atlas("spread-24", "robot")
+    shape = of_design.shape(replace(EFFECTS["warm_up"], typical=share), {"tau": 600.0})
+    assert (shape is not None) == seen
+
+
+@pytest.mark.parametrize(("kind", "design", "approach"), [
+    ("triple_product", "circles-24", "robot"),  # one of its three factors is zero in each position
+    ("tightening_cable", "spread-24", "gravity"),  # no yaw, so no cable is wound
+    ("wound_supply", "spread-24", "gravity"),
+])  # fmt: skip
+def test_what_does_nothing_in_a_session_cannot_be_seen(kind, design, approach):
+    of_design, effect = atlas(design, approach), OUTSIDE[kind]
+    settings = effect.settings.draw(of_design.session, np.random.default_rng(1))
+    assert of_design.shape(effect, settings) is None
+    assert kind not in visible_outside(design, approach)
+
+
 def test_samples_within_the_holds_tell_the_noise():
     own = session("spread-24")
     campaign, _ = generate(

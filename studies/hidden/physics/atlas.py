@@ -97,6 +97,8 @@ class Conditions:
 
 VISIBLE = 3e-3
 """Share of an effect that must be left, or it cannot be seen."""
+ROUNDING = 1e-12
+"""Share of the readings themselves up to which an effect is only their rounding."""
 ALIKE = 0.9999
 """Canonical cosine from which on two effects are the same."""
 
@@ -166,6 +168,9 @@ class Atlas:
             np.sum((raw_force / self.session.sigma) ** 2)
             + np.sum((raw_angle * 9.8 / self.session.sigma) ** 2)
         ) / (2 * np.sqrt(effect.k))
+        readings = float(np.linalg.norm(self.conditions.directions)) * GRAVITY / self.session.sigma
+        if size < ROUNDING * readings:  # else what is left would be a matter of the processor
+            return None
         return Shape.of(effect, settings, left, float(size))
 
     @cached_property
