@@ -254,8 +254,6 @@ def study(folder, name, configuration) -> Texts:
 
 ANSWER = ("verdict", "specs", "positions", "posteriors", "place", "confirmed", "held_out_z",
           "sigma0_before", "sigma0_after", "p_size", "credible_set", "error")  # fmt: skip
-ROUNDING = ("tightening_cable", "triple_product", "wound_supply")
-"""Kinds that do nothing in some sessions; whether these see them is rounding, as processors do."""
 
 
 def hidden(folder, approach) -> Texts:
@@ -266,10 +264,8 @@ def hidden(folder, approach) -> Texts:
     from studies.hidden.diagnosing import diagnosed
 
     config = parse_hidden(yaml.safe_load((GOLDEN / "hidden.yaml").read_text("utf-8")))
-    cells = [cell for cell in study_cells(config) if cell.what not in ROUNDING]
-    campaigns = [
-        (cell, k) for cell in cells if cell.case.approach == approach for k in range(cell.count)
-    ]
+    cells = [cell for cell in study_cells(config) if cell.case.approach == approach]
+    campaigns = [(cell, k) for cell in cells for k in range(cell.count)]
     rows = diagnosed(campaigns, simulated(config.seed), config.model, config.diagnosis_seed)
     yield "campaigns", "".join(answer(outcome) for _, outcome, _ in rows)
 
