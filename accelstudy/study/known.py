@@ -28,12 +28,12 @@ class KnownValues:
     ----------
     cell : Cell
     theory : LinearTheory, of the cell
-    tilt : TiltError
+    tilt : TiltError; None where its statistics are not asked for
     """
 
     cell: Cell
     theory: LinearTheory
-    tilt: TiltError
+    tilt: TiltError | None = None
 
     @property
     def bias(self) -> Array:
@@ -88,6 +88,7 @@ class KnownValues:
     @cached_property
     def tilts(self) -> TiltDistribution:
         """Distribution of the tilt errors."""
+        assert self.tilt is not None
         u = len(self.tilt.reference)
         return TiltDistribution(self.tilt, self.theory.covariance[:u, :u])
 

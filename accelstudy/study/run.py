@@ -58,6 +58,6 @@ def study_tables(study: StudyConfig) -> dict[str, pd.DataFrame]:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        reduced = reductions(calibrations, leveling, papers_reductions())
+        reduced = reductions(calibrations, papers_reductions())
         tables["claims"], tables["claims_by_scheme"] = judge(study, tables, reduced)
     return tables

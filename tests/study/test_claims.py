@@ -8,7 +8,6 @@ import pytest
 from page_helpers import text_of
 from scipy.special import gammaln
 from study_helpers import (
-    LEVELING,
     NINE,
     PAPER_TRUTH,
     PROVENANCE,
@@ -85,7 +84,7 @@ def reduced(tables, folder):
         (cell, read_replicates(estimates_in(folder), cell))
         for cell in study_cells(make_study(**KEYS))
     ]
-    return reductions(replicates, LEVELING, papers_reductions())
+    return reductions(replicates, papers_reductions())
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +247,7 @@ def test_verdict_on_the_correlation(tables, rejudge):
 
 
 def test_a_scheme_without_redundancy_has_no_reduction(reduced, rejudge):
-    assert list(reductions([], LEVELING, papers_reductions())) == [*reduced]
+    assert list(reductions([], papers_reductions())) == [*reduced]
     claims, by_scheme = rejudge(reduced[reduced["scheme"] != "rings-24"])
     schemes = by_scheme.filter(like="reduction", axis=0).index.get_level_values("scheme")
     assert set(schemes) == {"mclaren-24"}

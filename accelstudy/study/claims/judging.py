@@ -81,7 +81,7 @@ def judge_claims(
             replicates = read_replicates(estimates, cell)
             if replicates is not None:
                 calibrations.append((cell, replicates))
-    reduced = reductions(calibrations, study.leveling.model_dump(), papers_reductions())
+    reduced = reductions(calibrations, papers_reductions())
     claims, by_scheme = judge(study, {name: read_table(tables[name]) for name in TABLES}, reduced)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], by_scheme, provenance)

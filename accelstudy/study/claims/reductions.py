@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,6 @@ from accelstudy.study.known import KnownValues
 from accelstudy.study.quantiles import controlled_quantiles, share_below
 from accelstudy.study.replicates import Replicates
 from accelstudy.study.statistics import calibrations as numbers_of
-from accelstudy.study.statistics import cell_tilt_error
 
 Array = NDArray[np.float64]
 LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
@@ -27,16 +26,13 @@ CENTRAL = (0, 3, 6)
 
 
 def reductions(
-    calibrations: Iterable[tuple[Cell, Replicates]],
-    leveling: Mapping[str, Any],
-    papers: Mapping[str, float],
+    calibrations: Iterable[tuple[Cell, Replicates]], papers: Mapping[str, float]
 ) -> pd.DataFrame:
     """Reductions, %, of the sd of some effects, robot-aided against gravity-based.
 
     Parameters
     ----------
     calibrations : cells with the model of the claims, and their replicates
-    leveling : mapping with max_tilt_gon and attitudes
     papers : the paper's number for each effect
 
     Returns
@@ -50,7 +46,7 @@ def reductions(
     for cell, replicates in calibrations:
         simulated = replicates.simulated
         if simulated.redundancy > 0 and simulated.converged.any():
-            sigmas[cell.scheme, cell.approach] = _Sigmas.of(cell, replicates, leveling)
+            sigmas[cell.scheme, cell.approach] = _Sigmas.of(cell, replicates)
     rows = []
     for effect, paper in papers.items():
         for scheme in (name for name, approach in sigmas if approach == "gravity"):
@@ -74,13 +70,11 @@ class _Sigmas(NamedTuple):
     converged: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, cell: Cell, replicates: Replicates, leveling: Mapping[str, Any]) -> _Sigmas:
+    def of(cls, cell: Cell, replicates: Replicates) -> _Sigmas:
         """Take those of a cell."""
         simulated, linear = replicates
         theory = None if linear is None else numbers_of(cell, linear)["effect_sigma"]
-        known = None
-        if cell.linear_theory is not None:
-            known = KnownValues(cell, cell.linear_theory, cell_tilt_error(cell, leveling))
+        known = None if cell.linear_theory is None else KnownValues(cell, cell.linear_theory)
         own = numbers_of(cell, simulated)["effect_sigma"]
         return cls(list(cell.uniform_effects), own, theory, known, simulated.converged)
 
