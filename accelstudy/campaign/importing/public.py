@@ -148,7 +148,8 @@ def fetch(data: PublicData, searched: Path, target: Path) -> Path:
         for path in sorted(searched.rglob(data.file_name)):
             if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
                 return path
-        download = pooch.HTTPDownloader(timeout=TIMEOUT)
+        # As a stream, pooch would leave the connection open after an error.
+        download = pooch.HTTPDownloader(timeout=TIMEOUT, stream=False)
         checksum = f"sha256:{data.sha256}"
         return Path(pooch.retrieve(data.url, checksum, data.file_name, target, downloader=download))
     except ValueError:
