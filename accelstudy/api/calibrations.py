@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from accelstudy.api.given import (
-    IN_MEMORY,
     drawing,
     for_programs,
     of_type,
@@ -39,7 +37,7 @@ from accelstudy.campaign.calibration.applying import (
 from accelstudy.campaign.calibration.assessment import assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
-from accelstudy.campaign.calibration.leveling import level_log
+from accelstudy.campaign.calibration.leveling import Leveling, level_frame
 from accelstudy.campaign.calibration.output import (
     calibration_content,
     draw_residuals,
@@ -194,15 +192,15 @@ class Calibration(Result):
         -------
         DataFrame
             The columns of the log, the calibrated force in m/s², roll and pitch in the unit that
-            the names say, and their sigmas. Warnings stand in ``attrs["warnings"]``.
+            the names say, and their sigmas; a DataFrame keeps its index. Warnings stand in
+            ``attrs["warnings"]``.
         """
         log = log_of(log)
         reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
-        with TemporaryDirectory(prefix=IN_MEMORY) as folder:
-            out = Path(folder) / "leveled.parquet"
-            sensor = calibration_of(self.content)
-            leveled = level_log(sensor, log.path, out, log.layout, reading, start)
-            table = pd.read_parquet(out)
+        sensor = calibration_of(self.content)
+        table, leveled = level_frame(
+            Leveling(sensor, log.file, log.layout, reading, start), log.table
+        )
         table.attrs["warnings"] = list(map(python_words, leveled.warnings))
         return table
 

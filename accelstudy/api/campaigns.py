@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from os import PathLike
+from pathlib import Path
 from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, create_model
@@ -55,13 +56,13 @@ def find_holds(log: Log, *, gravity: float | str | None = None, **settings: Any)
         If the log cannot be read, has no holds, or a setting is wrong.
     """
     log = log_of(log)
-    content = {"name": log.path.stem, **log.layout, **settings}
+    content = {"name": Path(log.name).stem, **log.layout, **settings}
     if gravity is not None:
         content["gravity"] = {"value_mps2": quantity("gravity", gravity, GRAVITY)}
     given = parse_settings(content, "find_holds")
     if given.sensors:
         raise InputError("sensors: several sensors make several campaigns; give the columns of one")
-    campaign, report = import_log(log.path, given)
+    campaign, report = import_log(log.file, given)
     notes, warnings = (
         tuple(map(python_words, each)) for each in (report.lines(), campaign.warnings)
     )

@@ -10,7 +10,6 @@ from math import isfinite
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from accelstudy.basics import bounds
@@ -26,8 +25,6 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
-IN_MEMORY = "accelstudy-"
-"""What the names of folders begin with that hold a table in memory as a file."""
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 _KEYWORDS = {"range": "range_mps2", "threshold": "threshold_mps2"}
 """Options whose keywords have other names."""
@@ -37,8 +34,7 @@ def python_words(text: str) -> str:
     """Say in words of Python what was written for a command: --time-unit is `time_unit`."""
     if "accelstudy " not in text:  # a command that is quoted keeps its options
         text = _OPTION.sub(_keyword, text)
-    folder = rf"{re.escape(gettempdir())}\W{IN_MEMORY}\w+\W"
-    return re.sub(rf"{folder}(DataFrame)\.parquet", r"\1", text)
+    return text
 
 
 def _keyword(option: re.Match[str]) -> str:

@@ -6,39 +6,40 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from shutil import rmtree
-from tempfile import mkdtemp
 from typing import Any
-from weakref import finalize
 
 import pandas as pd
+import pyarrow as pa
 
-from accelstudy.api.given import IN_MEMORY, for_programs, of_type, path_of, python_words
+from accelstudy.api.given import for_programs, of_type, path_of
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.sources import LogFile, TableSource
 from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log:
-    """A log, and how it is read; its numbers stay in the file until they are needed.
+    """A log, and how it is read; the numbers of a file stay there until they are needed.
 
     Attributes
     ----------
-    path : Path
+    file : path, or the columns of a table in memory
     layout : dict, keys of the settings of `import` that were given
+    table : DataFrame, the table in memory, as it was given; None of a file
     """
 
-    path: Path
+    file: LogFile
     layout: dict[str, Any]
+    table: pd.DataFrame | None = None
 
     @property
     def name(self) -> str:
-        """Name of the file; DataFrame, if it was made for one."""
-        return Path(python_words(str(self.path))).name
+        """Name of the file; DataFrame, of a table in memory."""
+        return Path(str(self.file)).name
 
     def __repr__(self) -> str:
         return f"Log({self.name!r}, {', '.join(self.layout) or 'nothing given'})"
@@ -92,19 +93,18 @@ def read_log(
         path = path_of("log", log, "a path or a DataFrame")
         open_source(path, given.get("variable"), known.delimiter)
         return Log(path, given)
+    table = log.copy()  # what its owner changes later is not of this log
+    rows = table
     if "rate_hz" not in given and "time" not in given:
-        log, given = _with_time(log, given)
-    folder = Path(mkdtemp(prefix=IN_MEMORY))
-    table = Log(folder / "DataFrame.parquet", given)
-    finalize(table, rmtree, folder, ignore_errors=True)
+        rows, given = _with_time(table, given)
     try:
-        log.rename(columns=str).to_parquet(table.path, index=False)
+        typed = pa.Table.from_pandas(rows.rename(columns=str), preserve_index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
         reason = one_line(error.args[-1])
         raise InputError(
             f"log: the DataFrame cannot be a log, which has numbers: {reason}"
         ) from None
-    return table
+    return Log(TableSource("DataFrame", typed), given, table)
 
 
 def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, dict[str, Any]]:

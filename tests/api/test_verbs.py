@@ -1,7 +1,9 @@
 """The verbs: what a user's few lines do, without a word of what lies below."""
 
 import json
+import pickle
 import sys
+import tempfile
 from subprocess import run
 
 import numpy as np
@@ -155,6 +157,66 @@ def test_a_calibration_that_is_read_levels_as_before(calibrations, folder, resul
             acs.InputError, match="a calibration that was read from a file has none"
         ):
             ask()
+
+
+@pytest.fixture
+def table(calibrations):
+    """A log with an index of dates, two of which are the same, and a text of its owner."""
+    forces = pd.DataFrame(calibrations[0].fit.campaign.forces, columns=["fx", "fy", "fz"])
+    dates = pd.date_range("2026-01-31 10:00", periods=len(forces), freq="s", name="when")
+    forces.index = dates.where(np.arange(len(dates)) != 7, dates[6])
+    return forces.assign(note=[f"pose {i}" for i in range(len(forces))])
+
+
+def test_a_table_that_is_leveled_keeps_its_index_and_columns(calibrations, table):
+    leveled = calibrations[0].apply(table)
+    pd.testing.assert_frame_equal(leveled[table.columns], table)
+    added = leveled.columns.difference(table.columns)
+    assert set(added) == {
+        *(f"{axis}_calibrated_mps2" for axis in table.columns[:3]), "near_pole",
+        *(f"{angle}gon" for angle in ("roll_", "pitch_", "sigma_roll_m", "sigma_pitch_m")),
+    }  # fmt: skip
+    # Its columns go beside others of the same index, those of a former leveling are replaced.
+    pd.testing.assert_frame_equal(table.assign(**leveled[added])[leveled.columns], leveled)
+    again = calibrations[0].apply(leveled)
+    pd.testing.assert_frame_equal(again, leveled)
+    by_number = table.set_axis([0, 1, 2, "note"], axis=1)
+    log = acs.read_log(by_number, rate=1, columns={"fx": 0, "fy": 1, "fz": 2})
+    by_number.iloc[:, :3] = 0.0  # a log is what it was when it was given
+    other = calibrations[0].apply(log)
+    assert list(other.columns[:4]) == [0, 1, 2, "note"]
+    np.testing.assert_array_equal(other["roll_gon"], leveled["roll_gon"])
+
+
+def test_a_table_in_memory_goes_through_no_file(calibrations, table, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with pytest.raises(FileNotFoundError):
+        tempfile.mkdtemp()
+    monkeypatch.chdir(tmp_path)
+    log = acs.read_log(table)
+    assert len(calibrations[0].apply(log)) == len(table)
+    assert len(calibrations[0].apply(pickle.loads(pickle.dumps(log)))) == len(table)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_tables_files_and_the_command_are_leveled_alike(results, folder, table, tmp_path, ending):
+    table.iloc[3, 0] = np.nan
+    path, out = tmp_path / f"log.{ending}", tmp_path / "out.parquet"
+    written = table.reset_index()
+    written.to_csv(path, index=False) if ending == "csv" else written.to_parquet(path)
+    file = folder / "calibrated-0/calibration.json"
+    answer = call("apply", file, path, "--out", out)
+    assert answer.exit_code == 0, answer.output
+    calibration = acs.read_calibration(file)
+    of_command, of_file, of_table = (
+        pd.read_parquet(out), calibration.apply(path), calibration.apply(table)
+    )  # fmt: skip
+    pd.testing.assert_frame_equal(of_file, of_command)
+    numbers = of_table.columns.difference(["note"])
+    pd.testing.assert_frame_equal(of_table[numbers].reset_index(drop=True), of_file[numbers])
+    (warning,) = of_table.attrs["warnings"]
+    assert "row 4, column fx" in warning
 
 
 def test_the_tilt_error_is_that_of_the_report(calibrations):

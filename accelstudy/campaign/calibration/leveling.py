@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
@@ -27,7 +28,7 @@ from accelstudy.campaign.calibration.readings import Readings, readings_of
 from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.importing.recording import AXES
-from accelstudy.campaign.importing.sources import CHUNK
+from accelstudy.campaign.importing.sources import CHUNK, LogFile
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import near_pole
 from accelstudy.sensors.frames import Frame
@@ -64,6 +65,68 @@ class Leveled:
     warnings: tuple[str, ...]
 
 
+class Leveling:
+    """A calibration that levels a log, a chunk of rows at a time; see `level_log`."""
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        log: LogFile,
+        given: Mapping[str, Any] | None = None,
+        sigma: float | None = None,
+        start: float | None = None,
+    ) -> None:
+        self._calibration = calibration
+        self._readings = readings_of(log, calibration, given, start or 0.0)
+        if sigma is not None:
+            bounds.SIGMA_READING.check_key("--sigma", sigma)
+        self._noise = noise_of_reading(calibration) if sigma is None else sigma
+        self._account = Account(calibration, self._readings)
+        self._started = start is not None
+
+    def chunks(
+        self, size: int = CHUNK, typed: bool = False
+    ) -> Iterator[tuple[pa.Table, dict[str, pa.Array]]]:
+        """Rows as they are in the log, and the columns that are added; see `read_chunks`."""
+        calibration, frame = self._calibration, self._readings.frame
+        for table, forces, hold in track(self._readings.chunks(size, typed), "leveling"):
+            corrected, near, added = _leveled(calibration, frame, forces, hold, self._noise)
+            self._account.add(table, forces, corrected, near, hold)
+            yield table, added
+        self._account.close()
+
+    def summary(self) -> Leveled:
+        """Return what is to be known of the rows that were leveled."""
+        calibration, account = self._calibration, self._account
+        doubts = (
+            *_implausible(calibration),
+            *_mended(calibration, self._readings),
+            *_estimated(calibration),
+        )
+        assumed = () if self._started else account.assumptions()
+        return Leveled(account.rows, account.empty, (*doubts, *assumed, *account.warnings()))
+
+
+def level_frame(
+    leveling: Leveling, frame: pd.DataFrame | None = None
+) -> tuple[pd.DataFrame, Leveled]:
+    """Return what `level_log` writes, with nothing written.
+
+    Parameters
+    ----------
+    leveling : Leveling
+    frame : DataFrame, optional
+        The rows of the log as their owner has them, whose index and columns stay as they are; as
+        they were read if omitted.
+    """
+    rows, added = zip(*leveling.chunks(typed=True), strict=True)
+    if frame is None:
+        frame = pa.concat_tables(rows).to_pandas()
+    columns = pa.concat_tables(map(pa.table, added)).to_pandas()
+    values = {name: column.to_numpy() for name, column in columns.items()}
+    return frame.assign(**values), leveling.summary()
+
+
 def level_log(
     calibration: Calibration,
     log: str | Path,
@@ -95,22 +158,11 @@ def level_log(
         If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
         far from gravity in most rows that it must be in another unit.
     """
-    readings = readings_of(log, calibration, given, start or 0.0)
-    if sigma is not None:
-        bounds.SIGMA_READING.check_key("--sigma", sigma)
-    noise = noise_of_reading(calibration) if sigma is None else sigma
-    account = Account(calibration, readings)
+    leveling = Leveling(calibration, log, given, sigma, start)
     with chunk_writer(out) as write:
-        chunks = readings.chunks(chunk_size, typed=is_parquet(out))
-        for table, forces, hold in track(chunks, "leveling"):
-            corrected, near, added = _leveled(calibration, readings.frame, forces, hold, noise)
-            account.add(table, forces, corrected, near, hold)
+        for table, added in leveling.chunks(chunk_size, typed=is_parquet(out)):
             write(_with(table, added))
-        account.close()
-    assumed = account.assumptions() if start is None else ()
-    doubts = (*_implausible(calibration), *_mended(calibration, readings), *_estimated(calibration))
-    warnings = (*doubts, *assumed, *account.warnings())
-    return Leveled(account.rows, account.empty, warnings)
+    return leveling.summary()
 
 
 def _implausible(calibration: Calibration) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from accelstudy.campaign.importing.recording import (
     time_factor_of,
     told_by_names,
 )
-from accelstudy.campaign.importing.sources import CHUNK, Source
+from accelstudy.campaign.importing.sources import CHUNK, LogFile, Source
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.files.reading import overlay
 from accelstudy.files.validation import checked
@@ -50,7 +49,7 @@ class Readings:
 
     Attributes
     ----------
-    source : Source
+    source : Source, a file or a table in memory
     places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
     rate : float, 1/s, if the time comes from it
     time_factor : float, s per unit of the column of time
@@ -128,7 +127,7 @@ class Readings:
 
 
 def readings_of(
-    log: str | Path,
+    log: LogFile,
     calibration: Calibration,
     given: Mapping[str, Any] | None = None,
     start: float = 0.0,
@@ -137,7 +136,7 @@ def readings_of(
 
     Parameters
     ----------
-    log : file, of any kind that `open_source` reads
+    log : anything that `open_source` opens
     calibration : Calibration
     given : mapping, optional
         Keys of `LogLayout`. Columns overlay those of the campaign's log; if all three columns of

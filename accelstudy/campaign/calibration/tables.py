@@ -27,10 +27,9 @@ from accelstudy.basics.wording import one_line
 from accelstudy.campaign.importing.sources import (
     CHUNK,
     ArraySource,
-    ParquetSource,
     Source,
     TextSource,
-    open_parquet,
+    TypedSource,
 )
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import parquet_file
@@ -61,8 +60,8 @@ def read_chunks(source: Source, chunk_size: int = CHUNK, typed: bool = False) ->
     if isinstance(source, TextSource):
         read = partial(_text_chunks, source, names, chunk_size)
         return _with_types(read) if typed else read()
-    if isinstance(source, ParquetSource):
-        return _parquet_chunks(source, names, chunk_size)
+    if isinstance(source, TypedSource):
+        return _typed_chunks(source, names, chunk_size)
     assert isinstance(source, ArraySource)
     values = source.values
     starts = range(0, len(values), chunk_size)
@@ -148,13 +147,12 @@ def _cells(source: TextSource) -> Iterator[Sequence[str | None]]:
         raise InputError(f"{source.path}: no table: {one_line(error)}") from None
 
 
-def _parquet_chunks(source: ParquetSource, names: list[str], chunk_size: int) -> Iterator[pa.Table]:
-    with open_parquet(source.path) as file:
-        # The row labels that pandas writes as a column are not part of the log.
-        kept = [name for name in names if not name.startswith("__index_level_")]
-        for batch in file.iter_batches(chunk_size):
-            table = pa.Table.from_batches([batch]).replace_schema_metadata(None)
-            yield table.rename_columns(names).select(kept)
+def _typed_chunks(source: TypedSource, names: list[str], chunk_size: int) -> Iterator[pa.Table]:
+    # The row labels that pandas writes as a column are not part of the log.
+    kept = [name for name in names if not name.startswith("__index_level_")]
+    for batch in source.batches(chunk_size):
+        table = pa.Table.from_batches([batch]).replace_schema_metadata(None)
+        yield table.rename_columns(names).select(kept)
 
 
 # --- Writing -------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ from accelstudy.campaign.importing.settings import (
     named_after,
     parse_selection,
 )
-from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.campaign.importing.windows import surveyed, usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
@@ -52,14 +52,14 @@ class TellsAngles(Protocol):
         """Give a campaign roll and pitch of its holds."""
 
 
-def log_of(path: str | Path, settings: ImportSettings, untimed: bool = False) -> Log:
+def log_of(path: LogFile, settings: ImportSettings, untimed: bool = False) -> Log:
     """Open a log by the settings; see `open_log` for `untimed`."""
     source = open_source(path, settings.variable, settings.delimiter)
     settings = as_its_format(settings, source)
     return open_layout(path, settings, source, untimed or settings.block is not None)
 
 
-def open_layout(path: str | Path, layout: LogLayout, source: Source, untimed: bool = False) -> Log:
+def open_layout(path: LogFile, layout: LogLayout, source: Source, untimed: bool = False) -> Log:
     """Open a log by its layout; see `open_log` for `untimed`."""
     return open_log(
         path,
@@ -88,7 +88,7 @@ def as_its_format(settings: ImportSettings, source: Source) -> ImportSettings:
 
 
 def import_log(
-    path: str | Path, settings: ImportSettings | None = None
+    path: LogFile, settings: ImportSettings | None = None
 ) -> tuple[Campaign, ImportReport]:
     """Import a log of one sensor or, if the settings say so, a table of means; see `import_all`."""
     ((campaign, report),) = import_all([path], settings or ImportSettings()).values()
@@ -96,7 +96,7 @@ def import_log(
 
 
 def import_all(
-    paths: Sequence[str | Path],
+    paths: Sequence[LogFile],
     settings: ImportSettings,
     beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
@@ -117,7 +117,7 @@ def import_all(
 
 
 def import_sensors(
-    paths: Sequence[str | Path],
+    paths: Sequence[LogFile],
     settings: ImportSettings,
     beside: TellsAngles | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
@@ -125,7 +125,7 @@ def import_sensors(
 
     Parameters
     ----------
-    paths : files with raw logs, see `open_log`; if there are several, the longest hold of each is
+    paths : raw logs, see `open_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
     beside : TellsAngles, optional, a calibrated sensor on the same plate, whose roll and pitch the
@@ -180,7 +180,7 @@ def import_sensors(
 
 
 def _import_blocks(
-    paths: Sequence[str | Path], chosen: Mapping[str, ImportSettings]
+    paths: Sequence[LogFile], chosen: Mapping[str, ImportSettings]
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Make each block of so many samples, or each of several files, a position of each sensor."""
     result = {}
@@ -260,7 +260,7 @@ def find_joint_holds(
 
 
 def import_to(
-    folder: str | Path, path: str | Path, settings: ImportSettings
+    folder: str | Path, path: LogFile, settings: ImportSettings
 ) -> tuple[Campaign, ImportReport]:
     """Import a file of one sensor and write the campaign to a folder; see `import_each`."""
     if settings.sensors:
@@ -270,7 +270,7 @@ def import_to(
 
 def import_each(
     folders: Mapping[str, Path],
-    paths: Sequence[str | Path],
+    paths: Sequence[LogFile],
     settings: ImportSettings,
     figure: bool = True,
     beside: TellsAngles | None = None,
@@ -321,7 +321,7 @@ def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     }
 
 
-def _recording(paths: Sequence[str | Path], settings: ImportSettings) -> Log | LogSeries:
+def _recording(paths: Sequence[LogFile], settings: ImportSettings) -> Log | LogSeries:
     parts = [log_of(path, settings, untimed=len(paths) > 1) for path in paths]
     if len(parts) == 1:
         return parts[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording
 from accelstudy.campaign.importing.resolution import steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.sources import Source
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -108,7 +107,7 @@ def shown(sigma: float) -> str:
 
 
 def campaign_of_holds(
-    paths: Sequence[str | Path], settings: ImportSettings, log: Recording, holds: DetectedHolds
+    paths: Sequence[LogFile], settings: ImportSettings, log: Recording, holds: DetectedHolds
 ) -> tuple[Campaign, ImportReport]:
     """Make the campaign of the holds of one sensor, and its report."""
     warnings = [*holds.warnings, *_doubts(holds, settings.gravity.value_mps2)]
@@ -246,7 +245,7 @@ def _with_offset(
 
 
 def imported_campaign(
-    path: str | Path, settings: ImportSettings, forces: Array, **columns: Any
+    path: LogFile, settings: ImportSettings, forces: Array, **columns: Any
 ) -> Campaign:
     """Make a campaign of forces (n, 3) in m/s², in forward, right, down, as the settings say.
 
@@ -279,7 +278,7 @@ def imported_campaign(
     )
 
 
-def _check_size(path: str | Path, settings: ImportSettings, raw: Array, forces: Array) -> None:
+def _check_size(path: LogFile, settings: ImportSettings, raw: Array, forces: Array) -> None:
     """Check that forces are roughly as large as gravity; the error names the options to change."""
     gravity, unit = settings.gravity.value_mps2, settings.unit
     cause, given, norm = likely_fault(raw, forces, unit, gravity)

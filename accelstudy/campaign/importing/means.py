@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from accelstudy.campaign.importing.making import (
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, locate
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import Source, read_columns
+from accelstudy.campaign.importing.sources import LogFile, Source, read_columns
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 
@@ -34,13 +33,13 @@ _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 
 
 def import_means(
-    path: str | Path, settings: ImportSettings | None = None
+    path: LogFile, settings: ImportSettings | None = None
 ) -> tuple[Campaign, ImportReport]:
     """Make a campaign of a table of means, one row for each position.
 
     Parameters
     ----------
-    path : file, of any kind that `open_log` reads; a MATLAB array may have a column for each
+    path : anything that `open_source` opens; a MATLAB array may have a column for each
         position instead
     settings : ImportSettings, optional
         Its `columns` are those of `MEANS`. Settings of the detector do not matter. With `robot`
@@ -157,7 +156,7 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
     return values, warnings
 
 
-def _check_angles(path: str | Path, angles: Array, unit: str, campaign: Campaign) -> None:
+def _check_angles(path: LogFile, angles: Array, unit: str, campaign: Campaign) -> None:
     """Check that no other unit or frame fits the forces clearly better, for angles (n, 2)."""
 
     def misfit(unit: str, sign: int = 1) -> float:

@@ -9,8 +9,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER, open_bag, open_ulog
 from accelstudy.campaign.importing.sources import (
     GZIP,
+    LogFile,
     ParquetSource,
     Source,
+    TableSource,
     TextSource,
     open_matlab,
 )
@@ -33,17 +35,18 @@ _OTHERS = {
 _JSON = re.compile(rb"(\xef\xbb\xbf)?\s*(\{\s*[\"}]|\[\s*[\[{\"])")
 
 
-def open_source(
-    path: str | Path, variable: str | None = None, delimiter: str | None = None
-) -> Source:
+def open_source(path: LogFile, variable: str | None = None, delimiter: str | None = None) -> Source:
     """Open a file of numbers, by its ending and its first bytes.
 
     Parameters
     ----------
-    path : file; a pipe is none, since a log is read more than once
+    path : file, or a table in memory, which is a source already; a pipe is none, since a log is
+        read more than once
     variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
     delimiter : str, between the columns of a text, see `LogLayout`
     """
+    if isinstance(path, TableSource):
+        return path
     path = Path(path)
     with readable(path):
         is_bag = (path / BAG_OF_FOLDER).is_file()

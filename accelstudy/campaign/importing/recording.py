@@ -27,7 +27,7 @@ from accelstudy.campaign.importing.names import (
     without_unit,
 )
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.sources import CHUNK, Source
+from accelstudy.campaign.importing.sources import CHUNK, LogFile, Source
 from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 
@@ -106,7 +106,7 @@ class Recording(Protocol):
 
 
 def open_log(
-    path: str | Path,
+    path: LogFile,
     *,
     columns: Mapping[str, Column] | None = None,
     time: Column | None = None,
@@ -126,7 +126,7 @@ def open_log(
 
     Parameters
     ----------
-    path : file, of any kind that `open_source` reads
+    path : anything that `open_source` opens
     columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
         in the header if omitted, or the only three columns there are. The last two may be absent.
     time : column of time; by its name in the header if omitted
@@ -180,7 +180,7 @@ def open_log(
     if len(set(places.values())) < len(places):
         raise InputError(f"{path}: two of {', '.join(places)} name the same column")
     return Log(
-        path=Path(path),
+        path=source.path,
         source=source,
         places=places | nanoseconds_beside(source, places),
         rate=rate,

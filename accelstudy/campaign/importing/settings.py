@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import LogLayout, Place
+from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
     Gravity,
@@ -98,14 +99,14 @@ def read_settings(
     return parse_settings(overlay(content, given or {}), str(path or "options"))
 
 
-def named_after(settings: ImportSettings, paths: Sequence[str | Path]) -> ImportSettings:
+def named_after(settings: ImportSettings, paths: Sequence[LogFile]) -> ImportSettings:
     """Settings with a name for the campaign, if they have none.
 
     It is the name of the file without endings, or of the folder of the files.
     """
     if settings.name:
         return settings
-    path = Path(paths[0])
+    path = Path(str(paths[0]))
     name = Path(path.stem).stem if path.suffix == ".gz" else path.stem
     if len(paths) > 1:
         name = path.absolute().parent.name or path.stem

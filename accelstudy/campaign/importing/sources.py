@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from io import TextIOWrapper
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -565,19 +565,17 @@ def open_parquet(path: Path) -> AbstractContextManager[pq.ParquetFile]:
     return whole_parquet(path, pre_buffer=False, buffer_size=_BUFFER)
 
 
-class ParquetSource:
-    """Columns of a Parquet file."""
+class TypedSource:
+    """Columns of types, from where `batches` has them; see `Source`."""
 
     notes: Sequence[str] = ()
     warnings: Sequence[str] = ()
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
         import pyarrow as pa
 
         self.path = path
-        with open_parquet(path) as file:
-            schema = file.schema_arrow
-            first = next(file.iter_batches(1), None)
+        first = next(self.batches(1), None)
         self._columns, self._types = schema.names, schema.types
         self.names = [printable(" ".join(name.split())) for name in schema.names]
         self.named = True
@@ -602,10 +600,9 @@ class ParquetSource:
             if self._columns.count(self._columns[place]) > 1:
                 raise InputError(f"{self.path}: there are several columns {self.names[place]!r}")
         names = [self._columns[place] for place in places]
-        with open_parquet(self.path) as file:
-            batches = file.iter_batches(chunk_size, columns=names)
-            columns = ([_numbers(batch.column(name)) for name in names] for batch in batches)
-            yield from rows_of(columns, places, self.dates, clock)
+        batches = self.batches(chunk_size, names)
+        columns = ([_numbers(batch.column(name)) for name in names] for batch in batches)
+        yield from rows_of(columns, places, self.dates, clock)
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
@@ -614,6 +611,50 @@ class ParquetSource:
                 return f"row {row + 1}", f"{chunk[row, 0]:g}"
             row -= len(chunk)
         return f"row {row + 1}", "nothing"
+
+    def batches(
+        self, chunk_size: int, columns: Sequence[str] | None = None
+    ) -> Iterator[pa.RecordBatch]:
+        """Rows as they are, of all columns or of some."""
+        raise NotImplementedError
+
+
+class ParquetSource(TypedSource):
+    """Columns of a Parquet file."""
+
+    def __init__(self, path: Path) -> None:
+        with open_parquet(path) as file:
+            schema = file.schema_arrow
+        super().__init__(path, schema)
+
+    def batches(
+        self, chunk_size: int, columns: Sequence[str] | None = None
+    ) -> Iterator[pa.RecordBatch]:
+        """Rows as they are, of all columns or of some."""
+        with open_parquet(self.path) as file:
+            yield from file.iter_batches(chunk_size, columns=columns)
+
+
+class TableSource(TypedSource):
+    """A table in memory, which messages call by a name instead of a path."""
+
+    def __init__(self, name: str, table: pa.Table) -> None:
+        self._table = table
+        super().__init__(Path(name), table.schema)
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    def batches(
+        self, chunk_size: int, columns: Sequence[str] | None = None
+    ) -> Iterator[pa.RecordBatch]:
+        """Rows as they are, of all columns or of some."""
+        table = self._table if columns is None else self._table.select(columns)
+        yield from table.to_batches(chunk_size)
+
+
+LogFile: TypeAlias = str | Path | TableSource
+"""Where a log is: the path of a file, or a table in memory."""
 
 
 def _numbers(column: pa.Array) -> NDArray[Any]:
