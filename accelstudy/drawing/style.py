@@ -245,19 +245,24 @@ def say_empty(ax: Axes, text: str = "no estimable cell") -> None:
 
 
 def ink_on(image: AxesImage, value: float) -> str:
-    """Colour of a text on the field of an image that shows `value`: the one of more contrast.
+    """Colour of a text on the field of an image that shows `value`; see `inks_on`."""
+    return str(inks_on(image, [value])[0])
+
+
+def inks_on(image: AxesImage, values: ArrayLike) -> NDArray[np.str_]:
+    """Colours of texts on the fields of an image that show `values`: those of more contrast.
 
     Contrast is that of WCAG 2.2, (L₁ + 0.05) / (L₂ + 0.05) of the relative luminances.
     """
     from matplotlib.colors import to_rgb
 
-    def luminance(colour: ArrayLike) -> float:
-        rgb = np.asarray(colour, dtype=float)[:3]
+    def luminance(colours: ArrayLike) -> NDArray[np.float64]:
+        rgb = np.asarray(colours, dtype=float)[..., :3]
         linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-        return float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05
+        return np.asarray(linear @ (0.2126, 0.7152, 0.0722)) + 0.05
 
-    field = luminance(image.to_rgba(np.array([value]))[0])
-    return "white" if field**2 < 1.05 * luminance(to_rgb(INK)) else INK
+    fields = luminance(image.to_rgba(np.asarray(values)))
+    return np.where(fields**2 < 1.05 * luminance(to_rgb(INK)), "white", INK)
 
 
 def approach_handles(approaches: Iterable[str], **options: Any) -> list[Line2D]:

@@ -89,8 +89,11 @@ def parquet_writer(
     """Write tables of one schema into one file, a row group each.
 
     `measured` names columns of floats that hardly repeat. They are packed byte by byte, which is
-    smaller and faster than a search for repetitions.
+    smaller and faster than a search for repetitions. Of numbers that count up the steps are stored,
+    and other floats stay as they are.
     """
+    counting = [f.name for f in schema if pa.types.is_int64(f.type)]
+    floats = [f.name for f in schema if pa.types.is_floating(f.type)]
     metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
     with (
         whole_file(path) as temporary,
@@ -98,7 +101,8 @@ def parquet_writer(
             temporary,
             schema.with_metadata(metadata),
             compression="zstd",
-            use_dictionary=[name for name in schema.names if name not in measured],
+            use_dictionary=[name for name in schema.names if name not in (*counting, *floats)],
+            column_encoding=dict.fromkeys(counting, "DELTA_BINARY_PACKED"),
             use_byte_stream_split=list(measured),
         ) as writer,
     ):

@@ -30,6 +30,7 @@ class Kernel:
 
     def __init__(self, equations: CalibrationEquations) -> None:
         self.function = KernelFunction(equations)
+        self._below = np.tril_indices(self.function.unknowns, -1)
         self._compiled = Compiled(text_of(self.function), NAME, len(INTEGERS), len(POINTERS))
 
     def calibrate(self, problem: CalibrationProblem) -> Block:
@@ -55,8 +56,7 @@ class Kernel:
         ]
         self._compiled.call(n, count, *(array.ctypes.data for array in arrays))
         correlation = np.diag(np.full(u, results[2 * u + 2, :count].sum()))
-        below = np.tril_indices(u, -1)
-        correlation[below] = correlation.T[below] = correlations.sum(axis=1)
+        correlation[self._below] = correlation.T[self._below] = correlations.sum(axis=1)
         return Block(
             estimates=results[:u, :count].T,
             sigma_priori=results[u : 2 * u, :count].T,

@@ -21,7 +21,7 @@ from accelstudy.drawing.style import (
     Style,
     approach_colour,
     approach_marker,
-    ink_on,
+    inks_on,
     new_figure,
     say_empty,
 )
@@ -150,5 +150,6 @@ def write_values(
     """Write numbers onto the fields of a matrix, unless NaN, in the ink of more contrast."""
     fields: Array = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
     style: Style = {"ha": "center", "va": "center", "fontsize": size, "in_layout": False}
+    inks = inks_on(image, fields)
     for i, j in np.argwhere(np.isfinite(values)):
-        ax.text(j, i + down, text(values[i, j]), color=ink_on(image, fields[i, j]), **style)
+        ax.text(j, i + down, text(values[i, j]), color=inks[i, j], **style)
