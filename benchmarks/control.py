@@ -20,7 +20,6 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
 from accelstudy.study.replicates import Replicates, simulate
 from accelstudy.study.statistics import statistics
@@ -36,7 +35,7 @@ def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
     """Estimable cells of the paper's study with the noise of forces and angles scaled."""
     study = read_study(CONFIG)
     chosen = []
-    for cell in study_cells(study):
+    for cell in study.cells:
         if (where and cell.name not in where) or not cell.estimability.estimable:
             continue
         for noise in noises:

@@ -7,7 +7,6 @@ from time import process_time
 
 import numpy as np
 
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import read_study
 from accelstudy.study.estimate import LEAST
 from accelstudy.study.replicates import Replicates, simulate
@@ -33,7 +32,7 @@ def run(speeds):
     study = read_study(CONFIG)
     leveling = study.leveling.model_dump()
     needed, seconds = {}, {}
-    for cell in study_cells(study):
+    for cell in study.cells:
         if cell.name != f"bias-scale-nonorthogonality/{SCHEME}/{cell.approach}":
             continue
         name = cell.approach

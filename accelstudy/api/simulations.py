@@ -23,7 +23,6 @@ from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.config.blocks import LevelingConfig
 from accelstudy.study.statistics import (
@@ -242,7 +241,7 @@ def simulate(
         },
         "simulate",
     )
-    cells = _with_truth(study_cells(study), truth)
+    cells = _with_truth(study.cells, truth)
     if not any(cell.estimability.estimable for cell in cells):
         raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
     return Simulation(tuple(simulated_statistics(cell, seed, LEVELING) for cell in cells))

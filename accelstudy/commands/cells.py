@@ -18,11 +18,10 @@ def cells_command(configs: tuple[Path, ...]) -> None:
     overlays those before it, as with Snakemake's --configfile.
     """
     from accelstudy.design.estimability import estimability
-    from accelstudy.study.cells import study_cells
     from accelstudy.study.config import read_study
 
     study = read_study(*configs)
-    chosen = study_cells(study)
+    chosen = study.cells
     for cell in chosen:
         found = estimability(
             cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold

@@ -17,7 +17,6 @@ from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.optimised import is_best
 from accelstudy.planning.question import Question
 from accelstudy.schemes.files import held
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 from accelstudy.study.estimate import Estimates
 from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics, simulated_statistics
@@ -137,7 +136,7 @@ def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simul
     by_cell: dict[str, Simulated] = {}
     order = []
     for grid in config["grids"]:
-        (cell,) = study_cells(parse_study({**config, "grids": [grid]}))
+        (cell,) = parse_study({**config, "grids": [grid]}).cells
         order.append(cell.name)
         if cell.name not in by_cell:
             found = simulated_statistics(cell, study.seed, leveling, shares)

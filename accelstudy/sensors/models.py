@@ -24,31 +24,31 @@ MODEL_FILE = "model.yaml"
 """Name of the file in which a diagnosis writes a model."""
 
 _NINE = ("bias", "scale", "nonorthogonality")
-
 NINE = "bias-scale-nonorthogonality"
 """Name of the model of nine parameters, which is taken where none is given."""
+_CROSS_AXIS = f"{NINE}-crossaxis"
 MODELS: dict[str, tuple[str, ...]] = {
     "bias-scale": ("bias", "scale"),
     NINE: _NINE,
-    "bias-scale-nonorthogonality-crossaxis": (*_NINE, "cross_axis_misalignment"),
-    "bias-scale-nonorthogonality-quadratic": (*_NINE, "quadratic_scale"),
-    "bias-scale-nonorthogonality-cubic": (*_NINE, "cubic_scale"),
-    "bias-scale-nonorthogonality-quadratic-cubic": (*_NINE, "quadratic_scale", "cubic_scale"),
+    _CROSS_AXIS: (*_NINE, "cross_axis_misalignment"),
+    f"{NINE}-quadratic": (*_NINE, "quadratic_scale"),
+    f"{NINE}-cubic": (*_NINE, "cubic_scale"),
+    f"{NINE}-quadratic-cubic": (*_NINE, "quadratic_scale", "cubic_scale"),
 }
 """Name -> effects (Thalmann & Neuner 2018, section 2; nonlinear scale after Cai 2013)."""
 
 TITLES = {
     "bias-scale": "6: bias, scale",
-    "bias-scale-nonorthogonality": "9: + non-orthogonality",
-    "bias-scale-nonorthogonality-crossaxis": "12: 9 + cross-axis",
-    "bias-scale-nonorthogonality-quadratic": "12: 9 + quadratic",
-    "bias-scale-nonorthogonality-cubic": "12: 9 + cubic",
-    "bias-scale-nonorthogonality-quadratic-cubic": "15: 9 + quadratic + cubic",
+    NINE: "9: + non-orthogonality",
+    _CROSS_AXIS: "12: 9 + cross-axis",
+    f"{NINE}-quadratic": "12: 9 + quadratic",
+    f"{NINE}-cubic": "12: 9 + cubic",
+    f"{NINE}-quadratic-cubic": "15: 9 + quadratic + cubic",
 }
 """Short titles for figures."""
 
 
-def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> SensorModel:
+def get_model(text: str, extra: Mapping[str, SensorModel] | None = None) -> SensorModel:
     """Return the model that a person wrote.
 
     Parameters
@@ -57,7 +57,7 @@ def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> Se
         A name; parts joined by +, each a registered model or an effect with its settings; or the
         path of a YAML file, of which the name of one of its models may follow after a colon. A
         path has a separator or ends in .yaml or .yml.
-    extra : mapping of name to names of effects, optional
+    extra : mapping of name to SensorModel, optional
         Models defined by the caller, beside the registered ones.
 
     Returns
@@ -73,16 +73,17 @@ def get_model(text: str, extra: Mapping[str, Sequence[str]] | None = None) -> Se
         If an effect occurs twice, a setting cannot be read, or a file has not one model.
     """
     text = text.strip()
-    named = {**MODELS, **(extra or {})}
-    if text in named:
-        return compose(text, tuple(named[text]))
+    if extra and text in extra:
+        return extra[text]
+    if text in MODELS:
+        return compose(text, MODELS[text])
     if text and os.path.isfile(inside := os.path.join(text, MODEL_FILE)):
         raise InputError(f"{text}: a folder, not a model; take {inside}")
     if path := re.fullmatch(rf"(.*(?:\.ya?ml|[/{re.escape(os.sep)}].*?))(?::([\w-]+))?", text):
         return _model_of_file(path[1], path[2])
     parts = [part.strip() for part in re.split(r"\+(?![^()]*\))", text)]
     if len(parts) == 1 and not _is_effect(text):
-        raise UnknownNameError("model", text, named)
+        raise UnknownNameError("model", text, (*MODELS, *(extra or ())))
     specs: list[str] = []
     for part in parts:
         if not part:
@@ -174,7 +175,6 @@ class Preset:
 
 
 _SIX_MODEL = "bias-scale"
-_CROSS_AXIS = "bias-scale-nonorthogonality-crossaxis"
 _PRETTO_TEDALDI = "[25] Pretto & Grisetti, [26] Tedaldi 2014"
 
 PRESETS: tuple[Preset, ...] = (

@@ -9,15 +9,15 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas as pd
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 OFF = 0.01
 """Share of the variance from which linear theory counts as off."""
 
 
-def knows_all(study: StudyConfig) -> bool:
+def knows_all(study: Study) -> bool:
     """Whether calibrations know of all that is simulated, and linear theory with them."""
-    return study.simulated_effects == ["model"] and not study.noise.effects
+    return study.simulated_effects is None and not study.noise.effects
 
 
 def is_compared(cells: Any) -> Any:

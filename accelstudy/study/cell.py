@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.units import MGON
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import Scheme, get_scheme
@@ -23,6 +25,9 @@ from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import BLOCK, Noise, Session, session
 
 Array = NDArray[np.float64]
+
+MEGABYTES, BYTES_PER_ESTIMATE = 1000, 120
+"""Memory of a job: at least, and for each estimate of its largest cell."""
 
 
 @dataclass(frozen=True)
@@ -150,6 +155,20 @@ class Cell:
         return len(self.parameter_units)
 
     @property
+    def labels(self) -> dict[str, Any]:
+        """Columns by which the cell is found in every table."""
+        return {
+            "cell": self.name,
+            "model": self.model,
+            "scheme": self.scheme,
+            "approach": self.approach,
+            "sensor_sigma_mps2": self.noise.sigma_force,
+            "robot_sigma_mgon": self.noise.sigma_angle / MGON,
+            "gravity_sigma_mps2": self.noise.sigma_gravity,
+            "gravity_error_mps2": self.noise.gravity_error,
+        }
+
+    @property
     def n_blocks(self) -> int:
         """Number of blocks; the last one may have fewer replicates."""
         return -(-self.replicates // BLOCK)
@@ -160,6 +179,11 @@ class Cell:
         It depends on the study's seed, the definition of the cell and the block only. So no other
         cell or block changes it.
         """
+        return np.random.SeedSequence([seed, *self._words], spawn_key=(block,))
+
+    @cached_property
+    def _words(self) -> list[int]:
+        """Hash of what defines the cell."""
         identity = [
             list(self.effects),
             list(self.simulated_effects),
@@ -173,8 +197,7 @@ class Cell:
         if holds != HoldPlan():
             identity.append(asdict(holds))
         digest = hashlib.sha256(json.dumps(identity).encode()).digest()
-        words = np.frombuffer(digest, dtype="<u4").tolist()
-        return np.random.SeedSequence([seed, *words], spawn_key=(block,))
+        return list(np.frombuffer(digest, dtype="<u4").tolist())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, from which `from_dict` makes the cell again."""
@@ -185,22 +208,24 @@ class Cell:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cell:
         """Make a cell of plain data."""
-        return cls(
-            **{
-                **data,
-                "effects": tuple(data["effects"]),
-                "simulated_effects": tuple(data["simulated_effects"]),
-                "noise": Noise(**_tuples(data["noise"])),
-                "holds": HoldPlan(**_tuples(data["holds"])),
-                "directions": _rows(data.get("directions")),
-            }
-        )
+        return _adapter().validate_python(data)
 
 
-def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Plain data with tuples for lists."""
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
+@cache
+def _adapter() -> TypeAdapter[Cell]:
+    return TypeAdapter(Cell)
 
 
-def _rows(data: Any) -> tuple[tuple[float, ...], ...] | None:
-    return None if data is None else tuple(map(tuple, data))
+def fanned_out(cells: Sequence[Cell], pattern: str) -> dict[str, list[Cell]]:
+    """Cells by what they have in common, named by a pattern such as "{model}/{approach}"."""
+    groups: dict[str, list[Cell]] = {}
+    for cell in cells:
+        name = pattern.format(model=cell.model, scheme=cell.scheme, approach=cell.approach)
+        groups.setdefault(name, []).append(cell)
+    return groups
+
+
+def memory(cells: Sequence[Cell]) -> int:
+    """Memory that a job of cells needs, megabytes."""
+    estimates = max(cell.replicates * cell.n_unknowns for cell in cells)
+    return MEGABYTES + round(BYTES_PER_ESTIMATE * estimates / 1e6)

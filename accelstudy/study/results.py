@@ -3,18 +3,50 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.study.cell import Cell
-from accelstudy.study.replicates import ESTIMATES, estimates_table
+from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_table
 from accelstudy.study.statistics import CellStatistics, simulated_statistics
 from accelstudy.study.summary import tables_of
 from accelstudy.study.tables import TABLES
 
 log = logging.getLogger(__name__)
+
+
+def simulated_tables(
+    cells: Sequence[Cell],
+    seed: int,
+    leveling: Mapping[str, Any],
+    keep: Callable[[Cell, Replicates], object],
+) -> dict[str, pd.DataFrame]:
+    """Simulate cells one after the other; return each of `TABLES`.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    seed : int, of the study
+    leveling : mapping with max_tilt_gon and attitudes
+    keep : function that gets each cell that is estimable with its replicates
+    """
+
+    def results() -> Iterator[CellStatistics]:
+        for number, cell in enumerate(cells, 1):
+            found = simulated_statistics(cell, seed, leveling)
+            if found.replicates is not None:
+                keep(cell, found.replicates)
+            failed = found.simulated - found.converged
+            said = f"{found.simulated} replicates, {failed} not converged"
+            said = cell.estimability.reason or said
+            log.info("%d/%d %s: %s", number, len(cells), cell.name, said)
+            yield found
+
+    return tables_of(results())
 
 
 def simulate_cells(
@@ -34,20 +66,13 @@ def simulate_cells(
     outputs : paths of `estimates` and of each of `TABLES`
     provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
     """
-    simulated = [Cell.from_dict(data) for data in cells]
     measured = ("estimate", "linear_estimate", "sigma_priori")
     with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
-
-        def results() -> Iterator[CellStatistics]:
-            for number, cell in enumerate(simulated, 1):
-                found = simulated_statistics(cell, provenance["seed"], leveling)
-                n, failed = found.simulated, found.simulated - found.converged
-                if found.replicates is not None:
-                    write(estimates_table(cell, found.replicates))
-                said = cell.estimability.reason or f"{n} replicates, {failed} not converged"
-                log.info("%d/%d %s: %s", number, len(simulated), cell.name, said)
-                yield found
-
-        tables = tables_of(results())
+        tables = simulated_tables(
+            [Cell.from_dict(data) for data in cells],
+            provenance["seed"],
+            leveling,
+            lambda cell, replicates: write(estimates_table(cell, replicates)),
+        )
     for name in TABLES:
         write_table(outputs[name], tables[name], provenance)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
 from accelstudy.study.claims.judging import is_claimed, judge, papers_reductions
 from accelstudy.study.claims.reductions import reductions
-from accelstudy.study.config import StudyConfig, read_study
+from accelstudy.study.config import Study, read_study
 from accelstudy.study.replicates import Replicates
+from accelstudy.study.results import simulated_tables
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
-from accelstudy.study.statistics import CellStatistics, simulated_statistics
-from accelstudy.study.summary import tables_of
 
 
 def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
@@ -41,19 +38,15 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
     return study_tables(read_study(*configurations))
 
 
-def study_tables(study: StudyConfig) -> dict[str, pd.DataFrame]:
+def study_tables(study: Study) -> dict[str, pd.DataFrame]:
     """Run a checked study in memory; see `run_study`."""
-    leveling = study.leveling.model_dump()
     calibrations: list[tuple[Cell, Replicates]] = []
 
-    def results() -> Iterator[CellStatistics]:
-        for cell in study_cells(study):
-            found = simulated_statistics(cell, study.seed, leveling)
-            if found.replicates is not None and study.paper and is_claimed(study, cell):
-                calibrations.append((cell, found.replicates))
-            yield found
+    def keep(cell: Cell, replicates: Replicates) -> None:
+        if study.paper and is_claimed(study, cell):
+            calibrations.append((cell, replicates))
 
-    tables = tables_of(results())
+    tables = simulated_tables(study.cells, study.seed, study.leveling.model_dump(), keep)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])

@@ -11,15 +11,14 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import to_si
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import leveling_shares
-from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 
 APPROACHES = ("gravity", "robot")
 """The approaches with whose calibrations the sensitivity is analysed."""
 
 
-def sensitivity_table(study: StudyConfig, summary: pd.DataFrame) -> pd.DataFrame:
+def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
     """Analyse the sensitivity of leveling.
 
     Its `analysis` is "forces" for the parameter-free model (figure 4), or the approach whose
@@ -27,7 +26,7 @@ def sensitivity_table(study: StudyConfig, summary: pd.DataFrame) -> pd.DataFrame
 
     Parameters
     ----------
-    study : StudyConfig, with `sensitivity`
+    study : Study, with `sensitivity`
     summary : DataFrame, the table of that name, with all cells that are analysed
     """
     settings = study.sensitivity
@@ -54,9 +53,7 @@ def sensitivity_table(study: StudyConfig, summary: pd.DataFrame) -> pd.DataFrame
     return pd.concat(tables, ignore_index=True)
 
 
-def shapley_table(
-    study: StudyConfig, summary: pd.DataFrame, correlations: pd.DataFrame
-) -> pd.DataFrame:
+def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFrame) -> pd.DataFrame:
     """Divide the variance of roll and pitch among correlated parameters.
 
     The covariance matrix of a calibration has the sds of the Monte Carlo, as for the total effects,
@@ -64,7 +61,7 @@ def shapley_table(
 
     Parameters
     ----------
-    study : StudyConfig, with `sensitivity`
+    study : Study, with `sensitivity`
     summary, correlations : DataFrame, the tables of those names, as of `sensitivity_table`
     """
     settings = study.sensitivity
@@ -74,7 +71,7 @@ def shapley_table(
     tables = []
     for approach in APPROACHES:
         sigma = _empirical_sigma(study, approach, summary)
-        of_cell = correlations[correlations["cell"] == _cell(study, approach)]
+        of_cell = correlations[correlations["cell"] == settings.cell(approach)]
         matrix = of_cell.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
         table = leveling_shares(
             settings.roll_gon,
@@ -92,27 +89,23 @@ def shapley_table(
     return pd.concat(tables, ignore_index=True)
 
 
-def _sensor(study: StudyConfig) -> tuple[SensorModel, np.ndarray]:
+def _sensor(study: Study) -> tuple[SensorModel, np.ndarray]:
     """Model of the sensitivity analysis, and its true parameters, (u,), SI."""
     settings = study.sensitivity
     assert settings is not None
-    model = get_model(settings.model, study.models)
+    model = settings.model
     return model, model.vector(study.truth(e.spec for e in model.effects))
 
 
-def _cell(study: StudyConfig, approach: str) -> str:
-    """Name of the cell whose calibrations the sensitivity analysis uses."""
+def _empirical_sigma(study: Study, approach: str, summary: pd.DataFrame) -> np.ndarray:
+    """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
     settings = study.sensitivity
     assert settings is not None
-    return "/".join([settings.model, settings.scheme, approach])
-
-
-def _empirical_sigma(study: StudyConfig, approach: str, summary: pd.DataFrame) -> np.ndarray:
-    """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
-    model, _ = _sensor(study)
-    cell = _cell(study, approach)
+    cell = settings.cell(approach)
     rows = summary[summary["cell"] == cell].set_index("parameter")
     if rows.empty or rows["sd_empirical"].isna().any():
         raise InputError(f"sensitivity: the study has no estimates of the cell {cell}")
     sigma, units = rows["sd_empirical"].to_dict(), rows["unit"].astype(str).to_dict()
-    return np.array([float(to_si(sigma[p.name], units[p.name], p.unit)) for p in model.parameters])
+    return np.array(
+        [float(to_si(sigma[p.name], units[p.name], p.unit)) for p in settings.model.parameters]
+    )

@@ -42,25 +42,11 @@ def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:
     }
 
 
-def _labels(cell: Cell) -> dict[str, Any]:
-    """Columns by which a cell is found in every table."""
-    return {
-        "cell": cell.name,
-        "model": cell.model,
-        "scheme": cell.scheme,
-        "approach": cell.approach,
-        "sensor_sigma_mps2": cell.noise.sigma_force,
-        "robot_sigma_mgon": cell.noise.sigma_angle / MGON,
-        "gravity_sigma_mps2": cell.noise.sigma_gravity,
-        "gravity_error_mps2": cell.noise.gravity_error,
-    }
-
-
 def _cell_row(statistics: CellStatistics) -> dict[str, Any]:
     cell = statistics.cell
     theory = cell.estimability
     return {
-        **_labels(cell),
+        **cell.labels,
         "n_positions": cell.positions.n_positions,
         "n_parameters": len(theory.parameter_names),
         "rank": theory.rank,
@@ -119,7 +105,7 @@ def _summary_rows(statistics: CellStatistics) -> list[dict[str, Any]]:
         }
         rows.append(
             {
-                **_labels(cell),
+                **cell.labels,
                 "parameter": name,
                 "unit": recorded_unit(unit),
                 "truth": float(to_recorded(cell.true_values[i], unit)),
@@ -225,7 +211,7 @@ def _correlation_rows(statistics: CellStatistics) -> pd.DataFrame:
 
 def _quantile_rows(statistics: CellStatistics) -> pd.DataFrame:
     """Quantiles of the errors and sds of each parameter and of the tilt error, in shown units."""
-    cell, labels = statistics.cell, _labels(statistics.cell)
+    cell, labels = statistics.cell, statistics.cell.labels
     units = {**cell.parameter_units, **dict.fromkeys(TILTS, "rad")}
     parts: list[list[Any]] = [[] for _ in QUANTILES]
     size = len(statistics.levels)
@@ -243,7 +229,7 @@ def _quantile_rows(statistics: CellStatistics) -> pd.DataFrame:
 def _leveling_row(statistics: CellStatistics) -> dict[str, Any]:
     """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
     rms = statistics.tilt_rms.scaled(1 / MGON)
-    row: dict[str, Any] = _labels(statistics.cell)
+    row: dict[str, Any] = statistics.cell.labels
     for i, angle in enumerate(ANGLES):
         row |= _columns(f"{angle}_rms_mgon", rms[i], f"{angle}_rms", plain=True)
     for name in TILTS:

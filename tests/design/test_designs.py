@@ -20,7 +20,6 @@ from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -122,22 +121,22 @@ def test_a_study_depends_on_what_the_file_holds(tmp_path):
         return study(path)
 
     first = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, -1, 0])
-    (cell,) = study_cells(first)
+    (cell,) = first.cells
     assert cell.scheme.startswith("mine@")
     np.testing.assert_array_equal(cell.positions.directions[0], [0, 0, 1])
     second = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, 1, 1])
-    (other,) = study_cells(second)
+    (other,) = second.cells
     assert other.scheme != cell.scheme
     assert second.fingerprint != first.fingerprint
     assert other.seed(1, 0).entropy != cell.seed(1, 0).entropy
     moved = path.rename(tmp_path / "elsewhere.yaml")
-    assert study_cells(study(moved)) == [other]
+    assert study(moved).cells == [other]
 
 
 def test_a_job_needs_no_file(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("directions: [[0, 0, 1], [0, 1, 0], [1, 0, 0]]\n")
-    (cell,) = study_cells(study(path))
+    (cell,) = study(path).cells
     plain = study(path).model_dump(mode="json")
     path.unlink()
     monkeypatch.setattr(files, "_read", {})
@@ -147,7 +146,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="unknown scheme 'some@"):
         get_scheme(cell.scheme)
     again = parse_study(plain)
-    assert study_cells(again) == [cell]
+    assert again.cells == [cell]
     assert again.fingerprint == parse_study(plain).fingerprint
     np.testing.assert_array_equal(get_scheme(cell.scheme).directions, same.positions.directions)
     plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
@@ -157,7 +156,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
         {"study": "s", "seed": 1, "grids": [{"models": "bias-scale", "schemes": "faces-6",
                                             "approaches": "robot", "replicates": 2}]}
     )  # fmt: skip
-    assert "directions" not in study_cells(usual)[0].to_dict()
+    assert "directions" not in usual.cells[0].to_dict()
 
 
 @pytest.mark.parametrize(

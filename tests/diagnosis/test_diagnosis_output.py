@@ -390,7 +390,7 @@ def test_the_model_is_a_study(written, case):
     study = read_study(ROOT / "config/config.yaml", out / "model.yaml")
     assert study.study == case
     assert study.sigma_force == pytest.approx(content["noise"]["sigma_mps2"])
-    truth = study.truth(study.simulated_effects)
+    truth = study.truth(effect.spec for effect in study.simulated_effects.effects)
     for parameter in [p for e in content["effects"] for p in e.get("parameters", [])]:
         assert truth[parameter["name"]] == pytest.approx(parameter["value"])
     assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)

@@ -65,7 +65,7 @@ def test_all_is_made(made):
 
 def test_what_was_found_is_a_study(made):
     study = read_study(ROOT / "config/config.yaml", made / "results/tiny/diagnosis/model.yaml")
-    assert "thermal_bias" in study.simulated_effects
+    assert "thermal_bias" in [effect.name for effect in study.simulated_effects.effects]
 
 
 def test_a_second_run_does_nothing(made):

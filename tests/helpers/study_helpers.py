@@ -3,7 +3,7 @@
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.study import results
-from accelstudy.study.cells import fanned_out, study_cells
+from accelstudy.study.cell import fanned_out
 from accelstudy.study.config import parse_study
 from accelstudy.study.replicates import Replicates, simulate
 from accelstudy.study.statistics import statistics
@@ -38,7 +38,7 @@ def make_study(**keys):
 
 
 def make_cells(*grids, **keys):
-    return {cell.name: cell for cell in study_cells(make_study(grids=list(grids), **keys))}
+    return {cell.name: cell for cell in make_study(grids=list(grids), **keys).cells}
 
 
 LEVELING = {"max_tilt_gon": 50, "attitudes": 200}
@@ -65,7 +65,7 @@ def simulate_cells(folder, cells, seed=1, leveling=LEVELING):
 def run_study(folder, pattern="{model}", **keys):
     """Tables of a study, {name: DataFrame}, estimates included; `pattern` names the jobs."""
     study = make_study(**keys)
-    cells = study_cells(study)
+    cells = study.cells
     parts = [
         simulate_cells(folder / name, each, study.seed, study.leveling.model_dump())
         for name, each in fanned_out(cells, pattern).items()

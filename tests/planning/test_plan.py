@@ -44,7 +44,6 @@ from accelstudy.planning.wording import (
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study, read_study
 
 MODEL = get_model(NINE)
@@ -209,7 +208,7 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(yaml.safe_dump(plan.study), encoding="utf-8")
     study = read_study(ROOT / "config/config.yaml", path)  # as Snakemake lays one over the other
-    cells = {cell.name: cell for cell in study_cells(study)}
+    cells = {cell.name: cell for cell in study.cells}
     told = {r.simulated.cell: r.simulated for r in plan.ranked if r.simulated}
     assert set(cells) == set(told)
     cell = cells[plan.first.simulated.cell]

@@ -43,7 +43,7 @@ found["points"] = [line.get_xydata().tolist() for line in ax.get_lines()]
 pairs = [("b_x", "s_x", -0.01), ("b_x", "b_y", 0.5), ("s_x", "s_y", 0.25)]
 correlations = pd.DataFrame(pairs, columns=["parameter_1", "parameter_2", "adjustment"])
 settings = study.sensitivity
-cell = f"{settings.model}/{settings.scheme}/gravity"
+cell = settings.cell("gravity")
 tables = {"correlations": correlations.assign(cell=cell)}
 evidence = Evidence(study, tables, pd.DataFrame(), pd.DataFrame())
 found["claims"] = [judge_claim(claim_table()["paper"][-1], evidence)]

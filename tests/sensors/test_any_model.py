@@ -30,7 +30,6 @@ from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
-from accelstudy.study.cells import study_cells
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
@@ -107,7 +106,7 @@ def test_a_study_of_compositions(tmp_path):
             holds={"interval_s": 60},
         )
     )
-    old, new = study_cells(plain), study_cells(study)
+    old, new = plain.cells, study.cells
     assert [cell.model for cell in new[len(old) :: 2]] == [
         f"{NINE}+warm_up(tau=300)", "bias-scale+quadratic_scale",
     ]  # fmt: skip
@@ -118,7 +117,7 @@ def test_a_study_of_compositions(tmp_path):
     assert model_title(new[len(old)].model) == "9 + warm up (300)"
     # The condition of the holds is part of a cell, so seeds are compared without it.
     beside = parse_study(content(grids=[grid(), grid(models="bias-scale+quadratic_scale")]))
-    seeds = {cell.name: cell.seed(1, 0).entropy for cell in study_cells(beside)}
+    seeds = {cell.name: cell.seed(1, 0).entropy for cell in beside.cells}
     assert all(seeds[cell.name] == cell.seed(1, 0).entropy for cell in old)
     with pytest.raises(InputError, match=r"holds\.interval_s: missing; the effect 'warm_up'"):
         parse_study(content(grids=[grid(models=f"{NINE}+warm_up(tau=300)")]))
@@ -130,13 +129,12 @@ def test_the_sensitivity_of_a_composition():
     name = f"{NINE}+quadratic_scale+cubic_scale"
     settings = {"roll_gon": [0], "pitch_gon": [0], "model": "bias+scale + nonorthogonality"}
     study = parse_study(content(grids=[grid()], sensitivity=settings))
-    assert study.sensitivity.model == NINE
+    assert study.sensitivity.model.name == NINE
     settings["model"] = f"{NINE}+ cross_coupling"
     study = parse_study(content(grids=[grid(models=settings["model"])], sensitivity=settings))
-    assert study.sensitivity.model == study_cells(study)[0].model == f"{NINE}+cross_coupling"
-    assert parse_study(content(grids=[grid(models=name)])).grids[0].models == [
-        f"{NINE}-quadratic-cubic"
-    ]
+    assert study.sensitivity.model.name == study.cells[0].model == f"{NINE}+cross_coupling"
+    (model,) = parse_study(content(grids=[grid(models=name)])).grids[0].models
+    assert model.name == f"{NINE}-quadratic-cubic"
 
 
 def test_batches_and_the_round_trip_take_a_composition():
@@ -385,7 +383,8 @@ def test_a_model_that_becomes_a_registered_one_is_a_study_too():
     assert diagnosis.extended.name == NINE
     overlay = study_overlay(diagnosis)
     assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
-    assert parse_study({**overlay, "seed": 1}).grids[0].models == ["bias-scale", "extended"]
+    models = parse_study({**overlay, "seed": 1}).grids[0].models
+    assert [model.name for model in models] == ["bias-scale", "extended"]
 
 
 def test_a_large_effect_is_fitted_from_the_affine_part_on():

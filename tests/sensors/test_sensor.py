@@ -180,11 +180,13 @@ def test_an_unknown_name_is_answered_with_a_suggestion():
     with pytest.raises(UnknownNameError, match=f"did you mean '{NINE}'"):
         get_model("bias-scale-nonortogonality")
     with pytest.raises(UnknownNameError, match="unknown effect 'friction'"):
-        get_model("mine", {"mine": ["friction"]})
+        SensorModel.of("mine", ["friction"])
 
 
 def test_a_model_of_the_caller():
-    model = get_model("mine", {"mine": ["scale", "bias"]})
+    mine = SensorModel.of("mine", ["scale", "bias"])
+    model = get_model("mine", {"mine": mine})
+    assert model is mine
     assert model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
 
 

@@ -12,7 +12,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import cap_forces, leveling_error
-from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.study.cell import Cell
@@ -82,9 +81,8 @@ def test_the_rig_stays_behind_when_the_sensor_levels():
 
 def test_what_depends_on_temperature_tilts_if_it_is_not_estimated():
     """A bias of b (T − 20 °C) on x at T uniform in 10 to 40 °C is a pitch of b (T − 20)/g."""
-    simulated, estimated = get_model("t", {"t": ["bias", "thermal_bias"]}), SensorModel.of(
-        "b", ["bias"]
-    )  # fmt: skip
+    simulated = SensorModel.of("t", ["bias", "thermal_bias"])
+    estimated = SensorModel.of("b", ["bias"])
     forces = cap_forces(0.01, 20_000)
     truth = np.array([0, 0, 0, 0.01, 0, 0])
     hold = FULL.use(forces, 9)

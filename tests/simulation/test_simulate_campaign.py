@@ -17,6 +17,7 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import get_effect
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -58,7 +59,7 @@ def test_hidden_effects_are_found_where_they_were_put():
         **{name: pytest.approx(math.copysign(0.05, value))
            for name, value in values(truth["effects"]).items() if name.startswith("w_")},
     }  # fmt: skip
-    full = get_model("full", {"full": [*NINE_EFFECTS, "thermal_bias", "warm_up(tau=400)"]})
+    full = SensorModel.of("full", [*NINE_EFFECTS, "thermal_bias", "warm_up(tau=400)"])
     fit = fit_campaign(campaign, full, get_approach("robot"))
     known = full.vector({**values(truth["sensor"]), **values(truth["effects"])})
     assert np.abs((fit.parameters - known) / fit.adjustment.sigma_priori[0]).max() < 4.5

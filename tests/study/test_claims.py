@@ -23,7 +23,6 @@ from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.beyond_linear_theory import beyond_linear_theory
-from accelstudy.study.cells import study_cells
 from accelstudy.study.claims.judging import (
     FAILS,
     HOLDS,
@@ -81,8 +80,7 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def reduced(tables, folder):
     replicates = [
-        (cell, read_replicates(estimates_in(folder), cell))
-        for cell in study_cells(make_study(**KEYS))
+        (cell, read_replicates(estimates_in(folder), cell)) for cell in make_study(**KEYS).cells
     ]
     return reductions(replicates, papers_reductions())
 

@@ -20,8 +20,7 @@ from accelstudy.files.reading import overlay, read_layer
 from accelstudy.schemes import scheme_names
 from accelstudy.sensors.models import MODELS
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
-from accelstudy.study.config import StudyConfig, config_schema, parse_study, read_study
+from accelstudy.study.config import Study, config_schema, parse_study, read_study
 
 CONFIG = ROOT / "config" / "config.yaml"
 OVERLAYS = [ROOT / "config" / "smoke.yaml", *sorted((ROOT / "config" / "sweeps").glob("*.yaml"))]
@@ -39,7 +38,7 @@ def test_the_study_of_the_paper():
     assert [truth[f"b_{axis}"] for axis in "xyz"] == [0.05, 0.01, 0.03]
     assert [truth[f"s_{axis}"] for axis in "xyz"] == pytest.approx(3 * [200e-6], rel=1e-14)
     assert truth["alpha_zx"] == pytest.approx(44 * MGON, rel=1e-14)
-    names = {cell.name for cell in study_cells(study)}
+    names = {cell.name for cell in study.cells}
     for model in MODELS:
         for scheme in scheme_names():
             assert {f"{model}/{scheme}/gravity", f"{model}/{scheme}/robot"} <= names
@@ -49,7 +48,7 @@ def test_the_study_of_the_paper():
 def test_overlays_are_valid(path):
     study = read_study(CONFIG, path)
     assert study.study != "paper"
-    assert study_cells(study)
+    assert study.cells
     paper = read_study(CONFIG).sensor
     assert {name: study.sensor[name] for name in paper} == paper
 
@@ -101,7 +100,7 @@ def test_the_schema_explains_every_key():
 
 
 def test_config_yaml_has_every_top_level_key():
-    assert set(yaml.safe_load(CONFIG.read_text())) == set(StudyConfig.model_fields)
+    assert set(yaml.safe_load(CONFIG.read_text())) == set(Study.model_fields)
 
 
 def undocumented(text):
@@ -424,7 +423,7 @@ def accept_or_refuse(given_content):
     except InputError as error:
         message = str(error)
     if message is None:
-        assert study_cells(study)
+        assert study.cells
         return ""
     assert message.startswith("config: ")
     assert len(message.splitlines()) == 1
@@ -509,7 +508,7 @@ def test_cells_of_any_valid_study(keys):
     study = make_study(**keys)
     assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
 
-    cells = study_cells(study)
+    cells = study.cells
     assert cells
     assert len({cell.name for cell in cells}) == len(cells)
     for cell in cells:

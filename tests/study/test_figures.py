@@ -16,7 +16,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
 from accelstudy.effects import effect_names
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
-from accelstudy.study.config import StudyConfig, parse_study
+from accelstudy.study.config import Study, parse_study
 from accelstudy.study.figures import (
     captions,
     draw,
@@ -71,7 +71,7 @@ def _few_pixels(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def paper() -> StudyConfig:
+def paper() -> Study:
     return parse_study(PAPER)
 
 
@@ -443,7 +443,7 @@ def test_a_figure_that_cannot_be_drawn_is_named(tables, paper, tmp_path):
 
 IMPORTED = """\
 import sys
-import accelstudy.study.figures, accelstudy.study.cells
+import accelstudy.study.figures, accelstudy.study.config
 import accelstudy.jobs
 print([name for name in ("matplotlib", "pandas", "scipy.stats") if name in sys.modules])
 """

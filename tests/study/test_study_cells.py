@@ -12,7 +12,7 @@ from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON
 from accelstudy.sensors.models import MODELS, PRESETS
 from accelstudy.simulation.sessions import BLOCK, Noise
-from accelstudy.study.cells import fanned_out, study_cells
+from accelstudy.study.cell import fanned_out
 
 GRAVITY, ROBOT = f"{NINE}/mclaren-24/gravity", f"{NINE}/mclaren-24/robot"
 
@@ -114,7 +114,7 @@ def test_a_repeated_cell_runs_once_with_the_larger_number():
 
 def test_presets_are_the_rows_of_table_1():
     study = make_study(grids=[], presets={"replicates": 5, "approaches": "robot"})
-    names = [cell.name for cell in study_cells(study)]
+    names = [cell.name for cell in study.cells]
     assert sorted(names) == sorted({f"{p.model}/{p.scheme}/robot" for p in PRESETS})
     for row in ("bias-scale/faces-6/robot", f"{NINE}-quadratic/mclaren-24/robot"):
         assert row in names
@@ -135,7 +135,7 @@ def test_cells_fan_out_by_what_they_have_in_common():
 def test_every_cell_and_block_has_its_own_seed():
     more = grid(sensor_sigma_mps2=[1e-3, 3e-3], robot_sigma_mgon=[0, 3.2])
     study = make_study(grids=[grid("all", "all", 1), more])
-    cells = study_cells(study)
+    cells = study.cells
     words = {tuple(cell.seed(1, block).generate_state(4)) for cell in cells for block in range(3)}
     assert len(words) == 3 * len(cells)
     assert not words & {tuple(cell.seed(2, 0).generate_state(4)) for cell in cells}

@@ -33,7 +33,7 @@ from accelstudy.files.tables import (
     write_table,
 )
 from accelstudy.study import results as module
-from accelstudy.study.cells import memory
+from accelstudy.study.cell import memory
 from accelstudy.study.replicates import ESTIMATES
 from accelstudy.study.statistics import simulated_statistics
 from accelstudy.study.tables import collect, read_estimates

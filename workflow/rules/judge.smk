@@ -2,7 +2,7 @@
 JUDGED = [
     name
     for name, cells in SET_UPS.items()
-    if STUDY.sensitivity and any(cell.model == STUDY.sensitivity.model for cell in cells)
+    if STUDY.sensitivity and any(cell.model == STUDY.sensitivity.model.name for cell in cells)
 ]
 
 

@@ -1,9 +1,9 @@
 from accelstudy.jobs import job, lists
 from accelstudy.study.claims.judging import TABLES, judge_claims
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 
 with job(snakemake) as provenance:
-    study = StudyConfig.model_validate(snakemake.config)
+    study = Study.model_validate(snakemake.config)
     judge_claims(
         study,
         lists(snakemake.input)["estimates"],

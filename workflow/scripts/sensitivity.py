@@ -1,10 +1,10 @@
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.jobs import job, lists
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 with job(snakemake) as provenance:
-    study = StudyConfig.model_validate(snakemake.config)
+    study = Study.model_validate(snakemake.config)
     tables = {name: read_table(paths) for name, paths in lists(snakemake.input).items()}
     sensitivity = sensitivity_table(study, tables["summary"])
     shapley = shapley_table(study, tables["summary"], tables["correlations"])

@@ -22,12 +22,11 @@ from accelstudy.study.beyond_linear_theory import (
     noise_when_off,
 )
 from accelstudy.study.cell import Cell
-from accelstudy.study.cells import study_cells
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_page
 from accelstudy.study.claims.quantities import Evidence, Numbers
 from accelstudy.study.claims.reductions import reductions
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 from accelstudy.study.replicates import read_replicates
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
@@ -59,7 +58,7 @@ def claim_table() -> dict[str, list[dict[str, Any]]]:
 
 
 def judge_claims(
-    study: StudyConfig,
+    study: Study,
     estimates: Sequence[str | Path],
     tables: Mapping[str, str | Path],
     outputs: Mapping[str, str],
@@ -69,18 +68,15 @@ def judge_claims(
 
     Parameters
     ----------
-    study : StudyConfig, with `sensitivity`
+    study : Study, with `sensitivity`
     estimates : files with the estimates of the cells that the claims use
     tables : paths of the tables of `TABLES`, by their names
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
-    calibrations = []
-    for cell in study_cells(study):
-        if is_claimed(study, cell) and cell.estimability.estimable:
-            replicates = read_replicates(estimates, cell)
-            if replicates is not None:
-                calibrations.append((cell, replicates))
+    claimed = [cell for cell in study.cells if is_claimed(study, cell)]
+    stored = ((cell, read_replicates(estimates, cell)) for cell in claimed)
+    calibrations = ((cell, replicates) for cell, replicates in stored if replicates is not None)
     reduced = reductions(calibrations, papers_reductions())
     claims, by_scheme = judge(study, {name: read_table(tables[name]) for name in TABLES}, reduced)
     write_table(outputs["claims"], claims, provenance)
@@ -89,10 +85,10 @@ def judge_claims(
         path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
 
 
-def is_claimed(study: StudyConfig, cell: Cell) -> bool:
+def is_claimed(study: Study, cell: Cell) -> bool:
     """Whether the claims use the estimates of a cell: it has their model, and the usual noise."""
     assert study.sensitivity is not None
-    return cell.name == "/".join([study.sensitivity.model, cell.scheme, cell.approach])
+    return cell.name == study.sensitivity.cell(cell.approach, cell.scheme)
 
 
 def papers_reductions() -> dict[str, float]:
@@ -102,13 +98,13 @@ def papers_reductions() -> dict[str, float]:
 
 
 def judge(
-    study: StudyConfig, tables: Mapping[str, pd.DataFrame], reductions: pd.DataFrame
+    study: Study, tables: Mapping[str, pd.DataFrame], reductions: pd.DataFrame
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Judge all claims.
 
     Parameters
     ----------
-    study : StudyConfig, with `sensitivity`
+    study : Study, with `sensitivity`
     tables : mapping of name to DataFrame, those of `TABLES`
     reductions : DataFrame, see `accelstudy.study.claims.reductions`
 

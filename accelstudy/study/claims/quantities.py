@@ -16,12 +16,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import special
 
+from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 from accelstudy.study.config.blocks import SensitivityConfig
 
 Array = NDArray[np.float64]
@@ -39,13 +40,13 @@ class Evidence:
 
     Attributes
     ----------
-    study : StudyConfig, with `sensitivity`
+    study : Study, with `sensitivity`
     tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
     reductions : DataFrame, see `accelstudy.study.claims.reductions`
     by_scheme : DataFrame, what single simulations show in each scheme; empty while it is made
     """
 
-    study: StudyConfig
+    study: Study
     tables: Mapping[str, pd.DataFrame]
     reductions: pd.DataFrame
     by_scheme: pd.DataFrame
@@ -62,16 +63,12 @@ class Evidence:
         cells = self.tables["cells"]
         done = set(cells["cell"][cells["estimable"].astype(bool) & (cells["n_replicates"] > 0)])
         names = dict.fromkeys(cells["scheme"].astype(str))
-        return [s for s in names if all(self.cell(a, s) in done for a in APPROACHES)]
-
-    def cell(self, approach: str, scheme: str = "") -> str:
-        """Name of the cell of an approach, in the scheme of the claims if no other is named."""
-        return f"{self.settings.model}/{scheme or self.settings.scheme}/{approach}"
+        return [s for s in names if all(self.settings.cell(a, s) in done for a in APPROACHES)]
 
     def rows(self, table: str, approach: str, scheme: str = "") -> pd.DataFrame:
         """Rows of a table that are of one cell."""
         rows = self.tables[table]
-        return rows[rows["cell"] == self.cell(approach, scheme)]
+        return rows[rows["cell"] == self.settings.cell(approach, scheme)]
 
     @cached_property
     def effects_of_forces(self) -> pd.DataFrame:
@@ -186,9 +183,9 @@ def _largest(rows: pd.DataFrame) -> Numbers:
 def reduction(evidence: Evidence, effect: str) -> Numbers:
     """Reduction, %, of the mean sd a posteriori of an effect by the robot."""
     table = evidence.by_scheme[evidence.by_scheme["claim"] == f"reduction-{effect}"]
-    row = table[table["scheme"] == evidence.settings.scheme].iloc[0]
+    row = table[table["scheme"] == evidence.settings.scheme.name].iloc[0]
     means = reductions(evidence, effect)
-    half = float(means["half"][means["scheme"] == evidence.settings.scheme].iloc[0])
+    half = float(means["half"][means["scheme"] == evidence.settings.scheme.name].iloc[0])
     inside = table["single_low"].le(table["paper"]) & table["single_high"].ge(table["paper"])
     names = sorted(table["scheme"][inside])
     named = f" ({', '.join(names)})" if 0 < len(names) <= 4 else ""
@@ -256,7 +253,7 @@ def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:
     sd, error, truth = _sds(evidence, effect)
     ratios = truth / sd
     value = float(np.exp(np.mean(np.log(ratios))))
-    half = 1.96 * value * float(np.mean(error / sd))
+    half = Z95 * value * float(np.mean(error / sd))
     return {
         **{"value": value, "low": value - half, "high": value + half},
         **dict(zip("xyz", ratios, strict=True)),
@@ -267,7 +264,7 @@ def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:
 def sd_a_posteriori(evidence: Evidence, effect: str) -> Numbers:
     """Mean sd a posteriori of an effect's parameters, gravity-based, also in % of the truth."""
     sd, error, truth = _sds(evidence, effect)
-    value, half = float(sd.mean()), 1.96 * float(error.mean())
+    value, half = float(sd.mean()), Z95 * float(error.mean())
     percent = 100 * value / truth.min()
     return {"value": value, "low": value - half, "high": value + half, "percent": percent}
 

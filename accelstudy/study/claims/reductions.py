@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from accelstudy.basics.shares import Z95
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import MEAN, controlled
 from accelstudy.study.known import KnownValues
@@ -111,7 +112,7 @@ def _reduction(gravity: _Sigmas, robot: _Sigmas, effect: str, paper: float) -> d
     high, median, low = 100 * (1 - quantiles.value[[*CENTRAL]])
     return {
         "mean": mean,
-        "half": 1.96 * (100 - mean) * float(np.hypot(error_above / above, error_below / below)),
+        "half": Z95 * (100 - mean) * float(np.hypot(error_above / above, error_below / below)),
         "single_low": float(low),
         "median": float(median),
         "single_high": float(high),

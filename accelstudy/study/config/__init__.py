@@ -9,19 +9,16 @@ from typing import Any
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
-from accelstudy.effects import get_effect
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import checked
-from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
-from accelstudy.study.config.blocks import HOLD_KEYS, Grid
-from accelstudy.study.config.schema import StudyConfig
+from accelstudy.study.config.blocks import HOLD_KEYS, Grid, SensitivityConfig
+from accelstudy.study.config.schema import Study
 
-__all__ = ["Grid", "StudyConfig", "config_schema", "named_files", "parse_study", "read_study"]
+__all__ = ["Grid", "Study", "config_schema", "named_files", "parse_study", "read_study"]
 
 
-def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConfig:
+def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:
     """Check a configuration.
 
     Parameters
@@ -34,7 +31,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConf
     InputError
         One line that names the source, the key, what is wrong and what would be right.
     """
-    study = checked(StudyConfig, content, source)
+    study = checked(Study, content, source)
     try:
         _check_formulas(study)
     except InputError as error:
@@ -42,7 +39,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> StudyConf
     return study
 
 
-def read_study(*paths: str | Path) -> StudyConfig:
+def read_study(*paths: str | Path) -> Study:
     """Read a configuration from YAML files; later ones overlay earlier ones key by key.
 
     Raises
@@ -72,11 +69,11 @@ def config_schema() -> dict[str, Any]:
     """JSON schema of the configuration, as kept in `workflow/schemas/config.schema.json`."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **StudyConfig.model_json_schema(),
+        **Study.model_json_schema(),
     }
 
 
-def _check_formulas(study: StudyConfig) -> None:
+def _check_formulas(study: Study) -> None:
     """Check that effects get the conditions they need, and that leveling can be analysed.
 
     This needs the formulas of the models and takes half a second. The schema does without: jobs
@@ -89,17 +86,15 @@ def _check_formulas(study: StudyConfig) -> None:
     """
     _check_conditions(study)
     if study.sensitivity is not None:
-        _check_sensitivity(study, study.sensitivity.model, study.sensitivity.scheme)
+        _check_sensitivity(study, study.sensitivity)
 
 
-def _check_conditions(study: StudyConfig) -> None:
+def _check_conditions(study: Study) -> None:
     """Check that the plan of the holds has each condition that an effect depends on."""
-    plan = study.hold_plan
-    effects = [get_effect(name) for name in study.simulated_effects if name != "model"]
-    for grid in study.grids:
-        for name in study.model_names(grid.models):
-            effects += get_model(name, study.models).effects
-    for effect in {effect.spec: effect for effect in effects}.values():
+    plan, simulated = study.hold_plan, study.simulated_effects
+    models = [model for grid in study.grids for model in grid.models]
+    models += [] if simulated is None else [simulated]
+    for effect in {e.spec: e for model in models for e in model.effects}.values():
         if column := plan.missing(effect):
             raise InputError(
                 f"{HOLD_KEYS[column]}: missing; the effect {effect.name!r} needs the {column} of "
@@ -107,18 +102,18 @@ def _check_conditions(study: StudyConfig) -> None:
             )
 
 
-def _check_sensitivity(study: StudyConfig, name: str, scheme: str) -> None:
+def _check_sensitivity(study: Study, settings: SensitivityConfig) -> None:
     """Check that the cells of the sensitivity analysis can be estimated."""
-    model = get_model(name, study.models)
-    if model.hold_columns:
+    if settings.model.hold_columns:
         raise InputError(
-            f"sensitivity.model: {name!r} depends on the {model.hold_columns[0]} of each hold, "
+            f"sensitivity.model: {settings.model.name!r} depends on the "
+            f"{settings.model.hold_columns[0]} of each hold, "
             "and leveling is analysed without; choose another model"
         )
     noise = Noise(sigma_gravity=study.noise.gravity.sigma_mps2)
     for approach in ("gravity", "robot"):
-        cell = f"sensitivity: {name}/{scheme}/{approach}"
-        design = estimability(get_scheme(scheme), model, get_approach(approach), noise)
+        cell = f"sensitivity: {settings.cell(approach)}"
+        design = estimability(settings.scheme, settings.model, get_approach(approach), noise)
         if not design.estimable:
             raise InputError(f"{cell} cannot be estimated: {design.reason}")
         if study.paper and design.redundancy == 0:

@@ -1,12 +1,25 @@
-"""The blocks of the configuration of a study."""
+"""The blocks of the configuration of a study.
+
+Models, schemes, approaches and effects are written by their names; a block has the objects.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, GetCoreSchemaHandler, model_validator
+from pydantic_core import core_schema
 
-from accelstudy.config_names import ModelName, SchemeName
+from accelstudy.approaches import Approach, approach_names, get_approach
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import to_si
+from accelstudy.effects import Effect, get_effect
 from accelstudy.files.validation import (
     Angle,
     Attitudes,
@@ -29,6 +42,89 @@ from accelstudy.files.validation import (
     Vibration,
 )
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
+from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.sensors.models import MODELS, NINE, compose, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.simulation.sessions import sigma_of_mean
+
+OWN_MODELS: ContextVar[Mapping[str, SensorModel]] = ContextVar(
+    "own_models", default=MappingProxyType({})
+)
+"""Models that the configuration defines, while the blocks that may name them are parsed."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """How a field is written: the type in the file, and the ways there and back.
+
+    Attributes
+    ----------
+    kind : type, of what the file has
+    parse, plain : functions from that to the object, and back
+    """
+
+    kind: Any
+    parse: Callable[[Any], Any]
+    plain: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        back = core_schema.plain_serializer_function_ser_schema(self.plain)
+        inner = handler.generate_schema(self.kind)
+        return core_schema.no_info_after_validator_function(self.parse, inner, serialization=back)
+
+
+def _names(things: Collection[Any]) -> list[str]:
+    return [thing.name for thing in things]
+
+
+def specs(effects: Collection[Any]) -> list[str]:
+    """Effects as they are written."""
+    return [effect.spec for effect in effects]
+
+
+def _listed(find: Callable[[str], Any], everything: Callable[[], Collection[str]]) -> Written:
+    """How a list of things is written: by their names, or as `all`."""
+
+    def parse(names: list[str]) -> list[Any]:
+        return [find(name) for name in (everything() if names == ["all"] else names)]
+
+    return Written(OneOrMore[str], parse, _names)
+
+
+def composed(name: str, effects: Collection[str]) -> SensorModel:
+    """Compose a model; the same one for the same effects, however they are written."""
+    return compose(name, tuple(get_effect(effect).spec for effect in effects))
+
+
+def _model(text: str) -> SensorModel:
+    return get_model(text, OWN_MODELS.get())
+
+
+def _name(thing: Any) -> str:
+    return str(thing.name)
+
+
+Model = Annotated[SensorModel, Written(str, _model, _name)]
+Positions = Annotated[Scheme, Written(str, get_scheme, _name)]
+Models = Annotated[list[SensorModel], _listed(_model, lambda: [*MODELS, *OWN_MODELS.get()])]
+Schemes = Annotated[list[Scheme], _listed(get_scheme, scheme_names)]
+Approaches = Annotated[list[Approach], _listed(get_approach, approach_names)]
+Composition = Annotated[
+    SensorModel,
+    Written(
+        OneOrMore[str],
+        lambda effects: composed("of your own", effects),
+        lambda model: specs(model.effects),
+    ),
+]
+"""A model that is written as a list of effects."""
+NoiseEffects = Annotated[
+    list[NoiseEffect], Written(list[str], lambda given: [*map(get_noise_effect, given)], specs)
+]
 
 Temperatures = tuple[Temperature, Temperature]
 Vibrations = tuple[Vibration, Vibration]
@@ -44,6 +140,12 @@ class SensorNoise(Block):
     )
     rate_hz: Rate = Field(100.0, description="sampling rate; used with per: sample")
     duration_s: Duration = Field(2.0, description="duration of a hold; used with per: sample")
+
+    def of_mean(self, sigma_mps2: float) -> float:
+        """Noise of a position's mean, m/s², from a configured noise (per position or sample)."""
+        if self.per == "position":
+            return sigma_mps2
+        return sigma_of_mean(sigma_mps2, self.rate_hz, self.duration_s)
 
 
 class RobotNoise(Block):
@@ -67,11 +169,21 @@ class NoiseConfig(Block):
     sensor: SensorNoise = SensorNoise()
     robot: RobotNoise = RobotNoise()
     gravity: GravityNoise = GravityNoise()
-    effects: list[str] = Field(
+    effects: NoiseEffects = Field(
         default_factory=list,
         description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
         "they act; the calibration ignores them",
     )
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """The four settings that a grid may vary, by their keys there."""
+        return {
+            "sensor_sigma_mps2": self.sensor.sigma_mps2,
+            "robot_sigma_mgon": self.robot.sigma_mgon,
+            "gravity_sigma_mps2": self.gravity.sigma_mps2,
+            "gravity_error_mps2": self.gravity.error_mps2,
+        }
 
 
 class HoldPlanConfig(Block):
@@ -86,6 +198,17 @@ class HoldPlanConfig(Block):
         None, description="rms of the vibration, drawn for each hold between these"
     )
     yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
+
+    def plan(self, seed: int) -> HoldPlan:
+        """The plan of the holds in SI, whose random conditions have this seed."""
+        return HoldPlan(
+            interval=self.interval_s,
+            temperature=self.temperature_degC,
+            temperature_order=self.temperature_order,
+            vibration=self.vibration_mps2,
+            yaw=self.yaw,
+            seed=seed,
+        )
 
 
 HOLD_KEYS = {
@@ -102,19 +225,31 @@ class Quantity(Block):
     value: OneOrMore[Finite] = Field(description="one number per parameter of the effect")
     unit: str = Field(description="unit of the values, e.g. mgon, ppm, m/s^2")
 
+    def check(self, effect: Effect) -> None:
+        """Check that these may be the parameters of an effect."""
+        parameters = effect.parameters
+        if len(self.value) != len(parameters):
+            raise InputError(
+                f"value: {len(self.value)} numbers; the effect has "
+                f"{len(parameters)} parameters ({', '.join(p.name for p in parameters)})"
+            )
+        to_si(self.value, self.unit, parameters[0].unit)
+
 
 class Grid(Block):
     """Cells: every combination of what is listed. A single value may stand for a list of one."""
 
-    models: OneOrMore[ModelName] = Field(
+    models: Models = Field(
         description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
         "model; or all"
     )
-    schemes: OneOrMore[SchemeName] = Field(
+    schemes: Schemes = Field(
         description="schemes: names, YAML files as `accelstudy design` writes them; or all"
     )
-    approaches: OneOrMore[str] = Field(
-        default=["gravity", "robot"], description="names of approaches, or all"
+    approaches: Approaches = Field(
+        default=["gravity", "robot"],
+        validate_default=True,
+        description="names of approaches, or all",
     )
     replicates: Replicates = Field(description="simulated calibrations per cell")
     sensor_sigma_mps2: OneOrMore[SigmaForce] | None = Field(
@@ -130,13 +265,33 @@ class Grid(Block):
         None, description="noise.gravity.error_mps2"
     )
 
+    def noises(self, usual: NoiseConfig) -> list[list[float]]:
+        """Values of the settings of the noise, in the order of those."""
+        return [getattr(self, key) or [value] for key, value in usual.settings.items()]
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Grid:
+        lists: list[Sequence[object]] = [
+            self.models,
+            self.schemes,
+            self.approaches,
+            *self.noises(NoiseConfig()),
+        ]
+        try:
+            bounds.CELLS.check(math.prod(map(len, lists)))
+        except ValueError as error:
+            raise ValueError(f"number of cells: {error}") from None
+        return self
+
 
 class Presets(Block):
     """The rows of the paper's Table 1, each with its own model and scheme."""
 
     replicates: Replicates = Field(description="simulated calibrations per row and approach")
-    approaches: OneOrMore[str] = Field(
-        default=["gravity", "robot"], description="names of approaches, or all"
+    approaches: Approaches = Field(
+        default=["gravity", "robot"],
+        validate_default=True,
+        description="names of approaches, or all",
     )
 
 
@@ -158,5 +313,13 @@ class SensitivityConfig(Block):
     resamples: Resamples = Field(100, description="bootstrap resamples for confidence intervals")
     roll_gon: OneOrMore[Angle] = Field(description="rolls of the grid")
     pitch_gon: OneOrMore[Pitch] = Field(description="pitches of the grid")
-    model: ModelName = Field("bias-scale-nonorthogonality", description="model of figures 5 and 6")
-    scheme: SchemeName = Field("mclaren-24", description="scheme whose calibration gives the sds")
+    model: Model = Field(NINE, validate_default=True, description="model of figures 5 and 6")
+    scheme: Positions = Field(
+        "mclaren-24",
+        validate_default=True,
+        description="scheme whose calibration gives the sds",
+    )
+
+    def cell(self, approach: str, scheme: str = "") -> str:
+        """Name of the cell of an approach, in the scheme of the analysis if no other is named."""
+        return f"{self.model.name}/{scheme or self.scheme.name}/{approach}"

@@ -1,38 +1,44 @@
-"""The schema of the configuration of a study, `config/*.yaml`, checked before anything runs.
+"""A study, as its configuration `config/*.yaml` says: schema, parser and cells.
 
 The models below are the schema; `workflow/schemas/config.schema.json` is generated from them.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from itertools import product
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
 
-from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
-from accelstudy.basics.units import STANDARD_GRAVITY, to_si
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import get_effect
 from accelstudy.files.reading import config_hash
-from accelstudy.files.validation import (
-    Configuration,
-    Gravity,
-    OneOrMore,
-    Seed,
-)
-from accelstudy.noise_effects import get_noise_effect
-from accelstudy.schemes import get_scheme, scheme_names
+from accelstudy.files.validation import Configuration, Gravity, OneOrMore, Seed
+from accelstudy.schemes import get_scheme
 from accelstudy.schemes.files import held, remember
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import sigma_of_mean
+from accelstudy.simulation.sessions import Noise
+from accelstudy.study.cell import Cell
+from accelstudy.study.compiling import with_compiled
 from accelstudy.study.config.blocks import (
+    OWN_MODELS,
+    Composition,
     Grid,
     HoldPlanConfig,
     LevelingConfig,
@@ -40,16 +46,43 @@ from accelstudy.study.config.blocks import (
     Presets,
     Quantity,
     SensitivityConfig,
+    Written,
+    composed,
+    specs,
 )
 
 CLAIMED_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that the model of the paper's claims and figures must have."""
 
-
 _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 
-class StudyConfig(Configuration):
+def _own_name(name: str) -> str:
+    if name in MODELS:
+        raise InputError("is the name of a registered model; choose another")
+    if name == "all" or not re.fullmatch(_NAME, name) or len(name) > LONGEST:
+        raise InputError(
+            "is not a valid name: use letters, digits, _ and -, "
+            f"at most {LONGEST} of them, and not `all`"
+        )
+    return name
+
+
+def _simulated(effects: list[str]) -> SensorModel | None:
+    return None if effects == ["model"] else composed("simulated", effects)
+
+
+Simulated = Annotated[
+    SensorModel | None,
+    Written(
+        OneOrMore[str],
+        _simulated,
+        lambda model: specs(model.effects) if model else ["model"],
+    ),
+]
+
+
+class Study(Configuration):
     """A study."""
 
     retired = {  # noqa: RUF012
@@ -71,12 +104,13 @@ class StudyConfig(Configuration):
         description="true parameters of the simulated sensor, by effect: its name, or its name "
         "with settings",
     )
-    simulated_effects: OneOrMore[str] = Field(
+    simulated_effects: Simulated = Field(
         default=["model"],
+        validate_default=True,
         description="effects that the simulated sensor has: model, for those of the cell's model, "
         "or a list",
     )
-    models: dict[str, OneOrMore[str]] = Field(
+    models: dict[Annotated[str, AfterValidator(_own_name)], Composition] = Field(
         default_factory=dict, description="models of your own: name and effects"
     )
     schemes: dict[str, dict[str, Any]] = Field(
@@ -99,6 +133,12 @@ class StudyConfig(Configuration):
         "cells of its model and scheme with both approaches",
     )
 
+    @field_validator("models")
+    @classmethod
+    def _named(cls, models: dict[str, SensorModel]) -> dict[str, SensorModel]:
+        """Give each model the name under which it stands."""
+        return {name: composed(name, specs(model.effects)) for name, model in models.items()}
+
     @field_validator("schemes")
     @classmethod
     def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -110,53 +150,31 @@ class StudyConfig(Configuration):
                 )
         return dict(given)
 
+    @field_validator("grids", "sensitivity", mode="wrap")
+    @classmethod
+    def _with_own_models(
+        cls, content: Any, parse: ValidatorFunctionWrapHandler, info: ValidationInfo
+    ) -> Any:
+        """Parse what may name models and schemes that the configuration defines itself."""
+        if not {"models", "schemes"} <= info.data.keys():  # it is these that are wrong
+            return content
+        before = OWN_MODELS.set(info.data["models"])
+        try:
+            return parse(content)
+        finally:
+            OWN_MODELS.reset(before)
+
     @model_validator(mode="after")
-    def _names_exist(self) -> StudyConfig:
-        for name, effects in self.models.items():
-            with _at(f"models.{name}"):
-                if name in MODELS:
-                    raise InputError("is the name of a registered model; choose another")
-                if name == "all" or not re.fullmatch(_NAME, name) or len(name) > LONGEST:
-                    raise InputError(
-                        "is not a valid name: use letters, digits, _ and -, "
-                        f"at most {LONGEST} of them, and not `all`"
-                    )
-                SensorModel.of(name, effects)
+    def _fits_together(self) -> Study:
         for name, quantity in self.sensor.items():
             with _at(f"sensor.{name}"):
-                parameters = get_effect(name).parameters
-                if len(quantity.value) != len(parameters):
-                    raise InputError(
-                        f"value: {len(quantity.value)} numbers; the effect has "
-                        f"{len(parameters)} parameters ({', '.join(p.name for p in parameters)})"
-                    )
-                to_si(quantity.value, quantity.unit, parameters[0].unit)
-        with _at("noise.effects"):
-            for effect in self.noise.effects:
-                get_noise_effect(effect)
-        if self.simulated_effects != ["model"]:
-            with _at("simulated_effects"):
-                SensorModel.of("simulated", self.simulated_effects)
-        with _at("holds"):
-            self.hold_plan  # noqa: B018
-        for index, grid in enumerate(self.grids):
-            with _at(f"grids.{index}.models"):
-                self.model_names(grid.models)
-            with _at(f"grids.{index}.schemes"):
-                _known_schemes(grid.schemes)
-            with _at(f"grids.{index}.approaches"):
-                _known_approaches(grid.approaches)
-            with _at(f"grids.{index}: number of cells"):
-                bounds.CELLS.check(self._n_cells(grid))
-        for name in (name for grid in self.grids for name in grid.schemes):
-            if (content := held(name)) is not None:
-                self.schemes[name] = content
+                quantity.check(get_effect(name))
         self._check_gravity()
-        if self.presets is not None:
-            with _at("presets.approaches"):
-                _known_approaches(self.presets.approaches)
         if not self.grids and self.presets is None:
             raise ValueError("neither grids nor presets are given: the study has no cells")
+        for scheme in (scheme for grid in self.grids for scheme in grid.schemes):
+            if (content := held(scheme.name)) is not None:
+                self.schemes[scheme.name] = content
         if self.sensitivity is not None:
             self._check_sensitivity(self.sensitivity)
         elif self.paper:
@@ -175,110 +193,95 @@ class StudyConfig(Configuration):
 
     def _check_sensitivity(self, settings: SensitivityConfig) -> None:
         """Check that the cells exist whose standard deviations the sensitivity analysis needs."""
-        with _at("sensitivity.model"):
-            model = get_model(settings.model, self.models)
-            missing = set(CLAIMED_EFFECTS) - {effect.name for effect in model.effects}
-            if self.paper and missing:
-                raise InputError(
-                    f"{settings.model!r} lacks {', '.join(sorted(missing))}, which the paper's "
-                    "claims need; choose another model, or paper: false"
-                )
-        with _at("sensitivity.scheme"):
-            get_scheme(settings.scheme)
+        missing = set(CLAIMED_EFFECTS) - {effect.name for effect in settings.model.effects}
+        if self.paper and missing:
+            raise ValueError(
+                f"sensitivity.model: {settings.model.name!r} lacks {', '.join(sorted(missing))}, "
+                "which the paper's claims need; choose another model, or paper: false"
+            )
         for name in ("roll_gon", "pitch_gon"):
             if self.paper and 0 not in getattr(settings, name):
                 raise ValueError(f"sensitivity.{name}: must contain 0, which paper: true needs")
-        for approach in ("gravity", "robot"):
-            cell = f"{settings.model}/{settings.scheme}/{approach}"
-            if self._usual_replicates(settings.model, settings.scheme, approach) < 2:
+        replicates = {cell.name: cell.replicates for cell in self.cells}
+        for cell in map(settings.cell, ("gravity", "robot")):
+            if replicates.get(cell, 0) < 2:
                 raise ValueError(
                     f"sensitivity: needs at least 2 replicates of the cell {cell}, with the noise "
                     "of `noise`; add it to `grids`"
                 )
 
-    def _n_cells(self, grid: Grid) -> int:
-        """Number of combinations in a grid, counted without making them."""
-        lists: list[Sequence[object]] = [
-            self.model_names(grid.models),
-            _known_schemes(grid.schemes),
-            _known_approaches(grid.approaches),
-            grid.sensor_sigma_mps2 or [None],
-            grid.robot_sigma_mgon or [None],
-            grid.gravity_sigma_mps2 or [None],
-            grid.gravity_error_mps2 or [None],
-        ]
-        return math.prod(map(len, lists))
-
     @property
     def all_grids(self) -> list[Grid]:
         """The grids, and the presets as grids."""
-        if self.presets is None:
-            return self.grids
+        rows = () if self.presets is None else PRESETS
         return [
             *self.grids,
             *(
-                Grid(
-                    models=[preset.model],
-                    schemes=[preset.scheme],
-                    approaches=self.presets.approaches,
-                    replicates=self.presets.replicates,
+                Grid.model_construct(
+                    models=[get_model(row.model)],
+                    schemes=[get_scheme(row.scheme)],
+                    **dict(self.presets or ()),
                 )
-                for preset in PRESETS
+                for row in rows
             ),
         ]
 
-    def _usual_replicates(self, model: str, scheme: str, approach: str) -> int:
-        """Replicates of a cell with the noise of `noise`; 0 if the study has no such cell."""
+    @cached_property
+    def cells(self) -> list[Cell]:
+        """All cells, in the order of the configuration, without repetition.
 
-        def has(values: list[float] | None, usual: float) -> bool:
-            return values is None or usual in values
+        A cell that occurs more than once, such as in Table 1 and in a grid, runs once, with the
+        largest number of replicates.
+        """
+        cells: dict[str, Cell] = {}
+        for cell in (cell for grid in self.all_grids for cell in self._cells_of(grid)):
+            earlier = cells.get(cell.name)
+            if earlier is None or cell.replicates > earlier.replicates:
+                cells[cell.name] = cell
+        return with_compiled(list(cells.values()))
 
-        noise = self.noise
-        return max(
-            (
-                grid.replicates
-                for grid in self.all_grids
-                if model in self.model_names(grid.models)
-                and scheme in _known_schemes(grid.schemes)
-                and approach in _known_approaches(grid.approaches)
-                and has(grid.sensor_sigma_mps2, noise.sensor.sigma_mps2)
-                and (approach == "gravity" or has(grid.robot_sigma_mgon, noise.robot.sigma_mgon))
-                and has(grid.gravity_sigma_mps2, noise.gravity.sigma_mps2)
-                and has(grid.gravity_error_mps2, noise.gravity.error_mps2)
-            ),
-            default=0,
-        )
-
-    def model_names(self, names: Sequence[str]) -> list[str]:
-        """Spell out `all` and check that the models exist."""
-        if list(names) == ["all"]:
-            return [*MODELS, *self.models]
-        return [get_model(name, self.models).name for name in names]
+    def _cells_of(self, grid: Grid) -> Iterator[Cell]:
+        usual, noises = self.noise.settings, [*product(*grid.noises(self.noise))]
+        for model, scheme, approach, noise in product(
+            grid.models, grid.schemes, grid.approaches, noises
+        ):
+            settings = dict(zip(usual, noise, strict=True))
+            if not approach.uses_angles:  # the same cell whatever the robot's accuracy
+                settings["robot_sigma_mgon"] = usual["robot_sigma_mgon"]
+            changed = [f"{k}={_shown(v)}" for k, v in settings.items() if v != usual[k]]
+            effects = tuple(specs(model.effects))
+            simulated = tuple(specs((self.simulated_effects or model).effects))
+            file = held(scheme.name)
+            yield Cell(
+                name="/".join([model.name, scheme.name, approach.name, *changed]),
+                model=model.name,
+                effects=effects,
+                simulated_effects=simulated,
+                scheme=scheme.name,
+                approach=approach.name,
+                replicates=grid.replicates,
+                noise=Noise(
+                    self.noise.sensor.of_mean(settings["sensor_sigma_mps2"]),
+                    settings["robot_sigma_mgon"] * MGON if approach.uses_angles else 0.0,
+                    settings["gravity_sigma_mps2"],
+                    settings["gravity_error_mps2"],
+                    tuple(specs(self.noise.effects)),
+                ),
+                gravity=self.gravity_mps2,
+                truth=self.truth(dict.fromkeys([*effects, *simulated])),
+                holds=self.hold_plan,
+                directions=None if file is None else tuple(map(tuple, file["directions"])),
+            )
 
     @property
     def hold_plan(self) -> HoldPlan:
         """Conditions of the holds."""
-        holds = self.holds
-        return HoldPlan(
-            interval=holds.interval_s,
-            temperature=holds.temperature_degC,
-            temperature_order=holds.temperature_order,
-            vibration=holds.vibration_mps2,
-            yaw=holds.yaw,
-            seed=self.seed,
-        )
+        return self.holds.plan(self.seed)
 
     @property
     def sigma_force(self) -> float:
         """Default noise of a position's mean, m/s²."""
-        return self.position_sigma(self.noise.sensor.sigma_mps2)
-
-    def position_sigma(self, sigma_mps2: float) -> float:
-        """Noise of a position's mean, m/s², from the configured noise (per position or sample)."""
-        sensor = self.noise.sensor
-        if sensor.per == "position":
-            return sigma_mps2
-        return sigma_of_mean(sigma_mps2, sensor.rate_hz, sensor.duration_s)
+        return self.noise.sensor.of_mean(self.noise.sensor.sigma_mps2)
 
     def truth(self, effects: Iterable[str]) -> dict[str, float]:
         """Return the true parameters of the given effects in SI; those not configured are zero."""
@@ -303,27 +306,16 @@ class StudyConfig(Configuration):
         return config_hash(self.model_dump(mode="json"))
 
 
-class _at:
+@contextmanager
+def _at(key: str) -> Iterator[None]:
     """Name the key at which an error occurs."""
-
-    def __init__(self, key: str) -> None:
-        self.key = key
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, InputError):
-            raise ValueError(f"{self.key}: {error}") from None
+    try:
+        yield
+    except InputError as error:
+        raise ValueError(f"{key}: {error}") from None
 
 
-def _known_schemes(names: Sequence[str]) -> list[str]:
-    if list(names) == ["all"]:
-        return list(scheme_names())
-    return [get_scheme(name).name for name in names]
-
-
-def _known_approaches(names: Sequence[str]) -> list[str]:
-    if list(names) == ["all"]:
-        return list(approach_names())
-    return [get_approach(name).name for name in names]
+def _shown(value: float) -> str:
+    """Show a number briefly, but never two numbers alike."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)

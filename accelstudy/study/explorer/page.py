@@ -21,7 +21,7 @@ from accelstudy.drawing.style import approach_colour, approach_marker
 from accelstudy.files.kept import kept_or_made
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages import render
-from accelstudy.study.config import StudyConfig
+from accelstudy.study.config import Study
 from accelstudy.study.explorer import charts
 from accelstudy.study.explorer.content import (
     ANGLES,
@@ -76,7 +76,7 @@ PARAMETER_COLUMNS = (
 
 
 def write_explorer(
-    study: StudyConfig,
+    study: Study,
     tables: Mapping[str, pd.DataFrame],
     output: str | Path,
     in_report: Mapping[str, str] | None = None,
@@ -85,7 +85,7 @@ def write_explorer(
 
     Parameters
     ----------
-    study : StudyConfig
+    study : Study
     tables : mapping of name to DataFrame, those of `TABLES`
     output : path of the page; the figures are in the folder `figures` beside it
     in_report : where a report has the figures, seen from the page there, by their names
@@ -97,7 +97,7 @@ def write_explorer(
 
 
 def explorer_page(
-    study: StudyConfig, tables: Mapping[str, pd.DataFrame], in_report: Mapping[str, str]
+    study: Study, tables: Mapping[str, pd.DataFrame], in_report: Mapping[str, str]
 ) -> str:
     """Return the page; parameters as in `write_explorer`."""
     cells, unit = tables["cells"], display_unit("rad")
@@ -161,7 +161,7 @@ def explorer_page(
     )
 
 
-def _first_rows(study: StudyConfig, rows: pd.DataFrame) -> str:
+def _first_rows(study: Study, rows: pd.DataFrame) -> str:
     """What the rows of the chart are at first: what the study varies."""
     for factor in FACTORS:
         if varies(study, factor):
@@ -173,11 +173,11 @@ def _unit(factor: Factor) -> str:
     return "" if factor.unit == "1" else unit_label(display_unit(factor.unit))
 
 
-def _start(study: StudyConfig, cells: pd.DataFrame) -> int:
+def _start(study: Study, cells: pd.DataFrame) -> int:
     """Number of the set-up that is chosen first: the paper's, else the first that is estimable."""
     names = list(cells["cell"])
     if study.sensitivity is not None:
-        return names.index(f"{study.sensitivity.model}/{study.sensitivity.scheme}/gravity")
+        return names.index(study.sensitivity.cell("gravity"))
     return int(cells["estimable"].to_numpy(bool).argmax())
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 GREEK = {"roll": r"\phi", "pitch": r"\theta"}
 ROLL, PITCH = np.linspace(-100.0, 100.0, 81), np.linspace(-80.0, 80.0, 65)
@@ -55,7 +55,7 @@ def shown_sigma(
     category="Paper",
     when=of_the_paper,
 )
-def accuracy_over_attitude(tables: Tables, study: StudyConfig) -> Figure:
+def accuracy_over_attitude(tables: Tables, study: Study) -> Figure:
     """Figure 2: accuracy of roll and pitch over the attitude.
 
     Standard deviation of roll (left) and pitch (right) computed from one measured specific force,
@@ -114,7 +114,7 @@ def _contours(ax: Axes, values: Array) -> None:
     category="Paper",
     when=of_the_paper,
 )
-def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
+def accuracy_over_noise(tables: Tables, study: Study) -> Figure:
     """Figure 3: accuracy of roll and pitch over the sensor noise.
 
     Standard deviation of roll and pitch over the noise of the accelerometer, in a tilted attitude.
@@ -149,7 +149,7 @@ def accuracy_over_noise(tables: Tables, study: StudyConfig) -> Figure:
     tables=("sensitivity",),
     when=of_the_paper,
 )
-def effects_of_forces(tables: Tables, study: StudyConfig) -> Figure:
+def effects_of_forces(tables: Tables, study: Study) -> Figure:
     """Figure 4: total effects of the forces on roll and pitch.
 
     Total effects of the three measured forces on roll (upper row) and pitch (lower row) over the

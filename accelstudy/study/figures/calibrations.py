@@ -18,7 +18,6 @@ from accelstudy.drawing.style import (
     shown,
     symbol,
 )
-from accelstudy.sensors.models import get_model
 from accelstudy.study.figures.panels import Array, Panel, key, matrix, panels, points, write_values
 from accelstudy.study.figures.registry import Tables, of_the_paper, register
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 APPROACHES = ("gravity", "robot")
 ANNOTATED = 0.005
@@ -44,7 +43,7 @@ WIDTH = 0.36
     tables=("summary", "quantiles"),
     when=of_the_paper,
 )
-def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
+def errors_and_sigmas(tables: Tables, study: Study) -> Figure:
     """Figure 7: errors and standard deviations of the two calibrations.
 
     Left: estimation errors of the first simulated calibration (open markers) before the middle 95
@@ -85,7 +84,7 @@ def errors_and_sigmas(tables: Tables, study: StudyConfig) -> Figure:
     return fig
 
 
-def single_runs(tables: Tables, study: StudyConfig) -> pd.DataFrame:
+def single_runs(tables: Tables, study: Study) -> pd.DataFrame:
     """What single calibrations give, as shown: a row each approach, parameter and quantity.
 
     Its columns are `first`, the first calibration, `low` and `high`, the ends of the middle 95 %,
@@ -128,18 +127,16 @@ def _draw_runs(ax: Axes, rows: pd.DataFrame) -> None:
     points(ax, rows, y="first", markerfacecolor="white", zorder=4)
 
 
-def _parameters(study: StudyConfig) -> dict[str, str]:
+def _parameters(study: Study) -> dict[str, str]:
     """SI units of the parameters of the paper's model, by their names."""
     assert study.sensitivity is not None
-    model = get_model(study.sensitivity.model, study.models)
-    return {parameter.name: parameter.unit for parameter in model.parameters}
+    return {p.name: p.unit for p in study.sensitivity.model.parameters}
 
 
-def _cells(study: StudyConfig) -> dict[str, str]:
+def _cells(study: Study) -> dict[str, str]:
     """Names of the paper's two cells by their approach."""
     assert study.sensitivity is not None
-    setting = study.sensitivity
-    return {name: f"{setting.model}/{setting.scheme}/{name}" for name in APPROACHES}
+    return {name: study.sensitivity.cell(name) for name in APPROACHES}
 
 
 @register(
@@ -149,7 +146,7 @@ def _cells(study: StudyConfig) -> dict[str, str]:
     when=of_the_paper,
     angles=False,
 )
-def correlations(tables: Tables, study: StudyConfig) -> Figure:
+def correlations(tables: Tables, study: Study) -> Figure:
     """Figure 8: correlations of the parameters of the two calibrations.
 
     Absolute correlations of the estimated parameters less the identity, from the covariance matrix

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from accelstudy.basics.units import MGON, display_unit, to_display, unit_label
+from accelstudy.schemes import scheme_names
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 
 @dataclass(frozen=True)
@@ -93,39 +94,26 @@ class Block:
         return list(dict.fromkeys(self.series_of_cells))
 
 
-def cell_table(study: StudyConfig) -> pd.DataFrame:
+def cell_table(study: Study) -> pd.DataFrame:
     """One row per cell of a study; the robot's noise is NaN where no robot is used."""
     import pandas as pd  # slow, and not needed by studies that vary nothing
 
-    from accelstudy.study.cells import study_cells
-
-    rows = [
-        {
-            "cell": cell.name,
-            "model": cell.model,
-            "scheme": cell.scheme,
-            "approach": cell.approach,
-            "family": family(cell.scheme),
-            "n_positions": cell.positions.n_positions,
-            "sensor_sigma_mps2": cell.noise.sigma_force,
-            "robot_sigma_mgon": (
-                cell.noise.sigma_angle / MGON if cell.conditions.uses_angles else np.nan
-            ),
-            "gravity_sigma_mps2": cell.noise.sigma_gravity,
-            "gravity_error_mps2": cell.noise.gravity_error,
-        }
-        for cell in study_cells(study)
-    ]
-    table = pd.DataFrame(rows)
-    return table.assign(robot_sigma_mgon=table["robot_sigma_mgon"].round(9))
+    table = pd.DataFrame([cell.labels for cell in study.cells])
+    uses_robot = np.array([cell.conditions.uses_angles for cell in study.cells])
+    robot = table["robot_sigma_mgon"].where(uses_robot)
+    return table.assign(
+        robot_sigma_mgon=robot.round(9),
+        family=table["scheme"].map(family),
+        n_positions=[cell.positions.n_positions for cell in study.cells],
+    )
 
 
-def varies(study: StudyConfig, factor: Factor) -> bool:
+def varies(study: Study, factor: Factor) -> bool:
     """Whether a study has cells that differ in one factor alone."""
     return bool(blocks(study, factor))
 
 
-def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
+def blocks(study: Study, factor: Factor) -> list[Block]:
     """Cells over one factor, in blocks that hold all others at the same levels.
 
     For each model and scheme, another factor is held at the study's default. If this factor does
@@ -157,17 +145,19 @@ def blocks(study: StudyConfig, factor: Factor) -> list[Block]:
     return [Block(dict(levels), pd.concat(parts)) for levels, parts in parts_of.items()]
 
 
-def _lists_values(study: StudyConfig, factor: Factor) -> bool:
+def _lists_values(study: Study, factor: Factor) -> bool:
     """Whether the grids list different values of a noise setting; quicker than all cells."""
     values = [getattr(grid, factor.column) for grid in study.all_grids]
     listed = {value for each in values if each is not None for value in each}
     return len(listed) + (None in values) > 1
 
 
-def _names_sizes(study: StudyConfig) -> bool:
+def _names_sizes(study: Study) -> bool:
     """Whether a grid names schemes of one family; `all` does not count."""
-    families = [[family(name) for name in grid.schemes] for grid in study.grids]
-    return any(len(names) > len(set(names)) for names in families)
+    named = [[scheme.name for scheme in grid.schemes] for grid in study.grids]
+    return any(
+        len(names) > len(set(map(family, names))) for names in named if names != [*scheme_names()]
+    )
 
 
 def family(scheme: str) -> str:
@@ -194,7 +184,7 @@ def _hold(
     return rows[(rows[other.column] == chosen) | rows[other.column].isna()]
 
 
-def factor_note(study: StudyConfig, factor: Factor) -> str:
+def factor_note(study: Study, factor: Factor) -> str:
     """Say in a caption what a study holds fixed where it varies a factor."""
     swept = blocks(study, factor)
     held = list(dict.fromkeys(text for block in swept if (text := levels_text(block.levels))))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 ANGLES = ("roll", "pitch")
 ROW_MM = 6.0
@@ -36,7 +36,7 @@ NOT_ESTIMABLE: Style = {
     tables=("cells", "leveling"),
     when=lambda study: not any(varies(study, noise) for noise in NOISES),
 )
-def tilt_errors(tables: Tables, study: StudyConfig) -> Figure:
+def tilt_errors(tables: Tables, study: Study) -> Figure:
     """Tilt error that each calibration leaves.
 
     The tilt error of roll (upper) and pitch (lower half) that a calibration leaves, over all

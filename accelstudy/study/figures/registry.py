@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 Tables: TypeAlias = "Mapping[str, pd.DataFrame]"
-Draw: TypeAlias = "Callable[[Tables, StudyConfig], Figure]"
+Draw: TypeAlias = "Callable[[Tables, Study], Figure]"
 
 TABLES = (
     *("cells", "summary", "correlations", "leveling", "quantiles"),
@@ -52,8 +52,8 @@ class FigureEntry:
     draw: Draw
     category: str
     tables: tuple[str, ...]
-    when: Callable[[StudyConfig], bool]
-    note: Callable[[StudyConfig], str]
+    when: Callable[[Study], bool]
+    note: Callable[[Study], str]
     angles: bool
 
 
@@ -64,8 +64,8 @@ def register(
     caption: str = "",
     category: str = "Study",
     tables: tuple[str, ...] = (),
-    when: Callable[[StudyConfig], bool] = lambda study: True,
-    note: Callable[[StudyConfig], str] = lambda study: "",
+    when: Callable[[Study], bool] = lambda study: True,
+    note: Callable[[Study], str] = lambda study: "",
     angles: bool = True,
 ) -> Callable[[Draw], Draw]:
     """Register the function that draws a figure; parameters as in `FigureEntry`.
@@ -92,7 +92,7 @@ def register(
     return decorate
 
 
-def of_the_paper(study: StudyConfig) -> bool:
+def of_the_paper(study: Study) -> bool:
     """Whether a study draws the figures of the paper."""
     return study.paper
 
@@ -102,7 +102,7 @@ def get_figure(name: str) -> FigureEntry:
     return _REGISTRY.get(name)
 
 
-def figure_names(study: StudyConfig | None = None) -> tuple[str, ...]:
+def figure_names(study: Study | None = None) -> tuple[str, ...]:
     """Names of the figures that a study has, or of all that there are."""
     names = _REGISTRY.names()
     return tuple(sorted(name for name in names if study is None or get_figure(name).when(study)))
@@ -113,12 +113,12 @@ def figure_tables(*names: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(table for name in names for table in get_figure(name).tables))
 
 
-def angle_unit(study: StudyConfig) -> str:
+def angle_unit(study: Study) -> str:
     """Unit of angles in figures: that of the study or, where it names none, of the user."""
     return study.angle_unit or attitude_unit()
 
 
-def captions(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
+def captions(names: Iterable[str], study: Study) -> dict[str, str]:
     """Captions of figures by their names, with the notes on this study."""
     texts = {}
     with angles_in(angle_unit(study)):
@@ -129,14 +129,14 @@ def captions(names: Iterable[str], study: StudyConfig) -> dict[str, str]:
     return texts
 
 
-def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
+def draw(name: str, tables: Tables, study: Study) -> Figure:
     """Draw a figure.
 
     Parameters
     ----------
     name : str
     tables : mapping of table name to table, at least those of `figure_tables`
-    study : StudyConfig
+    study : Study
     """
     import matplotlib as mpl
 
@@ -146,7 +146,7 @@ def draw(name: str, tables: Tables, study: StudyConfig) -> Figure:
         return get_figure(name).draw(tables, study)
 
 
-def write_figure(name: str, tables: Tables, study: StudyConfig, folder: str | Path) -> None:
+def write_figure(name: str, tables: Tables, study: Study, folder: str | Path) -> None:
     """Draw a figure, and write it into a folder under its name: as SVG, as PNG, and its caption.
 
     Each file is whole or not there at all, and the same tables give the same bytes. Parameters as

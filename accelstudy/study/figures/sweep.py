@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 CAPTION = """
 Mean empirical standard deviation of each group of parameters, and the rms error of roll and of
@@ -82,7 +82,7 @@ FAILED_STYLES: dict[str, Style] = {
 SOME = "some did not converge"
 
 
-def over_factor(tables: Tables, study: StudyConfig, factor: Factor) -> Figure:
+def over_factor(tables: Tables, study: Study, factor: Factor) -> Figure:
     """Panels for each group of parameters and for the tilt error, over one factor."""
     parts = [part for block in blocks(study, factor) for part in _parts(block)]
     left_out, parts = len(parts[MOST_BLOCKS:]), parts[:MOST_BLOCKS]

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.approaches import approach_names
 from accelstudy.drawing.style import (
     Style,
     approach_colour,
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 ROW_MM = 9.5
 CROSS_AT = 0.9
@@ -43,7 +42,7 @@ TILT = "tilt"
     tables=("summary", "leveling"),
     when=lambda study: study.presets is not None,
 )
-def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
+def published_calibrations(tables: Tables, study: Study) -> Figure:
     """Table 1: published calibrations and what they determine.
 
     The calibrations of the paper's Table 1, each with its own model and positions: mean empirical
@@ -54,8 +53,7 @@ def published_calibrations(tables: Tables, study: StudyConfig) -> Figure:
     says otherwise; compare tilt errors between models with this in mind.
     """
     assert study.presets is not None
-    named = study.presets.approaches
-    approaches = list(approach_names()) if named == ["all"] else named
+    approaches = [approach.name for approach in study.presets.approaches]
     table = preset_table(tables, approaches)
     row = []
     for group in [*in_order(set(table["group"]) - {TILT}), TILT]:

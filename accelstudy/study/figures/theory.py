@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 BAND = "#DDDDDD"
 GAP = 0.25
@@ -45,7 +45,7 @@ GAP = 0.25
     tables=("summary",),
     angles=False,
 )
-def monte_carlo_against_theory(tables: Tables, study: StudyConfig) -> Figure:
+def monte_carlo_against_theory(tables: Tables, study: Study) -> Figure:
     """Monte Carlo against closed forms and linear theory.
 
     Empirical standard deviation of each parameter of each cell over the expected one: from the
@@ -121,7 +121,7 @@ LIMIT: Style = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
     when=knows_all,
     angles=False,
 )
-def draw_beyond_linear_theory(tables: Tables, study: StudyConfig) -> Figure:
+def draw_beyond_linear_theory(tables: Tables, study: Study) -> Figure:
     """What simulation adds to linear theory.
 
     How far simulated calibrations are from linear theory, which knows no bias and one variance.

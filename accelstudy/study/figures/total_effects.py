@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from accelstudy.study.config import StudyConfig
+    from accelstudy.study.config import Study
 
 LINE_STYLES = ("-", "--", ":")
 MARKERS = ("o", "^", "s")
@@ -64,7 +64,7 @@ CAPTION_ROBOT = """
     """
 
 
-def effects_over_roll(tables: Tables, study: StudyConfig, output: str, approach: str) -> Figure:
+def effects_over_roll(tables: Tables, study: Study, output: str, approach: str) -> Figure:
     """Total effects on one output, with the standard deviations of one calibration."""
     table = read_shares(tables["sensitivity"], approach)
     table = table[(table["output"] == output) & (table["pitch_gon"] >= 0)]
@@ -102,7 +102,7 @@ for _suffix, _approach, _kind, _caption in (
     tables=("shapley",),
     when=of_the_paper,
 )
-def shapley(tables: Tables, study: StudyConfig) -> Figure:
+def shapley(tables: Tables, study: Study) -> Figure:
     """Shapley effects on roll and pitch, gravity-based calibration.
 
     What the correlations of the calibration's parameters change: Shapley effects, with the
