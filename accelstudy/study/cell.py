@@ -6,12 +6,11 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
@@ -208,12 +207,16 @@ class Cell:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cell:
         """Make a cell of plain data."""
-        return _adapter().validate_python(data)
+        plain = _tuples(data)
+        objects = {"noise": Noise(**plain["noise"]), "holds": HoldPlan(**plain["holds"])}
+        return cls(**{**plain, **objects})
 
 
-@cache
-def _adapter() -> TypeAdapter[Cell]:
-    return TypeAdapter(Cell)
+def _tuples(data: Any) -> Any:
+    """Plain data with tuples for lists, also for those in lists."""
+    if isinstance(data, Mapping):
+        return {key: _tuples(value) for key, value in data.items()}
+    return tuple(map(_tuples, data)) if isinstance(data, list) else data
 
 
 def fanned_out(cells: Sequence[Cell], pattern: str) -> dict[str, list[Cell]]:
