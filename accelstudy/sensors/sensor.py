@@ -43,9 +43,8 @@ class SensorModel:
         names = [parameter.name for parameter in self.parameters]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise InputError(
-                f"model {self.name!r}: parameters {', '.join(twice)} occur in two effects"
-            )
+            of = f"model {self.name!r}: " if self.name else ""
+            raise InputError(f"{of}parameters {', '.join(twice)} occur in two effects")
 
     @classmethod
     def of(cls, name: str, effects: Iterable[str]) -> SensorModel:

@@ -13,12 +13,14 @@ from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
 from study_helpers import NINE, content, grid, make_study
 
+from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.effects import effect_names
 from accelstudy.files.reading import overlay, read_layer
-from accelstudy.schemes import scheme_names
-from accelstudy.sensors.models import MODELS
+from accelstudy.noise_effects import get_noise_effect
+from accelstudy.schemes import get_scheme, scheme_names
+from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import Study, config_schema, parse_study, read_study
 
@@ -156,6 +158,7 @@ def test_every_key_of_config_yaml_is_commented():
 
 # --- bad input -----------------------------------------------------------------------------------
 
+NOISE = {"effects": ["heavy_tails( nu=5 )"]}
 SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
 
 BAD = {
@@ -192,7 +195,8 @@ BAD = {
     "simulated effect twice": ({"simulated_effects": ["bias", "bias"]}, "simulated_effects"),
     "unknown effect of a model": ({"models": {"mine": ["bias", "scales"]}},
                                   "models.mine: unknown effect 'scales'; did you mean 'scale'?"),
-    "effect twice in a model": ({"models": {"mine": ["bias", "bias"]}}, "models.mine", "b_x"),
+    "effect twice in a model": ({"models": {"mine": ["bias", "bias"]}},
+                              "models.mine: parameters b_x, b_y, b_z occur in two effects"),
     "model of a taken name": ({"models": {"bias-scale": ["bias"]}}, "models.bias-scale"),
     "model named all": ({"models": {"all": ["bias"]}}, "models.all"),
     "model with a slash": ({"models": {"a/b": ["bias"]}}, "models.a/b"),
@@ -340,6 +344,31 @@ def test_one_may_stand_for_a_list():
     )
     assert one == many
     assert one.fingerprint == many.fingerprint
+
+
+def test_names_become_the_things_that_they_name():
+    own = {"mine": ["scale", "bias"]}
+    both = grid(["mine", NINE], ["faces-6"], approaches="all")
+    settings = {**SENSITIVITY, "model": "mine"}
+    used = grid("mine")
+    study = make_study(models=own, grids=[both, used], sensitivity=settings, noise=NOISE)
+    mine = study.models["mine"]
+    assert mine.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
+    assert study.grids[0].models == [mine, get_model(NINE)]
+    assert study.grids[0].schemes == [get_scheme("faces-6")]
+    assert study.grids[0].approaches == [get_approach(name) for name in approach_names()]
+    assert study.sensitivity.model is mine
+    assert study.noise.effects == [get_noise_effect("heavy_tails(nu=5)")]
+    written = study.model_dump(mode="json")
+    assert written["models"] == own
+    assert written["grids"][0]["models"] == ["mine", NINE]
+    assert written["grids"][0]["approaches"] == list(approach_names())
+    assert written["simulated_effects"] == ["model"]
+    assert written["sensitivity"]["scheme"] == "mclaren-24"
+    assert written["noise"]["effects"] == ["heavy_tails(nu=5)"]
+    # Nobody else's configuration has that model.
+    with pytest.raises(InputError, match=r"grids\.0\.models: unknown model 'mine'"):
+        make_study(grids=[used])
 
 
 def test_numbers_as_yaml_1_1_reads_them():

@@ -138,3 +138,17 @@ def test_numbers_hang_on_no_code_that_their_version_leaves_out(snakefile, list_o
     words = [sys.executable, "-c", code]
     ran = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT)
     assert ran.stdout.strip() == "[]"
+
+
+IMPORTED = """\
+import sys
+import accelstudy.jobs, accelstudy.study.results
+print([name for name in ("pydantic", "matplotlib", "jinja2", "scipy.stats") if name in sys.modules])
+"""
+
+
+def test_a_job_that_simulates_loads_no_more_than_it_needs():
+    ran = subprocess.run(
+        [sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.strip() == "[]"

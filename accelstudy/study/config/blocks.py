@@ -104,6 +104,10 @@ def _model(text: str) -> SensorModel:
     return get_model(text, OWN_MODELS.get())
 
 
+def _noise_effect(text: str) -> NoiseEffect:
+    return get_noise_effect(get_noise_effect(text).spec)  # the same one, however it is written
+
+
 def _name(thing: Any) -> str:
     return str(thing.name)
 
@@ -117,13 +121,13 @@ Composition = Annotated[
     SensorModel,
     Written(
         OneOrMore[str],
-        lambda effects: composed("of your own", effects),
+        lambda effects: composed("", effects),
         lambda model: specs(model.effects),
     ),
 ]
 """A model that is written as a list of effects."""
 NoiseEffects = Annotated[
-    list[NoiseEffect], Written(list[str], lambda given: [*map(get_noise_effect, given)], specs)
+    list[NoiseEffect], Written(list[str], lambda texts: [*map(_noise_effect, texts)], specs)
 ]
 
 Temperatures = tuple[Temperature, Temperature]
