@@ -7,70 +7,44 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from accelstudy.api.calibrations import (
-        Calibration,
-        calibrate,
-        check_sigmas,
-        export,
-        read_calibration,
-    )
+    from accelstudy.api.calibrations import Calibration
     from accelstudy.api.campaigns import find_holds, read_campaign, simulate_campaign
     from accelstudy.api.catalogues import catalogue
-    from accelstudy.api.diagnoses import Diagnosis, diagnose
-    from accelstudy.api.epochs import Comparison, History, compare, history
+    from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.api.epochs import Comparison, History
     from accelstudy.api.logs import Log, read_log
-    from accelstudy.api.lots import Lot, lot
+    from accelstudy.api.lots import Lot
     from accelstudy.api.plans import Plan, plan
     from accelstudy.api.simulations import Simulation, simulate
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.session import Campaign
     from accelstudy.study.run import run_study
+    from accelstudy.verbs.calibrations import (
+        calibrate,
+        check_sigmas,
+        diagnose,
+        export,
+        read_calibration,
+    )
+    from accelstudy.verbs.sensors import compare, history, lot
 
     __version__: str
 
 _PLACES = {
-    "api.calibrations": (
-        "Calibration",
-        "calibrate",
-        "check_sigmas",
-        "export",
-        "read_calibration",
-    ),
-    "api.campaigns": (
-        "find_holds",
-        "read_campaign",
-        "simulate_campaign",
-    ),
+    "api.calibrations": ("Calibration",),
+    "api.campaigns": ("find_holds", "read_campaign", "simulate_campaign"),
     "api.catalogues": ("catalogue",),
-    "api.diagnoses": (
-        "Diagnosis",
-        "diagnose",
-    ),
-    "api.epochs": (
-        "Comparison",
-        "History",
-        "compare",
-        "history",
-    ),
-    "api.logs": (
-        "Log",
-        "read_log",
-    ),
-    "api.lots": (
-        "Lot",
-        "lot",
-    ),
-    "api.plans": (
-        "Plan",
-        "plan",
-    ),
-    "api.simulations": (
-        "Simulation",
-        "simulate",
-    ),
+    "api.diagnoses": ("Diagnosis",),
+    "api.epochs": ("Comparison", "History"),
+    "api.logs": ("Log", "read_log"),
+    "api.lots": ("Lot",),
+    "api.plans": ("Plan", "plan"),
+    "api.simulations": ("Simulation", "simulate"),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
     "study.run": ("run_study",),
+    "verbs.calibrations": ("calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
+    "verbs.sensors": ("compare", "history", "lot"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 

@@ -18,17 +18,14 @@ from accelstudy.api.given import (
     path_of,
     python_words,
     quantity,
-    whole,
 )
 from accelstudy.api.logs import log_of
 from accelstudy.api.results import Result
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.basics import bounds
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.units import GON, Given
 from accelstudy.campaign.calibration import export as forms
-from accelstudy.campaign.calibration import sigma_check
 from accelstudy.campaign.calibration.applying import (
     NO_CALIBRATION,
     calibration_of,
@@ -36,21 +33,27 @@ from accelstudy.campaign.calibration.applying import (
 )
 from accelstudy.campaign.calibration.assessment import assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
-from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
+from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.leveling import Leveling, level_frame
 from accelstudy.campaign.calibration.output import (
     calibration_content,
     draw_residuals,
     write_calibration,
 )
-from accelstudy.campaign.calibration.wording import parameter_lines
+from accelstudy.campaign.calibration.wording import (
+    approach_words,
+    interval_words,
+    next_steps,
+    parameter_lines,
+)
 from accelstudy.campaign.format import read_campaign as read_folder
 from accelstudy.campaign.of_type import with_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.sensors.models import NINE, get_model
+from accelstudy.sensors.frames import axes_note
+from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
@@ -58,7 +61,6 @@ if TYPE_CHECKING:
 
 SIGMA = Given("m/s^2", "", "Noise of a reading.")
 TILT = Given("rad", "", "Largest tilt.", 1e-3, np.pi / 2)
-REPLICATES = Range(2, 10**9)
 
 
 class Calibration(Result):
@@ -68,12 +70,24 @@ class Calibration(Result):
     ----------
     content : mapping, that of calibration.json
     fit : CampaignFit, the adjustment; None of a calibration that was read from a file
+    source : path of the campaign, for the commands that are suggested
     """
 
     kind = CALIBRATION
 
-    def __init__(self, content: Mapping[str, Any], fit: CampaignFit | None = None) -> None:
+    def __init__(
+        self,
+        content: Mapping[str, Any],
+        fit: CampaignFit | None = None,
+        source: Path | None = None,
+    ) -> None:
         self._content, self.fit = content, fit
+        self.source = Path("CAMPAIGN") if source is None else source
+
+    @classmethod
+    def of_fit(cls, fit: CampaignFit, source: Path | None = None) -> Calibration:
+        """Return the calibration that an adjustment gives."""
+        return cls(calibration_content(fit, assess(fit)), fit, source)
 
     @property
     def content(self) -> Mapping[str, Any]:
@@ -221,9 +235,25 @@ class Calibration(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
         if self.fit is not None:
-            write_calibration(self.fit, folder, place=place)
+            write_calibration(self.fit, folder, self.source, place)
         # That of a diagnosis knows of what was mended.
         write_json(folder / "calibration.json", dict(self.content))
+
+    def tell(self, place: Path) -> None:
+        """Print the parameters, the verdict and what to do next."""
+        fit = self._fitted("tell")
+        for warning in fit.campaign.warnings:
+            warn(warning)
+        for line in parameter_lines(self.content):
+            say(line)
+        if self.content["sigmas_95"] is not None:
+            say(f"±: {interval_words(fit)}")
+        say(approach_words(fit))
+        say(axes_note(None if fit.campaign.log is None else fit.campaign.log.frame))
+        show(f"{self.state.upper()}: {self.verdict}")
+        what, command = next_steps(fit, self.state, self.source, place / "calibration.json")[0]
+        say(f"{what}: {command}")
+        say(f"report: {place / 'report.html'}")
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw |f| − g of each position, mm/s²."""
@@ -233,109 +263,17 @@ class Calibration(Result):
         return ax
 
 
-@for_programs
-def read_calibration(path: str | PathLike[str]) -> Calibration:
-    """Read a calibration.json.
-
-    Parameters
-    ----------
-    path : path of the file, or of the folder that has it
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is not a calibration.
-    """
-    file = path_of("path", path)
-    file = file / "calibration.json" if file.is_dir() else file
-    content = read_calibration_content(file)
-    calibration_of(content, f"{file}: {NO_CALIBRATION}")
-    return Calibration({"warnings": [], **content})
-
-
-@for_programs
-def calibrate(
-    campaign: Campaign | str | PathLike[str],
-    *,
-    model: str = NINE,
-    approach: str | None = None,
-    prior: str | PathLike[str] | None = None,
-) -> Calibration:
-    """Calibrate a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign, or the path of its folder
-    model : str, a name, a composition, or the path of a YAML file
-    approach : str, optional, "gravity" or "robot"; with the robot, if the campaign has its angles
-    prior : path, optional
-        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
-
-    Raises
-    ------
-    InputError
-        If the campaign does not determine the model, or a name is unknown.
-    """
-    fit = fit_campaign(*resolve(campaign, model, approach, prior))
-    return Calibration(calibration_content(fit, assess(fit)), fit)
-
-
-@for_programs
-def check_sigmas(
-    campaign: Campaign | str | PathLike[str],
-    *,
-    model: str = NINE,
-    approach: str | None = None,
-    replicates: int = 2000,
-    seed: int = 1,
-) -> pd.DataFrame:
-    """Check the sigmas of a calibration by simulation.
-
-    The campaign is simulated with the noise that its sigmas are from. So the check finds whether
-    the adjustment turns that noise into the right sigmas, and not whether the noise is right.
-
-    Parameters
-    ----------
-    campaign, model, approach : as in `calibrate`
-    replicates : int, simulated campaigns
-    seed : int
-
-    Returns
-    -------
-    DataFrame
-        A row per parameter, in the units that people read: parameter, unit, estimate, sigma (as the
-        adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
-        sd_empirical) and n_converged.
-    """
-    fit = fit_campaign(*resolve(campaign, model, approach))
-    return sigma_check.check_sigmas(
-        fit, whole("replicates", replicates, REPLICATES), whole("seed", seed, bounds.SEED)
-    )
-
-
-def export(calibration: Calibration | str | PathLike[str], *, form: str = "json") -> str:
-    """Return a calibration in a form that a device takes.
-
-    Parameters
-    ----------
-    calibration : Calibration, or the path of a calibration.json
-    form : str, "json", "yaml", "c", "matrix" or "px4"
-
-    Returns
-    -------
-    str
-        Text of a file.
-    """
-    return as_calibration(calibration).export(form)
-
-
 # --- what is given ------------------------------------------------------------------------------
 
 
 def as_calibration(calibration: Any, name: str = "calibration") -> Calibration:
-    """Return a calibration, read if it is given as a path."""
+    """Return a calibration, read if it is given as the path of its file or folder."""
     if isinstance(calibration, str | PathLike):
-        return read_calibration(calibration)
+        file = path_of(name, calibration)
+        file = file / "calibration.json" if file.is_dir() else file
+        content = read_calibration_content(file)
+        calibration_of(content, f"{file}: {NO_CALIBRATION}")
+        return Calibration({"warnings": [], **content})
     if not isinstance(calibration, Calibration):
         raise InputError(
             f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
@@ -352,14 +290,19 @@ def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
     return campaign
 
 
+def place_of(campaign: Any) -> Path | None:
+    """Path of a campaign, for the commands that are suggested; None if it is in memory."""
+    return None if isinstance(campaign, Campaign) else Path(campaign)
+
+
+def chosen(model: str, approach: str | None) -> tuple[SensorModel, Approach | None]:
+    """Return the model and the approach that are named."""
+    return get_model(model), None if approach is None else get_approach(approach)
+
+
 def resolve(
-    campaign: Any, model: Any, approach: Any, prior: Any = None, plausible: bool = True
+    campaign: Any, model: str, approach: str | None, prior: Any = None, plausible: bool = True
 ) -> tuple[Campaign, SensorModel, Approach | None]:
-    """Read the campaign, the model and the approach that a program names."""
-    of_type("model", model, str, expected="the name of a model")
-    if approach is not None:
-        of_type("approach", approach, str, expected="the name of an approach")
-    chosen = get_model(model), None if approach is None else get_approach(approach)
-    of_sensors = None if prior is None else path_of("prior", prior)
-    measured = with_type(as_campaign(campaign, plausible), of_sensors, chosen[0])
-    return measured, *chosen
+    """Read the campaign, the model, the approach and what is known of the sensor a priori."""
+    names = chosen(model, approach)
+    return with_type(as_campaign(campaign, plausible), prior, names[0]), *names

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from numpy.linalg import LinAlgError
 
-from accelstudy.api.calibrations import Calibration, resolve
-from accelstudy.api.given import drawing, for_programs, whole
+from accelstudy.api.calibrations import Calibration
+from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
-from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
-from accelstudy.diagnosis.pipeline import diagnose as diagnosed
+from accelstudy.basics.progress import say, show, stage, warn
+from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.report.document import (
     diagnosed_calibration,
     diagnosed_fit,
@@ -30,7 +27,7 @@ from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import Diagnosis as Found
 from accelstudy.drawing.style import COLUMN
 from accelstudy.files.outputs import DIAGNOSIS
-from accelstudy.sensors.models import NINE
+from accelstudy.sensors.frames import FRD, axes_note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,12 +41,16 @@ class Diagnosis(Result):
     Attributes
     ----------
     result : accelstudy.diagnosis.result.Diagnosis, all of it
+    source : path of the campaign, for the commands that are suggested
     """
 
     kind = DIAGNOSIS
 
-    def __init__(self, result: Found, seed: int, replicates: int) -> None:
+    def __init__(
+        self, result: Found, seed: int, replicates: int, source: Path | None = None
+    ) -> None:
         self.result, self._seed, self._replicates = result, seed, replicates
+        self.source = Path("CAMPAIGN") if source is None else source
 
     @property
     def name(self) -> str:
@@ -103,37 +104,21 @@ class Diagnosis(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy diagnose` does."""
-        write_diagnosis(self.result, folder, self.loop, place=place)
+        loop = self.loop
+        with stage("figures and page"):
+            write_diagnosis(self.result, folder, loop, self.source, place)
 
-
-@for_programs
-def diagnose(
-    campaign: Campaign | str | PathLike[str],
-    *,
-    model: str = NINE,
-    approach: str | None = None,
-    prior: str | PathLike[str] | None = None,
-    seed: int = 1,
-    replicates: int = REPLICATES,
-) -> Diagnosis:
-    """Find what a sensor model lacks to explain a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign, or the path of its folder
-    model, prior : as in `calibrate`
-    approach : str, optional; with the robot, if the campaign has its angles
-    seed : int
-    replicates : int
-        Sessions simulated with either model, when they are resolve for; fewer beyond 500 positions.
-
-    Raises
-    ------
-    InputError
-        If the campaign does not determine the model, or a name is unknown.
-    """
-    whole("seed", seed, bounds.SEED)
-    whole("replicates", replicates, SESSIONS)
-    # The diagnosis, not the reader, looks for wrong units and axes.
-    given = resolve(campaign, model, approach, prior, plausible=False)
-    return Diagnosis(diagnosed(*given, seed=seed), seed, replicates)
+    def tell(self, place: Path) -> None:
+        """Print the verdict and what is said with it."""
+        campaign = self.result.campaign
+        for warning in campaign.warnings:
+            warn(warning)
+        if self.result.recognised is not None:
+            warn(f"calibration.json is of mended data: {self.result.recognised.reason}")
+        verdict, *lines = verdict_lines(self.result)
+        show(verdict)
+        for line in lines:
+            say(line)
+        if campaign.log is not None and campaign.log.frame != FRD.name:
+            say(axes_note(campaign.log.frame))
+        say(f"report: {place / 'report.html'}")

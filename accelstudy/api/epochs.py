@@ -9,15 +9,13 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 
-from accelstudy.api.calibrations import TILT, Calibration, as_calibration
-from accelstudy.api.given import drawing, for_programs, of_type, quantity
+from accelstudy.api.calibrations import Calibration
+from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import GON, Given
 from accelstudy.basics.wording import counted
 from accelstudy.drawing.style import FULL
 from accelstudy.epochs import comparison as comparing
@@ -27,14 +25,9 @@ from accelstudy.epochs.history_output import history_document, history_table, wr
 from accelstudy.epochs.interval import Interval
 from accelstudy.epochs.output import comparison_document, draw_changes, write_comparison
 from accelstudy.files.outputs import COMPARISON, HISTORY
-from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.planning.question import confidence_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-ACCURACY = Given("rad", "", "Accuracy.", 1e-9, np.pi / 2)
 
 
 class Comparison(Result):
@@ -74,33 +67,6 @@ class Comparison(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy compare` does."""
         write_comparison(self.result, folder)
-
-
-@for_programs
-def compare(
-    first: Calibration | str | PathLike[str],
-    second: Calibration | str | PathLike[str],
-    *,
-    tilt_range: float | str = MAX_TILT_GON * GON,
-) -> Comparison:
-    """Say whether a sensor is still what it was.
-
-    The congruence test of deformation analysis takes all parameters with both covariance matrices;
-    if it rejects, the parameters that changed are named, at one level for all.
-
-    Parameters
-    ----------
-    first, second : Calibration, or the path of a calibration.json, the older one first
-    tilt_range : float in rad or str with a unit
-        Tilts over which the change of roll and pitch is taken.
-
-    Raises
-    ------
-    InputError
-        If they are not of one sensor, or have no effect in common.
-    """
-    pair = as_calibration(first, "first"), as_calibration(second, "second")
-    return Comparison(comparing.compare(*pair, quantity("tilt_range", tilt_range, TILT)))
 
 
 class History(Result):
@@ -166,70 +132,31 @@ class History(Result):
         write_history(self.result, folder, self.interval)
 
 
-@for_programs
-def history(
-    calibrations: Sequence[Calibration | str | PathLike[str]],
-    *,
-    dates: Sequence[str | datetime] = (),
-    tilt_accuracy: float | str | None = None,
-    tilt_range: float | str = MAX_TILT_GON * GON,
-    confidence: float | str = 0.95,
-) -> History:
-    """Say how a sensor changes over time.
-
-    For each parameter there is a rate with its interval, and the scatter from session to session.
-    All tests together have one level.
-
-    Parameters
-    ----------
-    calibrations : three or more of Calibration, or paths of calibration.json, of one sensor
-    dates : of the calibrations, in their order, as "2026-03-01"; those of the campaigns if omitted
-    tilt_accuracy : float in rad or str with a unit, optional
-        Ask how long the last calibration stays this accurate in roll and pitch.
-    tilt_range : float in rad or str with a unit, largest tilt at which the accuracy is wanted
-    confidence : float or str, as 0.95 or "95%", probability with which it stays so
-
-    Raises
-    ------
-    InputError
-        If they are fewer than three, of one date, or not of one sensor.
-    """
-    chosen = _confidence(confidence)
-    read = [as_calibration(one) for one in calibrations]
-    if dates and len(dates) != len(read):
+def follow(
+    calibrations: Sequence[Calibration], dates: Sequence[str | datetime], given: Sequence[Any]
+) -> Course:
+    """Follow a sensor over its calibrations, which messages call as they were given."""
+    if dates and len(dates) != len(calibrations):
         raise InputError(
-            f"--date: {counted(len(dates), 'date')} for {counted(len(read), 'calibration')}; give "
-            "one for each, in their order, as 2026-03-01"
+            f"--date: {counted(len(dates), 'date')} for "
+            f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
+            "2026-03-01"
         )
-    paths = all(isinstance(one, str | PathLike) for one in calibrations)
-    places = [str(one) for one in calibrations] if paths else None
+    paths = all(isinstance(one, str | PathLike) for one in given)
+    called = [str(one) for one in given] if paths else None
     first: dict[bytes, int] = {}
-    for i, one in enumerate(read):
+    for i, one in enumerate(calibrations):
         # Noise never repeats: the same numbers are one campaign, whatever the file is called.
         same = first.setdefault(one.parameters["value"].to_numpy().tobytes(), i)
         if same != i:
-            called = places or [f"calibration {k + 1}" for k in range(len(read))]
-            raise InputError(f"{called[i]}: has the numbers of {called[same]}; each counts once")
-    given: Sequence[Any] = dates or [one.content.get("date") for one in read]
-    where = ["--date"] * len(dates) or [f"{place}: date" for place in places or map(repr, read)]
-    when = [_date(text, what) for text, what in zip(given, where, strict=True)]
-    found, interval = history_of(read, when), None
-    if tilt_accuracy is not None:
-        interval = Interval(
-            found,
-            quantity("tilt_accuracy", tilt_accuracy, ACCURACY),
-            quantity("tilt_range", tilt_range, TILT),
-            chosen,
-        )
-    return History(found, interval)
-
-
-def _confidence(value: float | str) -> float:
-    of_type("confidence", value, float, str, expected="a probability, as 0.95 or 95%")
-    chosen = confidence_of(str(value).strip())
-    if chosen is None:
-        raise InputError("--confidence: a probability, such as 95%, not rms")
-    return chosen
+            names = called or [f"calibration {k + 1}" for k in range(len(calibrations))]
+            raise InputError(f"{names[i]}: has the numbers of {names[same]}; each counts once")
+    stated: Sequence[Any] = dates or [one.content.get("date") for one in calibrations]
+    places = [f"{name}: date" for name in called or map(repr, calibrations)]
+    where = ["--date"] * len(dates) or places
+    return history_of(
+        calibrations, [_date(text, what) for text, what in zip(stated, where, strict=True)]
+    )
 
 
 def _date(given: str | datetime | None, where: str) -> datetime:

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.calibrations import Calibration, as_campaign, resolve
-from accelstudy.api.given import drawing, for_programs, whole
+from accelstudy.api.calibrations import Calibration
+from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
-from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.output import calibration_content
-from accelstudy.campaign.session import Campaign
+from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.output import LotReport, draw_sensors, write_lot
-from accelstudy.lots.run import FEWEST, evaluate_lot
-from accelstudy.sensors.models import NINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,10 +81,15 @@ class Lot(Result):
     def calibrations(self) -> dict[str, Calibration]:
         """Calibration of each sensor with all that the model lacks, by its campaign."""
         return {
-            fit.campaign.name: Calibration(calibration_content(fit, assess(fit)), fit)
+            fit.campaign.name: Calibration.of_fit(fit)
             for fit in self.report.fits
             if not isinstance(fit, InputError)
         }
+
+    def tell(self, place: Path) -> None:
+        """Print the verdict."""
+        show(self.verdict)
+        say(f"report: {place / 'report.html'}")
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw what each sensor has of the first parameter that the model lacks."""
@@ -102,38 +100,3 @@ class Lot(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy lot` does."""
         write_lot(self.report, folder, place)
-
-
-@for_programs
-def lot(
-    campaigns: Sequence[Campaign | str | PathLike[str]],
-    *,
-    model: str = NINE,
-    approach: str | None = None,
-    seed: int = 1,
-    cores: int = 1,
-) -> Lot:
-    """Say what the model of sensors of one type lacks.
-
-    What one campaign alone cannot show, many show together: whether anything is missing in the
-    lot, at one level for all, in how many of the sensors, how large it is, and which one is odd.
-
-    Parameters
-    ----------
-    campaigns : two or more of Campaign, or paths of folders, one per sensor
-    model : str, as in `calibrate`
-    approach : str, optional; with the robot, where a campaign has its angles
-    seed : int
-    cores : int, processes that work at once; results do not depend on it
-
-    Raises
-    ------
-    InputError
-        If fewer than two campaigns can be judged, or a name is unknown.
-    """
-    if len(campaigns) < FEWEST:
-        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-    measured = [as_campaign(one) for one in campaigns]
-    _, wanted, by = resolve(measured[0], model, approach)
-    numbers = whole("seed", seed, bounds.SEED), whole("cores", cores, CORES)
-    return Lot(evaluate_lot(measured, wanted, by, *numbers))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from accelstudy.api.given import for_programs, path_of
+from accelstudy.basics.progress import say, show
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.pages.notebook import notebook_html
 
@@ -56,6 +57,11 @@ class Result(ABC):
     @abstractmethod
     def write(self, folder: Path, place: Path) -> None:
         """Write all files into a folder that is there; the page names `place` as theirs."""
+
+    def tell(self, place: Path) -> None:
+        """Print what the command of the same name does, after it wrote the files to a place."""
+        show(f"{self.state.upper()}: {self.verdict}")
+        say(f"report: {place / 'report.html'}")
 
     @for_programs
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:

@@ -12,6 +12,17 @@ BY_COMMAND: ContextVar[bool] = ContextVar("by_command", default=False)
 """Whether the user came by the command line, so that messages name its options."""
 
 
+def key(name: str, option: str = "") -> str:
+    """Spell the name of a keyword for who gave it: --time-unit on a command line, else time_unit.
+
+    Parameters
+    ----------
+    name : str, of the keyword
+    option : str, of the option, where it has another name
+    """
+    return f"--{(option or name).replace('_', '-')}" if BY_COMMAND.get() else name
+
+
 class InputError(ValueError):
     """Input that cannot be used; the message says where, what is wrong and what would be right.
 

@@ -13,22 +13,24 @@ from accelstudy.basics.errors import BY_COMMAND, InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.advise import advise_command
 from accelstudy.commands.apply import apply_command
-from accelstudy.commands.calibrate import calibrate_command
+from accelstudy.commands.calibrations import (
+    CALIBRATE,
+    CHECK_SIGMAS,
+    COMPARE,
+    DIAGNOSE,
+    EXPORT,
+    HISTORY,
+    LOT,
+)
 from accelstudy.commands.cells import cells_command
-from accelstudy.commands.check_sigmas import check_sigmas_command
 from accelstudy.commands.claims import claims_command
-from accelstudy.commands.compare import compare_command
 from accelstudy.commands.config_schema import config_schema_command
 from accelstudy.commands.data_sheet import data_sheet_command
 from accelstudy.commands.design import design_command
-from accelstudy.commands.diagnose import diagnose_command
 from accelstudy.commands.effects import effects_command
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
-from accelstudy.commands.export import export_command
-from accelstudy.commands.history import history_command
 from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
-from accelstudy.commands.lot import lot_command
 from accelstudy.commands.models import models_command
 from accelstudy.commands.options import ANGLE_UNIT, plugin_option
 from accelstudy.commands.plan import plan_command
@@ -43,14 +45,14 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
         public_command,
         simulate_campaign_command,
         advise_command,
-        calibrate_command,
-        diagnose_command,
-        lot_command,
-        check_sigmas_command,
+        CALIBRATE,
+        DIAGNOSE,
+        LOT,
+        CHECK_SIGMAS,
         apply_command,
-        export_command,
-        compare_command,
-        history_command,
+        EXPORT,
+        COMPARE,
+        HISTORY,
     ),
     "Before a calibration, and what it is worth": (
         plan_command,

@@ -30,6 +30,7 @@ def commands():
 def _command(command, top):
     context = click.Context(command, info_name=command.name, parent=top)
     options = _options(command, context)
+    said = [(f"`{name}`", text) for name, text in getattr(command, "meanings", {}).items()]
     own = dict(getattr(command, "sections", {}))
     named = {title: [options.pop(name) for name in names] for title, names in own.items()}
     usage = command.get_usage(context).removeprefix("Usage: ")
@@ -43,6 +44,7 @@ def _command(command, top):
         f"## {command.name}",
         f"```text\n{' '.join(usage.split())}\n```",
         _text(command.help),
+        *([table(("argument", "meaning"), said)] if said else []),
         *tables,
         _table(options),
         f"Example:\n\n```sh\n{_dedent(example)}\n```",

@@ -19,6 +19,7 @@ from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
 
+import accelstudy
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
@@ -36,7 +37,7 @@ from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import gap_figure
-from accelstudy.diagnosis.report.output import diagnose_folder, write_diagnosis
+from accelstudy.diagnosis.report.output import write_diagnosis
 from accelstudy.diagnosis.report.words import headline, question, verdict_lines
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.space.examined import examine
@@ -400,7 +401,8 @@ def test_same_seed_same_files(written, tmp_path, monkeypatch):
     monkeypatch.setattr(saving, "save", rendering(*RENDERED["named"]))
     out, _, _ = written("named")
     first = Path(shutil.copytree(out, tmp_path / "first"))
-    diagnose_folder(out.parent / "named", out, replicates=100)  # its commands name the folder
+    # Its commands name the folder.
+    accelstudy.diagnose(out.parent / "named", replicates=100).save(out)
     for path in sorted(first.rglob("*.*")):
         if path.is_file() and path.suffix != ".parquet":
             again = out / path.relative_to(first)

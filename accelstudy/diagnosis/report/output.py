@@ -10,22 +10,17 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import REFUTED
-from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.applying import needs_of
 from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import write_json
-from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.of_type import with_type
 from accelstudy.diagnosis.consequences import MISSING
 from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.decision.priors import SURE
 from accelstudy.diagnosis.decision.verdict import LEVEL_NOISE
-from accelstudy.diagnosis.loop import REPLICATES, Loop, close_loop
-from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report import words as wording
 from accelstudy.diagnosis.report.document import (
     diagnosed_calibration,
@@ -39,49 +34,9 @@ from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.files.outputs import DIAGNOSIS, result_folder, whole_file
+from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
-from accelstudy.sensors.models import get_model
-
-
-def diagnose_folder(
-    campaign: str | Path,
-    out: str | Path,
-    model: str = "bias-scale-nonorthogonality",
-    approach: str | None = None,
-    seed: int = 1,
-    replicates: int = REPLICATES,
-    force: bool = False,
-    prior: str | Path | None = None,
-) -> Diagnosis:
-    """Diagnose a campaign folder, close the loop, and write all of it.
-
-    Parameters
-    ----------
-    campaign, out : paths of folders
-    model, approach : str, names; robot-aided by default if the campaign has a robot
-    seed : int
-    replicates : int, sessions simulated with the old and with the new model
-    force : bool, as in `accelstudy.files.outputs.result_folder`
-    prior : path of the file of a type, what is known of the sensor a priori
-
-    Raises
-    ------
-    InputError
-        If the input cannot be used, or `out` not be written; nothing is written then.
-    """
-    chosen = get_model(model), None if approach is None else get_approach(approach)
-    inputs = [campaign] if prior is None else [campaign, prior]
-    with result_folder(out, DIAGNOSIS, inputs, force) as folder, stage("diagnosis"):
-        # The diagnosis, not the reader, looks for wrong units and axes.
-        measured = with_type(read_campaign(campaign, plausible=False), prior, chosen[0])
-        with stage("search for what is missing"):
-            diagnosis = diagnose(measured, *chosen, seed=seed)
-        loop = close_loop(diagnosis, replicates, seed)
-        with stage("figures and page"):
-            write_diagnosis(diagnosis, folder, loop=loop, source=campaign, place=out)
-    return diagnosis
 
 
 def write_diagnosis(

@@ -1,0 +1,83 @@
+"""Commands on campaigns and their calibrations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from accelstudy.basics.progress import say, warn
+from accelstudy.commands.bridge import command
+from accelstudy.commands.options import retired_option
+from accelstudy.files import outputs
+from accelstudy.verbs import calibrations, sensors
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEVELED = (
+    "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the calibrated force in "
+    "frd (guide 'On a device'); `accelstudy apply` gives them with their sigmas"
+)
+"""What to do instead of `--level`."""
+
+
+def show_sigmas(table: pd.DataFrame) -> None:
+    """Print the check of sigmas."""
+    click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
+    say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
+    click.echo(table.attrs["finds"])
+
+
+def run_export(calibration: Path, form: str) -> None:
+    """Print a calibration in a form that a device takes, and warn of what the form cannot hold."""
+    from accelstudy.campaign.calibration.export import losses
+
+    text = calibrations.export(calibration, form=form)
+    content = calibrations.read_calibration(calibration).content
+    if mended := content.get("mended"):
+        warn(f"the calibration is of mended data: {mended['reason']}")
+    for loss in losses(content, form):
+        warn(loss)
+    click.echo(text, nl=False)
+
+
+CALIBRATE = command(
+    calibrations.calibrate,
+    "accelstudy calibrate my-campaign --out calibrated",
+    writes=outputs.CALIBRATION,
+)
+DIAGNOSE = command(
+    calibrations.diagnose,
+    "accelstudy diagnose my-campaign --out diagnosed",
+    writes=outputs.DIAGNOSIS,
+)
+LOT = command(
+    sensors.lot,
+    "accelstudy lot sensor-1 sensor-2 sensor-3 --out lot",
+    writes=outputs.LOT,
+)
+CHECK_SIGMAS = command(
+    calibrations.check_sigmas,
+    "accelstudy check-sigmas my-campaign --replicates 500",
+    show=show_sigmas,
+)
+EXPORT = command(
+    calibrations.export,
+    "accelstudy export calibrated/calibration.json --form c",
+    run=run_export,
+    angles=False,
+)
+retired_option("--level", LEVELED, is_flag=True)(EXPORT)
+COMPARE = command(
+    sensors.compare,
+    "accelstudy compare spring/calibration.json autumn/calibration.json --out both",
+    writes=outputs.COMPARISON,
+)
+HISTORY = command(
+    sensors.history,
+    "accelstudy history spring/calibration.json autumn/calibration.json "
+    "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years",
+    writes=outputs.HISTORY,
+)

@@ -1,0 +1,200 @@
+"""Verbs on a campaign and on its calibration."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING, Annotated
+
+from accelstudy.basics.bounds import Range
+from accelstudy.verbs.kinds import Approach, File, Model, Seed, verb
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from accelstudy.api.calibrations import Calibration
+    from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.campaign.session import Campaign
+
+
+@verb
+def calibrate(
+    campaign: Campaign | str | PathLike[str],
+    *,
+    model: Model = "bias-scale-nonorthogonality",
+    approach: Approach | None = None,
+    prior: File | None = None,
+) -> Calibration:
+    """Calibrate a campaign and report on it.
+
+    The folder of results gets report.html for you, calibration.json for `apply`, `export` and
+    programs, positions.parquet and figures. Parameters are in the axes frd (forward, right, down),
+    whatever those of the log are.
+
+    Parameters
+    ----------
+    campaign : Campaign or path
+        Folder of the campaign.
+    model : str
+        A model: one that `accelstudy models` lists, a composition, or a YAML file.
+    approach : str
+        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
+        campaign has its angles]
+    prior : path
+        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
+
+    Raises
+    ------
+    InputError
+        If the campaign does not determine the model, or a name is unknown.
+    """
+    from accelstudy.api.calibrations import Calibration, place_of, resolve
+    from accelstudy.campaign.calibration.fit import fit_campaign
+
+    fit = fit_campaign(*resolve(campaign, model, approach, prior))
+    return Calibration.of_fit(fit, place_of(campaign))
+
+
+@verb
+def read_calibration(path: str | PathLike[str]) -> Calibration:
+    """Read a calibration.json.
+
+    Parameters
+    ----------
+    path : path
+        The file, or the folder that has it.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not a calibration.
+    """
+    from accelstudy.api.calibrations import as_calibration
+
+    return as_calibration(path, "path")
+
+
+@verb
+def check_sigmas(
+    campaign: Campaign | str | PathLike[str],
+    *,
+    model: Model = "bias-scale-nonorthogonality",
+    approach: Approach | None = None,
+    replicates: Annotated[int, Range(2, 10**9)] = 2000,
+    seed: Seed = 1,
+) -> pd.DataFrame:
+    """Check the sigmas of a calibration by simulation.
+
+    The campaign is simulated with the noise that its sigmas are from. So the check finds whether
+    the adjustment turns that noise into the right sigmas, and not whether the noise is right.
+
+    Parameters
+    ----------
+    campaign : Campaign or path
+        Folder of the campaign that is calibrated.
+    model : str
+        A model: one that `accelstudy models` lists, a composition, or a YAML file.
+    approach : str
+        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
+        campaign has its angles]
+    replicates : int
+        Simulated campaigns.
+    seed : int
+        Seed of all random numbers.
+
+    Returns
+    -------
+    DataFrame
+        A row per parameter, in the units that people read: parameter, unit, estimate, sigma (as the
+        adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
+        sd_empirical) and n_converged. What such a check can find is said in ``attrs["finds"]``.
+    """
+    from accelstudy.api.calibrations import resolve
+    from accelstudy.campaign.calibration import sigma_check
+    from accelstudy.campaign.calibration.fit import fit_campaign
+
+    fit = fit_campaign(*resolve(campaign, model, approach))
+    table = sigma_check.check_sigmas(fit, replicates, seed)
+    table.attrs["finds"] = sigma_check.what_it_finds(fit)
+    return table
+
+
+@verb
+def export(calibration: Calibration | str | PathLike[str], *, form: str = "json") -> str:
+    """Print a calibration in a form that a device takes.
+
+    json and yaml carry every effect: parameters with sigmas and units, and the formulas to
+    implement. matrix holds M in force = M · (x, y, z, 1), if nothing but the force matters, and
+    that linearly.
+
+    c is a header in C99 with the function accel_calibrate. It takes the reading and, where effects
+    depend on them, temperature, time and vibration. What depends on the position before is refused.
+
+    px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
+    axis, closest to the calibration over all attitudes. What PX4 cannot hold is said, with the
+    errors of roll and pitch that it leaves.
+
+    Readings and forces are in the axes of the log.
+
+    Parameters
+    ----------
+    calibration : Calibration or path
+        A calibration.json.
+    form : str
+        Form: json, yaml, c, matrix or px4.
+
+    Returns
+    -------
+    str
+        Text of a file.
+    """
+    from accelstudy.api.calibrations import as_calibration
+
+    return as_calibration(calibration).export(form)
+
+
+@verb
+def diagnose(
+    campaign: Campaign | str | PathLike[str],
+    *,
+    model: Model = "bias-scale-nonorthogonality",
+    approach: Approach | None = None,
+    prior: File | None = None,
+    seed: Seed = 1,
+    replicates: Annotated[int, Range(100, 10**9)] = 1000,
+) -> Diagnosis:
+    """Find what a sensor model lacks to explain a campaign.
+
+    Missing effects, wrong noise and gross errors are told apart. What is missing is added to the
+    model, and tested on positions that were not used.
+
+    Parameters
+    ----------
+    campaign : Campaign or path
+        Folder of the campaign.
+    model : str
+        A model: one that `accelstudy models` lists, a composition, or a YAML file.
+    approach : str
+        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
+        campaign has its angles]
+    prior : path
+        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
+    seed : int
+        Seed of all random numbers.
+    replicates : int
+        Sessions simulated with either model; fewer beyond 500 positions.
+
+    Raises
+    ------
+    InputError
+        If the campaign does not determine the model, or a name is unknown.
+    """
+    from accelstudy.api.calibrations import place_of, resolve
+    from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.basics.progress import stage
+    from accelstudy.diagnosis.pipeline import diagnose as diagnosed
+
+    # The diagnosis, not the reader, looks for wrong units and axes.
+    given = resolve(campaign, model, approach, prior, plausible=False)
+    with stage("search for what is missing"):
+        found = diagnosed(*given, seed=seed)
+    return Diagnosis(found, seed, replicates, place_of(campaign))

@@ -1,0 +1,205 @@
+"""Verbs on several calibrations or campaigns: of one sensor over time, or of one type."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError
+from accelstudy.verbs.kinds import Accuracy, Approach, Model, Seed, Share, Tilt, in_si, paths, verb
+
+if TYPE_CHECKING:
+    from accelstudy.api.calibrations import Calibration
+    from accelstudy.api.epochs import Comparison, History
+    from accelstudy.api.lots import Lot
+    from accelstudy.campaign.session import Campaign
+
+
+@verb
+def compare(
+    first: Calibration | str | PathLike[str],
+    second: Calibration | str | PathLike[str],
+    *,
+    tilt_range: Tilt = "50gon",
+) -> Comparison:
+    """Say whether a sensor is still what it was.
+
+    The congruence test of deformation analysis takes all parameters with both covariance matrices;
+    if it rejects, the parameters that changed are named, at one level for all. The change is also
+    given in roll and pitch. If one calibration has effects that the other lacks, it is brought to
+    those of both.
+
+    The folder of results gets report.html, comparison.json and a figure.
+
+    Parameters
+    ----------
+    first : Calibration or path
+        The older calibration.json.
+    second : Calibration or path
+        The newer one.
+    tilt_range : float in rad, or str with a unit
+        Tilts over which the change of roll and pitch is taken.
+
+    Raises
+    ------
+    InputError
+        If they are not of one sensor, or have no effect in common.
+    """
+    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.api.epochs import Comparison
+    from accelstudy.epochs.comparison import compare as compared
+
+    pair = as_calibration(first, "first"), as_calibration(second, "second")
+    return Comparison(compared(*pair, in_si(tilt_range)))
+
+
+@verb
+def history(
+    calibrations: Sequence[Calibration | str | PathLike[str]],
+    *,
+    dates: Sequence[str | datetime] = (),
+    tilt_accuracy: Accuracy | None = None,
+    tilt_range: Tilt = "50gon",
+    confidence: Annotated[float | str, Share()] = "95%",
+) -> History:
+    """Say how a sensor changes over time.
+
+    For each parameter there is a rate with its interval, and the scatter from session to session,
+    as by switching the sensor off and on. All tests together have one level. If calibrations differ
+    in their effects, they are brought to those that all of them have.
+
+    With `tilt_accuracy` it says how long the last calibration is good enough, and what a new one
+    would gain.
+
+    The folder of results gets report.html, history.json, history.parquet and a figure.
+
+    Parameters
+    ----------
+    calibrations : sequence of Calibration or path
+        Three or more calibration.json files of one sensor.
+    dates : sequence of str or datetime
+        Date of a calibration, as 2026-03-01 or 2026-03-01T14:00; one for each, in their order.
+        [default: those of the campaigns]
+    tilt_accuracy : float in rad, or str with a unit
+        Ask how long the last calibration stays this accurate in roll and pitch, as 10mgon.
+    tilt_range : float in rad, or str with a unit
+        Largest tilt at which the accuracy is wanted.
+    confidence : float or str
+        Probability with which it stays so.
+
+    Raises
+    ------
+    InputError
+        If they are fewer than three, of one date, or not of one sensor.
+    """
+    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.api.epochs import History, follow
+    from accelstudy.epochs.interval import Interval
+
+    _once(paths(calibrations), "calibration")
+    course = follow([as_calibration(one) for one in calibrations], dates, calibrations)
+    if tilt_accuracy is None:
+        return History(course, None)
+    wanted = in_si(tilt_accuracy), in_si(tilt_range), in_si(confidence)
+    return History(course, Interval(course, *wanted))
+
+
+@verb
+def lot(
+    campaigns: Sequence[Campaign | str | PathLike[str]],
+    *,
+    model: Model = "bias-scale-nonorthogonality",
+    approach: Approach | None = None,
+    seed: Seed = 1,
+    cores: Annotated[int, Range(1, 10_000)] = 1,
+) -> Lot:
+    """Say what the model of sensors of one type lacks.
+
+    The campaigns may differ in positions, columns and approach. What one campaign alone cannot
+    show, many show together: whether anything is missing in the lot, at one level for all, in how
+    many of the sensors, how large it is, and which sensor is odd.
+
+    The folder of results gets report.html, lot.json, a figure, a calibration.json of each sensor
+    with all that the model lacks, and type.yaml: the model of the type for `--model`, what these
+    sensors tell of the next one for `--prior`, and a data sheet for `plan --sensor`.
+
+    Parameters
+    ----------
+    campaigns : sequence of Campaign or path
+        Folders of campaigns, one per sensor, patterns such as 'sensor-*', or the list of a batch
+        (a YAML file).
+    model : str
+        A model: one that `accelstudy models` lists, a composition, or a YAML file.
+    approach : str
+        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
+        campaign has its angles]
+    seed : int
+        Seed of all random numbers.
+    cores : int
+        Processes that work at once; the results do not depend on it.
+
+    Raises
+    ------
+    InputError
+        If fewer than two campaigns can be judged, or a name is unknown.
+    """
+    from accelstudy.api.calibrations import as_campaign, chosen
+    from accelstudy.api.lots import Lot
+    from accelstudy.lots.run import FEWEST, evaluate_lot
+
+    given = [one for each in campaigns for one in folders_of(each)]
+    _once(paths(given), "sensor")
+    if len(given) < FEWEST:
+        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+    measured = [as_campaign(one) for one in given]
+    return Lot(evaluate_lot(measured, *chosen(model, approach), seed, cores))
+
+
+def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
+    """Folders of a pattern, or of the list of a batch; anything else stands for itself."""
+    from glob import glob, has_magic
+
+    from accelstudy.basics.names import natural
+
+    if not isinstance(given, str | PathLike):
+        return [given]
+    path = Path(given)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        return [*_listed(path)]
+    if path.exists() or not has_magic(str(path)):
+        return [path]
+    found = sorted((path for path in map(Path, glob(str(path))) if path.is_dir()), key=natural)
+    if not found:
+        raise InputError(f"{given}: no folder has such a name")
+    return [*found]
+
+
+def _listed(path: Path) -> list[Path]:
+    """Folders of the campaigns that the list of a batch names."""
+    from accelstudy.basics.plugins import only_named
+    from accelstudy.campaign.batch.config import parse_batch
+    from accelstudy.files.reading import read_layer
+
+    content = read_layer(path)
+    with only_named(content, path):
+        tasks = parse_batch({**content, "plugins": []}, str(path)).tasks()
+    for task in tasks:
+        if task.kind != "campaign":
+            raise InputError(
+                f"{path}: {task.source}: is a {task.kind}; only campaigns can be in a lot here. "
+                "Import it, or run the workflow of the campaigns with a section `lot`"
+            )
+    return [Path(task.source) for task in tasks]
+
+
+def _once(given: Sequence[str | PathLike[str]], what: str) -> None:
+    """Raise `InputError` if a path is given twice of which each stands for one thing."""
+    seen = set()
+    for path in given:
+        if (place := Path(path).resolve()) in seen:
+            raise InputError(f"{path}: is given twice; each {what} counts once")
+        seen.add(place)
