@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from accelstudy.api.epochs import Comparison, History
     from accelstudy.api.logs import Log, read_log
     from accelstudy.api.lots import Lot
-    from accelstudy.api.plans import Plan, plan
+    from accelstudy.api.plans import Plan
     from accelstudy.api.simulations import Simulation, simulate
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.session import Campaign
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         export,
         read_calibration,
     )
+    from accelstudy.verbs.planning import plan
     from accelstudy.verbs.sensors import compare, history, lot
 
     __version__: str
@@ -38,12 +39,13 @@ _PLACES = {
     "api.epochs": ("Comparison", "History"),
     "api.logs": ("Log", "read_log"),
     "api.lots": ("Lot",),
-    "api.plans": ("Plan", "plan"),
+    "api.plans": ("Plan",),
     "api.simulations": ("Simulation", "simulate"),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
     "study.run": ("run_study",),
     "verbs.calibrations": ("calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
+    "verbs.planning": ("plan",),
     "verbs.sensors": ("compare", "history", "lot"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}

@@ -2,53 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.given import (
-    drawing,
-    each,
-    for_programs,
-    names,
-    path_of,
-    quantity,
-    whole,
-)
-from accelstudy.basics import bounds
-from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.api.given import drawing
+from accelstudy.api.results import Result
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, show
+from accelstudy.basics.suggested import study_again
 from accelstudy.drawing.style import FULL
-from accelstudy.pages.notebook import notebook_html
-from accelstudy.planning.answer import Answer, answer
+from accelstudy.files.outputs import PLAN
+from accelstudy.planning.answer import Answer
 from accelstudy.planning.figure import draw_plan
-from accelstudy.planning.output import plan_table
-from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
-from accelstudy.planning.question import confidence_of, question_of
-from accelstudy.planning.wording import answer_lines, unreachable
+from accelstudy.planning.output import plan_files, plan_table
+from accelstudy.planning.wording import (
+    answer_lines,
+    assumption_lines,
+    how_to,
+    reason_lines,
+    table_lines,
+    unreachable,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-EQUIPMENT = ("gravity", "robot", "both")
-_MORE = (
-    "tilt_range",
-    "max_time",
-    "moving_time",
-    "robot_moving_time",
-    "robot_setup_time",
-    "robot_accuracy",
-)
+SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
 
 
-_OPTIONAL = ("sigma", "max_time")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Plan:
+class Plan(Result):
     """The cheapest calibrations for a tilt accuracy.
 
     Attributes
@@ -56,14 +41,25 @@ class Plan:
     answer : accelstudy.planning.answer.Answer, all of it
     """
 
-    answer: Answer
+    kind = PLAN
 
-    def __repr__(self) -> str:
-        return f"Plan({self.verdict!r})"
+    def __init__(self, answer: Answer) -> None:
+        self.answer = answer
 
-    def _repr_html_(self) -> str:
-        columns = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
-        return notebook_html("Plan", self.verdict, self.table[columns])
+    @property
+    def exit_status(self) -> int:  # type: ignore[override]
+        """1 if nothing reaches the accuracy."""
+        return 0 if self.answer.ranked else 1
+
+    @property
+    def name(self) -> str:
+        """Name of the sensor."""
+        return self.answer.question.sheet.name
+
+    @property
+    def state(self) -> str:
+        """Whether a calibration reaches the accuracy: reached or unreachable."""
+        return "reached" if self.answer.ranked else "unreachable"
 
     @property
     def verdict(self) -> str:
@@ -71,6 +67,12 @@ class Plan:
         return answer_lines(self.answer)[0] if self.answer.ranked else unreachable(self.answer)
 
     @property
+    def content(self) -> dict[str, Any]:
+        """State, verdict and the cheapest calibrations."""
+        calibrations = self.table.reset_index().to_dict("records")
+        return {"state": self.state, "verdict": self.verdict, "calibrations": calibrations}
+
+    @cached_property
     def compared(self) -> pd.DataFrame:
         """All calibrations that were compared, with their units in the names of the columns."""
         return plan_table(self.answer)
@@ -80,74 +82,38 @@ class Plan:
         """The cheapest calibrations that reach the accuracy, by rank."""
         return self.compared.dropna(subset="rank").set_index("rank").sort_index()
 
+    def to_frame(self) -> pd.DataFrame:
+        """Return what the cheapest calibrations take, by rank; `table` has all that is known."""
+        return self.table[SHOWN]
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the tilt error left over the time in the field."""
         with drawing(ax, FULL, 95) as ax:
             draw_plan(ax, self.answer)
         return ax
 
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy plan` does; raises `InputError` if nothing is reached."""
+        if not self.answer.ranked:
+            raise InputError(self.verdict)
+        plan_files(self.answer, folder, {"config_hash": None, "seed": self.answer.seed}, place)
 
-@for_programs
-def plan(
-    *,
-    tilt_accuracy: float | str,
-    sigma: float | str | None = None,
-    sensor: str | None = None,
-    equipment: str = "both",
-    confidence: float | str | None = None,
-    holds: float | str | Sequence[float | str] = (),
-    schemes: str | Sequence[str] = (),
-    reference: str | Path | None = None,
-    max_positions: int = 200,
-    replicates: int = 200,
-    seed: int = 1,
-    **quantities: Any,
-) -> Plan:
-    """Find the cheapest calibration for a tilt accuracy.
-
-    Parameters
-    ----------
-    tilt_accuracy : float in rad or str with a unit, of roll and of pitch
-    sigma : float in m/s² or str with a unit, of the mean of a position
-    sensor : str, instead of `sigma`: a data sheet, a YAML file, or the folder of a campaign
-    equipment : "gravity", "robot" or "both"
-    confidence : float or str, share of the calibrations that must reach the accuracy, 0.95 or
-        "95%"; None for the rms
-    holds : durations of a hold that are tried, in s or with a unit
-    schemes : names or files of further schemes
-    reference : path of the calibration.json of a sensor beside it, or "alike"
-    max_positions, replicates, seed : int
-    quantities
-        In SI or with a unit: ``tilt_range``, ``max_time``, ``moving_time``, ``robot_moving_time``,
-        ``robot_setup_time``, ``robot_accuracy``; see ``accelstudy plan --help``.
-
-    Raises
-    ------
-    InputError
-        If a quantity or a name is wrong, or not one of `sigma` and `sensor` is given.
-    """
-    if equipment not in EQUIPMENT:
-        raise UnknownNameError("equipment", equipment, EQUIPMENT)
-    for key in quantities:
-        if key not in _MORE:
-            raise UnknownNameError("quantity", key, _MORE)
-    given = {"tilt_accuracy": tilt_accuracy, "sigma": sigma}
-    given |= {key: QUANTITIES[key].usual or None for key in _MORE} | quantities
-    in_si: dict[str, Any] = dict.fromkeys(_OPTIONAL) | {
-        key: quantity(key, value, QUANTITIES[key])
-        for key, value in given.items()
-        if value is not None or key not in _OPTIONAL
-    }
-    question = question_of(
-        **in_si,
-        sensor=None if sensor is None else str(path_of("sensor", sensor)),
-        equipment=equipment,
-        confidence=None if confidence is None else confidence_of(str(confidence)),
-        holds=[quantity("holds", hold, QUANTITIES["hold"]) for hold in each(holds)],
-        schemes=names("schemes", schemes),
-        reference=None if reference is None else str(path_of("reference", reference)),
-        max_positions=whole("max_positions", max_positions, Range(*MOST_POSITIONS)),
-    )
-    whole("seed", seed, bounds.SEED)
-    whole("replicates", replicates, Range(*REPLICATES))
-    return Plan(answer(question, seed, replicates))
+    def tell(self, place: Path | None) -> None:
+        """Print the answer, the table and the assumptions."""
+        if not self.answer.ranked:
+            show(self.verdict)
+            return
+        for line in (*answer_lines(self.answer), "", *how_to(self.answer)):
+            show(line)
+        for line in ("", *table_lines(self.answer), "", *reason_lines(self.answer)):
+            say(line)
+        for line in ("", *assumption_lines(self.answer.question)):
+            say(line)
+        if place is None:
+            say(
+                "\n--out FOLDER keeps the table, the figure, and a study that makes the numbers "
+                "again."
+            )
+            return
+        say(f"\nplan, table and figure: {place}")
+        say(f"the same numbers again: {study_again(place / 'study.yaml')}")

@@ -25,11 +25,13 @@ class Result(ABC):
     """
 
     kind: ClassVar[Kind]
+    exit_status = 0
+    """Of the command; where it is not 0, there is nothing to write."""
 
     @property
     @abstractmethod
     def content(self) -> Mapping[str, Any]:
-        """Content of the JSON file that `save` writes."""
+        """Content of the JSON file that `save` writes, or what it would say if there is none."""
 
     @property
     @abstractmethod

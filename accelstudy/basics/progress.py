@@ -1,8 +1,8 @@
 """What a command reports while it works: lines and, for long work, bars on a terminal.
 
 A function reports by `track` and `stage`, wherever it stands. They show nothing unless a command
-asks for it by `feedback`, so that the package is silent when it is used from Python. `say` and
-`begin` are for commands themselves: they print unless `feedback` is quiet.
+asks for it by `feedback`, so that the package is silent when it is used from Python. `say` is
+for commands themselves: it prints unless `feedback` is quiet.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from accelstudy.basics.errors import printable
+from accelstudy.basics.errors import BY_COMMAND, printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -58,7 +58,7 @@ def show(text: str) -> None:
 
 def begin(text: str) -> None:
     """Say on standard error that long work begins, where no bar can show it: it is no terminal."""
-    if not _quiet.get() and not sys.stderr.isatty():
+    if BY_COMMAND.get() and not _quiet.get() and not sys.stderr.isatty():
         click.echo(text, err=True)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from glob import glob, has_magic
 from importlib import import_module
 from pathlib import Path
@@ -35,6 +36,8 @@ def command(
     *examples: str,
     name: str = "",
     writes: Kind | None = None,
+    out: str = "Folder to write to.",
+    optional: bool = False,
     sections: Mapping[str, Sequence[str]] | None = None,
     show: Callable[..., None] = click.echo,
     run: Callable[..., None] | None = None,
@@ -49,6 +52,8 @@ def command(
     examples : str, for the end of its help: commands that run as they stand
     name : str, of the command; that of the verb if omitted
     writes : Kind, of the folder that --out names, if the verb has a result with files
+    out : str, help of --out
+    optional : bool, whether nothing is written without --out
     sections : mapping of a title of the help to names of keywords, in the order of the help
     show : function that prints what the verb returns, where this is not a result with files
     run : function that does all of it, with the verb's parameters and with those of `options`
@@ -67,10 +72,12 @@ def command(
             else:
                 _save(verb, places, given, writes)
 
-    own = [_option(one) for one in keywords]
+    own = [_option(one, verb) for one in keywords]
     terminal = [_QUIET] if not angles else [_ANGLE_UNIT, _QUIET]
     if writes is not None:
-        own, terminal = [_OUT, *own], [_FORCE, *terminal]
+        own, terminal = own, [_FORCE, *terminal]
+        place = click.Option(["--out"], type=PATH, required=not optional, help=out)
+        own, terminal = ([*own], [place, *terminal]) if optional else ([place, *own], terminal)
     return Command(
         name or str(verb.__name__).replace("_", "-"),
         callback=act,
@@ -92,10 +99,17 @@ def _save(
 ) -> None:
     """Call a verb, write its result to --out, and print what it says."""
     out, force = given.pop("out"), given.pop("force")
+    named = {one.name for one in kinds.keywords(verb) if getattr(one.kind, "files", False)}
     inputs = [path for value in given.values() for path in _paths(value)]
-    with result_folder(out, writes, inputs, force) as folder, stage(writes.name):
+    inputs += [Path(given[name]) for name in named if isinstance(given[name], str)]
+    place = nullcontext() if out is None else result_folder(out, writes, inputs, force)
+    with place as folder, stage(writes.name):
         result = _call(verb, places, given)
-        result.write(folder, out)
+        if result.exit_status:
+            result.tell(None)
+            raise click.exceptions.Exit(result.exit_status)
+        if folder is not None:
+            result.write(folder, out)
     result.tell(out)
 
 
@@ -197,7 +211,6 @@ _QUIET = click.Option(["--quiet"], is_flag=True, help="Print only the result and
 _FORCE = click.Option(
     ["--force"], is_flag=True, help="Overwrite files of the same names, but never an input."
 )
-_OUT = click.Option(["--out"], type=PATH, required=True, help="Folder to write to.")
 _ANGLE_UNIT = click.Option(
     ["--angle-unit"],
     type=Text(Names("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS")),
@@ -227,7 +240,7 @@ def _metavar(parameter: inspect.Parameter) -> str:
     return (parameter.name.removesuffix("s") if many else parameter.name).upper()
 
 
-def _option(keyword: Keyword) -> click.Option:
+def _option(keyword: Keyword, verb: Verb) -> click.Option:
     """Option of a keyword."""
     default = None if keyword.default is inspect.Parameter.empty else keyword.default
     return click.Option(
@@ -238,7 +251,7 @@ def _option(keyword: Keyword) -> click.Option:
         required=keyword.default is inspect.Parameter.empty,
         default=default,
         show_default=default not in (None, (), False),
-        help=keyword.help.replace(" [default", "  [default"),
+        help=_spelled(keyword.help, verb).replace(" [default", "  [default"),
     )
 
 
@@ -251,7 +264,7 @@ def _type(kind: Any) -> Any:
         case Names() | Share():
             return Text(kind)
         case Range(least=least, most=most):
-            return Whole(int(least), int(most) if most < 1e6 else None)
+            return Whole(int(least), int(most) if most <= 1e6 else None)
         case Place():
             return PATH
     return kind

@@ -13,15 +13,6 @@ from accelstudy.basics.errors import BY_COMMAND, InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.commands.advise import advise_command
 from accelstudy.commands.apply import apply_command
-from accelstudy.commands.calibrations import (
-    CALIBRATE,
-    CHECK_SIGMAS,
-    COMPARE,
-    DIAGNOSE,
-    EXPORT,
-    HISTORY,
-    LOT,
-)
 from accelstudy.commands.cells import cells_command
 from accelstudy.commands.claims import claims_command
 from accelstudy.commands.config_schema import config_schema_command
@@ -33,11 +24,20 @@ from accelstudy.commands.importing import import_command
 from accelstudy.commands.init import init_command
 from accelstudy.commands.models import models_command
 from accelstudy.commands.options import ANGLE_UNIT, plugin_option
-from accelstudy.commands.plan import plan_command
 from accelstudy.commands.public import public_command
 from accelstudy.commands.scheme import scheme_command
 from accelstudy.commands.schemes import schemes_command
 from accelstudy.commands.simulate_campaign import simulate_campaign_command
+from accelstudy.commands.verbs import (
+    CALIBRATE,
+    CHECK_SIGMAS,
+    COMPARE,
+    DIAGNOSE,
+    EXPORT,
+    HISTORY,
+    LOT,
+    PLAN,
+)
 
 SECTIONS: dict[str, tuple[click.Command, ...]] = {
     "Campaigns, measured or simulated": (
@@ -55,7 +55,7 @@ SECTIONS: dict[str, tuple[click.Command, ...]] = {
         HISTORY,
     ),
     "Before a calibration, and what it is worth": (
-        plan_command,
+        PLAN,
         data_sheet_command,
     ),
     "What there is to choose from": (

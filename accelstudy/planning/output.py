@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
-from accelstudy.files.outputs import PLAN, result_folder
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.config import PlanCase
@@ -37,24 +36,6 @@ STUDY_HEAD = """\
 # numbers: {command}
 """
 ANGLES = ("roll", "pitch")
-
-
-def write_plan(
-    answer: Answer,
-    out: str | Path,
-    provenance: Mapping[str, Any],
-    inputs: Iterable[str | Path] = (),
-    force: bool = False,
-) -> None:
-    """Write the files of a plan that reaches its target into a folder.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written, or holds files that must not be overwritten.
-    """
-    with result_folder(out, PLAN, inputs, force) as folder:
-        plan_files(answer, folder, provenance, shown=Path(out))
 
 
 def make_plan(

@@ -55,7 +55,7 @@ class Share:
         """Share, None for the rms."""
         from accelstudy.planning.question import confidence_of
 
-        of_type(name, value, float, str, expected="a probability, as 0.95 or 95%")
+        of_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
         share = confidence_of(str(value).strip())
         if share is None and not self.rms:
             raise InputError(f"{name}: a probability, such as 95%, not rms")
@@ -66,7 +66,7 @@ EFFECTS = Names("effect", "accelstudy.effects", "effect_names")
 Approach = Annotated[str, Names("approach", "accelstudy.approaches", "approach_names")]
 Model = Annotated[str, Names("model", "accelstudy.sensors.models", "MODELS", True, EFFECTS)]
 Scheme = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
-Sensor = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names")]
+Sensor = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
 File = Annotated[str | PathLike[str], Place()]
 Seed = Annotated[int, bounds.SEED]
 Quantity = float | str

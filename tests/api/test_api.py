@@ -230,7 +230,7 @@ WRONG = {
     "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, confidence=2)": "confidence: must be rms, or a share",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
-    "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected a name",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected the name of a scheme",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, holds='10')": "holds: expected a number with its unit",
     "acs.plan(tilt_accuracy='10', sigma=0.002)": "tilt_accuracy: expected a number with its unit",
     "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",

@@ -1,4 +1,4 @@
-"""Commands on campaigns and their calibrations."""
+"""Commands for which a verb is enough."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from accelstudy.basics.progress import say, warn
 from accelstudy.commands.bridge import command
 from accelstudy.commands.options import retired_option
 from accelstudy.files import outputs
-from accelstudy.verbs import calibrations, sensors
+from accelstudy.verbs import calibrations, planning, sensors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,4 +80,30 @@ HISTORY = command(
     "accelstudy history spring/calibration.json autumn/calibration.json "
     "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years",
     writes=outputs.HISTORY,
+)
+PLAN = command(
+    planning.plan,
+    "accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2",
+    writes=outputs.PLAN,
+    out="Folder for the table, the figure and a study.",
+    optional=True,
+    sections={
+        "What is asked": (
+            "tilt_accuracy",
+            "tilt_range",
+            "sensor",
+            "sigma",
+            "history",
+            "equipment",
+            "reference",
+            "confidence",
+        ),
+        "What is tried": ("holds", "schemes", "max_time", "max_positions", "replicates", "seed"),
+        "What the equipment takes": (
+            "moving_time",
+            "robot_moving_time",
+            "robot_setup_time",
+            "robot_accuracy",
+        ),
+    },
 )
