@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from os import PathLike
 from pathlib import Path
@@ -12,7 +13,7 @@ from pydantic import ConfigDict, create_model
 from accelstudy.api.given import GRAVITY, for_programs, names, path_of, python_words, quantity
 from accelstudy.api.logs import Log, log_of
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import Given
+from accelstudy.basics.units import STANDARD_GRAVITY, Given
 from accelstudy.campaign.format import read_campaign as read_folder
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import parse_settings
@@ -84,25 +85,93 @@ def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Cam
 
 
 @for_programs
-def simulate_campaign(**settings: Any) -> Campaign:
-    """Simulate a campaign.
+def simulate_campaign(
+    *,
+    name: str = "simulated",
+    seed: int = 1,
+    scheme: str = "mclaren-24",
+    repeats: int = 1,
+    repeat_first: int = 0,
+    order: str = "scheme",
+    approach: str = "robot",
+    model: str = "bias-scale-nonorthogonality",
+    effects: str | Sequence[str] = (),
+    size: float = 1.0,
+    noise_effects: str | Sequence[str] = (),
+    gross_errors: str | Sequence[str] = (),
+    sigma: float | str = 0.002,
+    sigma_known: bool = True,
+    sigma_angle: float | str = "3.2 mgon",
+    gravity: float | str = STANDARD_GRAVITY,
+    interval: float | str | None = 60.0,
+    temperature: tuple[float, float] | None = None,
+    temperature_order: str = "linear",
+    vibration: tuple[float, float] | None = None,
+    yaw: str = "none",
+    n_samples: int | None = None,
+) -> Campaign:
+    """Simulate a campaign with effects of your choice.
+
+    What is not given is drawn at random, from the seed.
 
     Parameters
     ----------
-    settings
-        Those of `accelstudy.campaign.simulated.CampaignSettings`. Quantities may be texts with
-        their units, and a single effect stands for a list of one.
+    name : str
+        Name of the campaign.
+    seed : int
+        Seed of all random numbers.
+    scheme : str
+        Positions: a name that `accelstudy schemes` lists, or a file.
+    repeats : int
+        How often the scheme is measured.
+    repeat_first : int
+        First holds that are measured again at the end.
+    order : str
+        Order of the holds: scheme or random.
+    approach : str
+        By gravity alone, or with the angles of a robot, too.
+    model : str
+        Effects that the sensor has; their parameters are drawn, of typical size.
+    effects : str, or several
+        Effects beside the model, as "warm_up(tau=400)" or, with their parameters in SI,
+        "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it.
+    size : float
+        Factor of the typical size of each effect without parameters.
+    noise_effects : str, or several
+        As "heavy_tails(nu=3)".
+    gross_errors : str, or several
+        As "row_order(first=3, second=4)".
+    sigma : float in m/s², or str with a unit
+        Standard deviation of a position's mean.
+    sigma_known : bool
+        Whether the campaign states it.
+    sigma_angle : float in rad, or str with a unit
+        Standard deviation of the robot's roll and pitch.
+    gravity : float in m/s², or str with a unit
+        Local gravity.
+    interval : float in s, or str with a unit
+        Time between holds; without time if None.
+    temperature : two of float, °C
+        First and last temperature.
+    temperature_order : str
+        Course of the temperature: linear, ABBA or random.
+    vibration : two of float, m/s²
+        Lowest and highest rms.
+    yaw : str
+        Yaw of the holds: none or random.
+    n_samples : int
+        Samples of a hold; adds columns on them.
 
     Raises
     ------
     InputError
-        If a setting is unknown or wrong.
+        If a name is unknown or a value is wrong.
     """
+    settings = dict(locals())
     for key, given in _QUANTITIES.items():
-        if settings.get(key) is not None:
+        if settings[key] is not None:
             settings[key] = quantity(key, settings[key], given)
     for key in _NAMES:
-        if key in settings:
-            settings[key] = names(key, settings[key])
+        settings[key] = names(key, settings[key])
     content = checked(_Settings, settings, "simulate_campaign")
     return simulated(CampaignSettings(**content.model_dump()))[0]

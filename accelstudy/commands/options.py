@@ -15,7 +15,7 @@ from click.shell_completion import CompletionItem
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.progress import feedback
-from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, Given, angles_in, parse_quantity
+from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in, parse_quantity
 
 
 class _Path(click.Path):
@@ -97,21 +97,6 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
             raise InputError(f"{param.opts[0]}: {error}" if param else str(error)) from None
 
 
-def quantity_option(
-    name: str, given: Given, *names: str, **options: Any
-) -> Callable[[Command], Command]:
-    """Add the option of a quantity; further names and options are those of `click.option`."""
-    if given.usual:
-        options |= {"default": given.usual, "show_default": True}
-    return click.option(
-        f"--{name.replace('_', '-')}",
-        *names,
-        type=Quantity(given.unit, given.least, given.most),
-        help=given.help,
-        **options,
-    )
-
-
 class SchemeName(Name):
     """A scheme: a name, or a file, of which the shell completes paths if no name fits."""
 
@@ -166,18 +151,6 @@ def approach_option(default: str | None) -> Callable[[Command], Command]:
         help=f"Calibrate by gravity alone, or with the angles of a robot, too.{words}",
     )
 
-
-prior_option = click.option(
-    "--prior",
-    type=PATH,
-    help="The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
-)
-
-history_option = click.option(
-    "--history",
-    type=PATH,
-    help="A history.json of this sensor: drift and switch-on scatter of its bias.",
-)
 
 force_option = click.option(
     "--force",
@@ -288,15 +261,6 @@ class Sectioned(click.Command):
         for title, records in (*sections.items(), ("Other options", list(rows.values()))):
             with formatter.section(title):
                 formatter.write_dl(records)
-
-
-def given_once(paths: Sequence[Path], what: str) -> None:
-    """Raise `InputError` if a path is given twice of which each stands for one thing."""
-    seen = set()
-    for path in paths:
-        if (place := path.resolve()) in seen:
-            raise InputError(f"{path}: is given twice; each {what} counts once")
-        seen.add(place)
 
 
 def example(*commands: str) -> str:

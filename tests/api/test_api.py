@@ -224,7 +224,6 @@ WRONG = {
     "acs.simulate_campaign(sigma='2')": "sigma: expected a number with its unit",
     "acs.simulate_campaign(effects=3)": "effects: expected a name, or several",
     "acs.simulate_campaign(temperature=20)": "temperature: must be a list",
-    "acs.simulate_campaign(colour=1)": "colour: unknown key (known: name",
     "acs.calibrate(3)": "campaign: expected a Campaign",
     "acs.diagnose({})": "campaign: expected a Campaign",
     "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",

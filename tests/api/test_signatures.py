@@ -1,6 +1,7 @@
 """Commands are made of functions: the same words, the same defaults, the same errors."""
 
 import inspect
+from dataclasses import fields
 from typing import Any
 
 import click
@@ -10,6 +11,7 @@ from calling import refusal
 import accelstudy
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import Given
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.verbs import kinds
 
@@ -60,3 +62,12 @@ def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
         option = f"--{keyword.option.replace('_', '-')}"
         assert line == str(refused.value).replace(keyword.name, option, 1)
         assert line.startswith(f"{option}: ")
+
+
+def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() -> None:
+    one = accelstudy.simulate_campaign(seed=3)
+    other, _ = simulate_campaign(CampaignSettings(seed=3))
+    assert one.forces.tolist() == other.forces.tolist()
+    assert one.angles.tolist() == other.angles.tolist()
+    keywords = inspect.signature(accelstudy.simulate_campaign).parameters
+    assert [*keywords] == [each.name for each in fields(CampaignSettings)]
