@@ -21,8 +21,13 @@ from accelstudy.campaign.importing.logs import open_layout
 from accelstudy.campaign.importing.making import ImportReport, shown
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, Log, locate
-from accelstudy.campaign.importing.segments import WANDERING, GrowingHold, Segment
-from accelstudy.campaign.importing.windows import surveyed, usual_window
+from accelstudy.campaign.importing.segments import WANDERING, Segment, at_range
+from accelstudy.campaign.importing.windows import (
+    Windows,
+    choose_threshold,
+    samples_in,
+    usual_window,
+)
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
@@ -105,7 +110,8 @@ class Beside:
         segments, lost = self._segments(log, holds)
         means = np.array([segment.mean for segment in segments.values()])
         self._check_size(means, gravity)
-        ((_, rest),) = surveyed([self.log], usual_window(self.log), None)
+        windows = Windows(self.log, samples_in(self.log, usual_window(self.log)))
+        rest = choose_threshold(windows)
         moving = [n for n, s in segments.items() if s.variance > (WANDERING * rest.sd) ** 2]
         if len(moving) > len(segments) / 2:
             raise InputError(
@@ -123,32 +129,24 @@ class Beside:
         self, log: Log, holds: DetectedHolds
     ) -> tuple[dict[int, Segment], dict[int, str]]:
         """Samples of the reference in the holds of a log, and why there are none in others."""
-        content, shift = self.calibration.content, self._shift(log)
-        ends = np.array([[[-np.inf] * 3] * 2, [[np.inf] * 3] * 2])
-        full_range, mended = content.get("range_mps2") or np.inf, mending(content)
-        growing = {n: GrowingHold(0, 0, ends, full_range, 0) for n in holds.segments}
-        first, last = np.inf, -np.inf
-        for rows in self.log.chunks():
-            time = rows.time + shift
-            samples = np.column_stack([time, rows.forces @ mended.T])
-            first, last = min(first, time[0]), time[-1]
-            for n, hold in holds.segments.items():
-                inside = slice(*np.searchsorted(time, [hold.t0, hold.t1 + holds.step / 2]))
-                if inside.start < inside.stop:
-                    growing[n].keep(samples[inside])
+        content, read = self.calibration.content, self.log.samples
+        full_range = content.get("range_mps2") or np.inf
+        time = read.time + self._shift(log)
+        samples = read._replace(time=time, forces=read.forces @ mending(content).T)
         segments, lost = {}, {}
         for n, hold in holds.segments.items():
-            seconds = growing[n].n * self.log.step
-            if seconds < COVERED * (hold.t1 - hold.t0) or growing[n].n < FEWEST:
+            inside = slice(*np.searchsorted(time, [hold.t0, hold.t1 + holds.step / 2]).tolist())
+            count = inside.stop - inside.start
+            if count * self.log.step < COVERED * (hold.t1 - hold.t0) or count < FEWEST:
                 lost[n] = "the reference log does not cover it"
-            elif growing[n].saturated(np.zeros(3), np.ones(3)):
+            elif at_range(samples.forces[inside], full_range):
                 lost[n] = "the reference is saturated"
             else:
-                segments[n] = growing[n].finish()
+                segments[n] = Segment.of(samples, inside)
         if not segments:
             raise InputError(
-                f"--reference-log {self.given.log}: runs from {first:.6g} s to {last:.6g} s of the "
-                f"time of {log.path}, whose holds lie from {holds.t0[0]:.6g} s to "
+                f"--reference-log {self.given.log}: runs from {time[0]:.6g} s to {time[-1]:.6g} s "
+                f"of the time of {log.path}, whose holds lie from {holds.t0[0]:.6g} s to "
                 f"{holds.t1[-1]:.6g} s: all are left out, the first because "
                 f"{next(iter(lost.values()))}; --reference-offset gives the seconds to add to the "
                 "times of the reference"

@@ -85,11 +85,11 @@ class Donor:
         if settings.means:
             forces = campaign.forces
         else:
-            rows = [*log_of(path, settings).chunks()]
-            forces = np.concatenate([part.forces for part in rows])
+            samples = log_of(path, settings).samples
+            forces = samples.forces
         timed = not settings.means and settings.block is None
         if timed:
-            time = np.concatenate([part.time for part in rows])
+            time = samples.time
         else:
             time = interval / (settings.block or 1) * (np.arange(len(forces)) + 0.5)
         return cls(name, settings, forces, time, timed, spans, tuple(own))

@@ -8,7 +8,7 @@ from places import SHARED
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import find_joint_holds
 from accelstudy.campaign.importing.recording import open_log
-from accelstudy.campaign.importing.windows import windows
+from accelstudy.campaign.importing.windows import Windows
 
 RATE = 100.0
 G = 9.81
@@ -83,25 +83,14 @@ def test_known_holds(tmp_path, seed, sigma):
     assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
 
 
-def test_chunks_do_not_matter(tmp_path):
-    forces, _ = session()
-    whole = find_holds(opened(tmp_path, forces))
-    for chunk_size in (64, 333, 1000):
-        parts = find_holds(opened(tmp_path, forces, chunk_size=chunk_size))
-        assert_same(whole, parts, rtol=1e-9)
-        np.testing.assert_allclose(whole.noise.allan.deviation, parts.noise.allan.deviation)
-
-
 def test_windows_are_those_of_numpy(tmp_path):
     forces, _ = session(holds=2)
-    log = opened(tmp_path, forces, chunk_size=170)
-    batches = [batch for batch in windows(log, 101) if len(batch.time)]
-    found = np.concatenate([batch.variance for batch in batches])
+    found = Windows(opened(tmp_path, forces), 101)
     sliding = np.lib.stride_tricks.sliding_window_view(forces, 101, axis=0)
-    np.testing.assert_allclose(found, np.linalg.norm(sliding.var(axis=2), axis=1), rtol=1e-9)
-    assert [batch.index for batch in batches] == [
-        50 + sum(len(batch.time) for batch in batches[:i]) for i in range(len(batches))
-    ]
+    expected = np.linalg.norm(sliding.var(axis=2), axis=1)
+    np.testing.assert_allclose(found.variance[50:-50], expected, rtol=1e-9)
+    assert not found.centred[:50].any()
+    assert not found.centred[-50:].any()
 
 
 def test_no_hold_spans_a_gap(tmp_path):
@@ -109,15 +98,11 @@ def test_no_hold_spans_a_gap(tmp_path):
     time = np.arange(len(forces)) / RATE
     middle = edges[3].mean().astype(int)
     time[middle:] += 10
-    log = opened(tmp_path, forces, time, chunk_size=150)
+    log = opened(tmp_path, forces, time)
     holds = find_holds(log, shortest=0.5)
     assert "1 gap in time; no hold spans one" in holds.warnings
     assert len(holds) == len(edges) + 1
     assert not np.any((holds.of_each("start") < middle) & (holds.of_each("end") > middle))
-    # Where a chunk begins with the gap it is one gap, too.
-    whole = find_holds(opened(tmp_path, forces, time, chunk_size=middle), shortest=0.5)
-    assert_same(whole, holds, rtol=1e-9)
-    assert whole.warnings == holds.warnings
 
 
 def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):

@@ -25,8 +25,7 @@ TABLE = np.column_stack([TIME, FORCES])
 
 
 def everything(log):
-    times, forces, *_ = zip(*log.chunks(), strict=True)
-    return np.concatenate(times), np.concatenate(forces)
+    return log.samples.time, log.samples.forces
 
 
 def lines(separator=",", decimal=".", before=()):
@@ -60,23 +59,17 @@ BY_PLACE = {"columns": {"fx": 1, "fy": "2", "fz": 3}, "time": 0}
     (lines().replace("\n", "\n\n"), BY_PLACE),
     (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
 ])  # fmt: skip
-@pytest.mark.parametrize("chunk_size", [7, 65536])
-def test_text(tmp_path, text, options, chunk_size):
+def test_text(tmp_path, text, options):
     path = written(tmp_path, text)
-    time, forces = everything(open_log(path, chunk_size=chunk_size, **options))
+    time, forces = everything(open_log(path, **options))
     np.testing.assert_array_equal(time, TIME)
     np.testing.assert_array_equal(forces, FORCES)
-
-
-def test_chunks_are_small(tmp_path):
-    log = open_log(written(tmp_path, lines(before=["t,fx,fy,fz"])), chunk_size=7)
-    assert [len(rows.time) for rows in log.chunks()] == [7] * 7 + [1]
 
 
 @pytest.mark.parametrize("array", [TABLE, TABLE.T])
 def test_matlab(tmp_path, array):
     savemat(tmp_path / "log.mat", {"log": array, "name": "x"})
-    time, forces = everything(open_log(tmp_path / "log.mat", chunk_size=9, **BY_PLACE))
+    time, forces = everything(open_log(tmp_path / "log.mat", **BY_PLACE))
     np.testing.assert_array_equal(time, TIME)
     np.testing.assert_array_equal(forces, FORCES)
 
@@ -95,25 +88,11 @@ def test_parquet(tmp_path):
     frame = pd.DataFrame(TABLE, columns=["time", "accX", "accY", "accZ"]).assign(label="a")
     frame.to_parquet(tmp_path / "log.parquet")
     columns = {"fx": "accX", "fy": "accY", "fz": "accZ"}
-    log = open_log(tmp_path / "log.parquet", columns=columns, chunk_size=9)
+    log = open_log(tmp_path / "log.parquet", columns=columns)
     time, forces = everything(log)
     np.testing.assert_array_equal(time, TIME)
     np.testing.assert_array_equal(forces, FORCES)
     assert log.step == 0.25
-
-
-def test_a_group_of_rows_is_not_held_in_memory(tmp_path):
-    n = 400_000
-    forces = np.random.default_rng(1).normal(0, 5, (n, 3))
-    table = pa.table(dict(zip(("fx", "fy", "fz"), forces.T, strict=True)))
-    pq.write_table(table, tmp_path / "log.parquet", row_group_size=n, use_dictionary=False)
-    del table
-    before, held = pa.total_allocated_bytes(), []
-    for rows in open_log(tmp_path / "log.parquet", rate=100, chunk_size=1000).chunks():
-        held.append(pa.total_allocated_bytes() - before)
-        assert len(rows.forces) == 1000
-    # A whole column is 3.2 MB, and a page of one 1 MB.
-    assert max(held) < 7e6 < forces.nbytes
 
 
 def test_units(tmp_path):
@@ -124,7 +103,7 @@ def test_units(tmp_path):
     np.testing.assert_allclose(everything(log)[1], (FORCES - 7) * (0.1, 0.2, -0.3))
     time, _ = everything(open_log(path, time_unit="ms", **BY_PLACE))
     np.testing.assert_allclose(time, TIME * 1e-3)
-    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate=50, chunk_size=8))
+    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate=50))
     np.testing.assert_allclose(time, np.arange(N) / 50)
 
 
@@ -150,11 +129,10 @@ def changed(row, place, value):
     ("\n".join(f"{i},1,2,{i}" for i in range(9)), r"column 1 \(fx\) is constant"),
     ("0,1,2,3\n", r"too few samples \(1\)"),
 ])  # fmt: skip
-@pytest.mark.parametrize("chunk_size", [7, 65536])
-def test_bad_text(tmp_path, text, message, chunk_size):
+def test_bad_text(tmp_path, text, message):
     path = written(tmp_path, text)
     with pytest.raises(InputError, match=message) as caught:
-        everything(open_log(path, chunk_size=chunk_size, **BY_PLACE))
+        everything(open_log(path, **BY_PLACE))
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
 
@@ -176,9 +154,8 @@ def test_bad_text(tmp_path, text, message, chunk_size):
     (changed(20, 2, "x").replace("\n", "\n\n"), 20, "line 41, column 2 (fy): 'x'"),
     ("# one\n\n" + changed(20, 2, "x"), 20, "line 23, column 2 (fy): 'x'"),
 ])  # fmt: skip
-@pytest.mark.parametrize("chunk_size", [7, 65536])
-def test_a_row_that_lacks_a_reading_is_left_out_and_said(tmp_path, text, row, says, chunk_size):
-    log = open_log(written(tmp_path, text), chunk_size=chunk_size, **BY_PLACE)
+def test_a_row_that_lacks_a_reading_is_left_out_and_said(tmp_path, text, row, says):
+    log = open_log(written(tmp_path, text), **BY_PLACE)
     time, forces = everything(log)
     np.testing.assert_array_equal(forces, np.delete(FORCES, row, axis=0))
     kept = np.delete(TIME, row)
@@ -234,7 +211,7 @@ def test_bad_files(tmp_path):
     with pytest.raises(InputError, match="not a whole Parquet file"):
         open_log(tmp_path / "cut.parquet")
     frame.assign(fy=frame.fy.mask(frame.index == 20)).to_parquet(whole)
-    log = open_log(whole, chunk_size=8)
+    log = open_log(whole)
     assert len(everything(log)[0]) == N - 1
     assert "row 21, column fy (fy): nan" in log.warnings()[0]
     frame.assign(fy="a").to_parquet(whole)
@@ -383,17 +360,16 @@ cells = st.one_of(
     st.sampled_from([",", ";", " ", "\t", ", "]),
     st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
     st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
-    st.sampled_from([3, 65536]),
 )
-@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None, 3)
-@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None, 3)
-@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None, 3)
-@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None, 3)
-def test_whatever_the_text(tmp_path, rows, separator, timing, columns, chunk_size):
+@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None)
+@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None)
+@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None)
+@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None)
+def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
     with one_line_at_most():
-        log = open_log(path, columns=columns, chunk_size=chunk_size, **timing)
+        log = open_log(path, columns=columns, **timing)
         time, forces = everything(log)
         assert len(time) == len(forces)
         assert np.isfinite(forces).all()

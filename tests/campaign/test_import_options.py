@@ -43,8 +43,8 @@ def test_times_since_1970(tmp_path, turned, unit, kind):
     table["time"] = ticks.astype(np.int64) + SINCE_1970[unit] if whole else ticks + SINCE_1970[unit]
     path = tmp_path / f"log.{kind}"
     (table.to_parquet if kind == "parquet" else table.to_csv)(path, index=False)
-    log = open_log(path, time_unit=unit, chunk_size=1000)
-    time = np.concatenate([rows.time for rows in log.chunks()])
+    log = open_log(path, time_unit=unit)
+    time = log.samples.time
     np.testing.assert_allclose(time, ticks / PER_SECOND[unit], atol=1e-6)
     assert 1 / log.step == pytest.approx(RATE, rel=1e-4)
 

@@ -236,7 +236,7 @@ def test_dates_with_times_are_a_column_of_time(tmp_path, dates, kind):
     else:
         table.to_parquet(path, index=False)
     log = open_log(path)
-    times = np.concatenate([rows.time for rows in log.chunks()])
+    times = log.samples.time
     np.testing.assert_allclose(times, TIME, atol=1e-9)
     assert log.start == pytest.approx(EPOCH, abs=1e-3)
 

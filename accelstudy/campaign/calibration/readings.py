@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,7 @@ from accelstudy.campaign.importing.clocks import nanoseconds
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import (
     AXES,
+    TYPICAL,
     absurd,
     absurd_from,
     locate,
@@ -79,7 +81,8 @@ class Readings:
         """
         names, places = column_names(self.source), list(self.places.items())
         row, first = 0, np.nan
-        limit = absurd_from(self.source, self.places, self.conversion)
+        with closing(self.source.read([self.places[axis] for axis in AXES], TYPICAL)) as first_rows:
+            limit = absurd_from(next(first_rows, np.empty((0, 3))), self.conversion)
         course = Course(np.empty(0), np.empty(0))
         for table in read_chunks(self.source, chunk_size, typed):
             values = {key: self.numbers(table[names[place]], place) for key, place in places}

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 RELIABLE = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""
-_EVEN = 1e-6
-"""Share of a step by which the samples of a channel that grows evenly may be off: times round."""
 
 
 @dataclass(frozen=True)
@@ -80,42 +78,20 @@ def allan_moments(samples: ArrayLike) -> AllanMoments:
     factors = averaging_factors(n // 2)
     averaged = np.array(factors, dtype=int)
     terms = n + 1 - 2 * averaged
+    centred = channels - channels.mean(axis=1, keepdims=True)
+    centred[(channels == channels[:, :1]).all(axis=1)] = 0.0  # not what rounding the mean leaves
     sums = np.zeros((c, n + 1))
-    np.cumsum(channels - channels.mean(axis=1, keepdims=True), axis=1, out=sums[:, 1:])
+    np.cumsum(centred, axis=1, out=sums[:, 1:])
     squares = np.zeros((len(factors), c, c))
-    # Of a channel that grows evenly, as times do, all differences are m² times its step.
-    even = {i: step for i, step in enumerate(map(_even_step, channels)) if step is not None}
-    uneven = [i for i in range(c) if i not in even]
     memory, differences = np.empty(n + 1), np.empty_like(sums)
     for at, m in enumerate(factors):
-        for i in uneven:
+        for i in range(c):
             first = np.subtract(sums[i, m:], sums[i, :-m], out=memory[: n + 1 - m])
             second = np.subtract(first[m:], first[:-m], out=differences[i, : n + 1 - 2 * m])
-            for j in uneven[: uneven.index(i) + 1]:
+            for j in range(i + 1):
                 squares[at, i, j] = squares[at, j, i] = second @ differences[j, : len(second)]
     squares /= 2.0 * averaged[:, None, None] ** 2
-    for i, step in even.items():
-        for j in range(c):
-            other = even[j] * averaged**2 * terms if j in even else _totals(sums[j], averaged)
-            squares[:, i, j] = squares[:, j, i] = step / 2 * other
     return AllanMoments(tuple(factors), squares, terms, n // averaged - 1)
-
-
-def _even_step(channel: Array) -> float | None:
-    """Step of a channel (n,) that grows by equal steps, but for rounding; None if it does not."""
-    n = len(channel)
-    step = float(channel[-1] - channel[0]) / max(n - 1, 1)
-    if n < 2 or abs(channel[1] - channel[0] - step) > _EVEN * abs(step):
-        return None
-    off = np.abs(channel - channel[0] - step * np.arange(n)).max()
-    return step if off <= _EVEN * abs(step) else None
-
-
-def _totals(sums: Array, averaged: NDArray[np.int_]) -> Array:
-    """Sums over all k of S[k + 2m] − 2 S[k + m] + S[k], for running sums S (n + 1,)."""
-    total = np.concatenate([[0.0], np.cumsum(sums)])
-    last, m = len(sums), averaged
-    return total[last] - total[2 * m] - 2 * (total[last - m] - total[m]) + total[last - 2 * m]
 
 
 def pooled_deviation(

@@ -5,25 +5,17 @@ Nothing has to be found in them. But a block in which the sensor moved is no pos
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.recording import Log, LogSeries, Recording
-from accelstudy.campaign.importing.resolution import noise_before_rounding
-from accelstudy.campaign.importing.segments import Envelope, GrowingHold, Segment, Segmentation
-from accelstudy.campaign.importing.windows import (
-    FACTOR,
-    Survey,
-    Threshold,
-    given_threshold,
-    survey_log,
-)
+from accelstudy.campaign.importing.recording import Log, Recording
+from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation, saturated
+from accelstudy.campaign.importing.windows import FACTOR, Threshold, Windows, threshold_of
 
 Array = NDArray[np.float64]
-
 
 PARTS = 4
 """Parts of a block whose means are compared; the noise within them averages out."""
@@ -33,8 +25,8 @@ moves: a hand that trembles makes some five of it, a turn by a few degrees dozen
 
 
 def segment_blocks(
-    log: Log | LogSeries, size: int | None, threshold: float | None, full_range: float
-) -> tuple[Survey, Threshold, Segmentation]:
+    log: Recording, size: int | None, threshold: float | None, full_range: float
+) -> tuple[Windows, Threshold, Segmentation]:
     """Make each block of a log a position; those in which the sensor moves are to be left out.
 
     The blocks have so many samples, or are the parts of the log.
@@ -52,75 +44,52 @@ def segment_blocks(
     InputError
         If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
-    parts = log.parts if isinstance(log, LogSeries) else ()
-    least = size or min(sum(len(rows.time) for rows in part.chunks()) for part in parts)
+    block = log.samples.recording if size is None else _blocks(log, size)
+    first = np.flatnonzero(np.diff(block, prepend=-1))
+    edges = [*first.tolist(), len(block)]
+    all_blocks = {int(block[i]) + 1: slice(i, end) for i, end in pairwise(edges)}
+    least = size or min(each.stop - each.start for each in all_blocks.values())
     if least < PARTS:
         raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
-    survey = survey_log(log, (least // 2) | 1)
-    envelope = Envelope(survey.span, survey.total)
-    for _ in envelope.along(survey.kept.again()):
-        pass
-    segments: dict[int, Segment] = {}
-    blocks: dict[int, GrowingHold] = {}
-    left_out, scatter = {}, {}
-    start = 0
-    for number, rows in enumerate(_files(log) if size is None else _blocks(log, size), 1):
-        if len(rows) < PARTS:  # most are left out, which the report says
-            continue
-        block = GrowingHold(start, 0, survey.extremes, full_range - survey.steps.max(), 0)
-        block.keep(rows)
-        start += len(rows)
-        segments[number] = block.finish()
-        blocks[number] = block
-        means = [part.mean(axis=0) for part in np.array_split(rows[:, 1:4], PARTS)]
-        scatter[number] = float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
-    sd = np.median([segment.sd for segment in segments.values()], axis=0)
-    noise = noise_before_rounding(survey.steps, sd)
-    for number in [n for n, block in blocks.items() if block.saturated(survey.steps, noise)]:
-        left_out[number] = "the sensor is saturated"
-        del scatter[number]
+    # Blocks of which most is left out are no positions, which the report says.
+    blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
+    windows = Windows(log, (least // 2) | 1)
+    full = saturated(windows, [*blocks.values()], full_range - windows.steps.max())
+    left_out = {n: "the sensor is saturated" for n, f in zip(blocks, full, strict=True) if f}
+    scatter = {
+        n: _scatter(log.samples.forces[each]) for n, each in blocks.items() if n not in left_out
+    }
     if not scatter:
         raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
     if threshold is None:
         # Rounding hides the scatter of a coarse sensor.
-        usual = max(float(np.median([*scatter.values()])), FACTOR / RESTLESS * survey.rounding)
+        usual = max(float(np.median([*scatter.values()])), FACTOR / RESTLESS * windows.rounding)
         reason = f"{RESTLESS:g} times the scatter of the {PARTS} parts of a typical block"
         chosen = Threshold(RESTLESS * usual, usual, reason)
     else:
-        chosen = given_threshold(threshold)
+        chosen = threshold_of(windows, threshold)
     for number, each in scatter.items():
         if each > chosen.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return survey, chosen, Segmentation(segments, 0, 0, (), envelope, left_out, least)
+    segments = {n: Segment.of(log.samples, each) for n, each in blocks.items()}
+    envelope = Envelope(windows)
+    return windows, chosen, Segmentation(segments, 0, 0, (), envelope, left_out, least)
 
 
-def _files(log: Recording) -> Iterator[Array]:
-    """Samples of each part of a log, as those of a block."""
-    held: list[Array] = []
-    for rows in log.chunks():
-        if rows.anew and held:
-            yield np.concatenate(held)
-            held = []
-        held.append(np.column_stack([rows.time, rows.forces, rows.conditions]))
-    yield np.concatenate(held)
+def _scatter(forces: Array) -> float:
+    """Scatter of the means of the parts of a block, (n, 3), m/s²."""
+    means = [part.mean(axis=0) for part in np.array_split(forces, PARTS)]
+    return float(np.sqrt(np.linalg.norm(np.var(means, axis=0, ddof=1))))
 
 
-def _blocks(log: Log | LogSeries, size: int) -> Iterator[Array]:
-    """Samples of each block: time, forces, conditions."""
+def _blocks(log: Recording, size: int) -> NDArray[np.int_]:
+    """Block of each sample, from 0; a row that is left out counts as well."""
     assert isinstance(log, Log)
-    left, total = np.empty((0, 4 + len(log.conditions))), 0
-    for rows, lost in log.all_rows():
-        total += len(rows.time)
-        samples = np.column_stack([rows.time, rows.forces, rows.conditions])
-        samples[lost] = np.nan
-        left = np.concatenate([left, samples])
-        whole = len(left) // size * size
-        for block in left[:whole].reshape(-1, size, left.shape[1]):
-            yield block[np.isfinite(block[:, 1])]
-        left = left[whole:]
-    if np.isfinite(left[:, 1]).any():  # a note at the end is no sample
-        fewer = total - len(left)
+    total, row = log.losses.rows, log.samples.row
+    fewer = total // size * size
+    if len(row) and row[-1] >= fewer:  # a note at the end is no sample
         raise InputError(
             f"{log.path}: {total} samples are no multiple of the {size} of a block (--block): "
             f"{fewer} or {fewer + size} would be {fewer // size} or {fewer // size + 1} positions"
         )
+    return row // size

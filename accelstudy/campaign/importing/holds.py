@@ -1,9 +1,8 @@
 """What the static holds of a log are, and what they have in common: their noise, their zero point.
 
 The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): it compares the norm of the
-variances of the three axes in a window with a threshold, which comes from the data. The log is read
-twice, first for the threshold (`windows`), then for the holds and the envelope that a figure shows
-(`segments`), and only a chunk of it is in memory at a time.
+variances of the three axes in a window with a threshold, which comes from the data (`windows`); a
+hold is a run of samples whose windows are at rest (`segments`).
 """
 
 from __future__ import annotations
@@ -25,11 +24,10 @@ from accelstudy.campaign.importing.allan import (
     accuracy_of_mean,
     pooled_deviation,
 )
-from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.resolution import rounding_of_mean
 from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation
 from accelstudy.campaign.importing.settings import Selection
-from accelstudy.campaign.importing.windows import RESTLESS, Survey, Threshold
+from accelstudy.campaign.importing.windows import RESTLESS, Threshold, Windows
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
@@ -161,8 +159,7 @@ class DetectedHolds:
 
 
 def detected_holds(
-    log: Recording,
-    survey: Survey,
+    windows: Windows,
     threshold: Threshold,
     segmentation: Segmentation,
     selection: Selection,
@@ -170,13 +167,14 @@ def detected_holds(
     trim: float,
     shortest: float,
 ) -> DetectedHolds:
-    """Collect the holds of one sensor, as its log was read with these settings.
+    """Collect the holds of one sensor, as they were found with these settings.
 
     Raises
     ------
     InputError
         If nothing is at rest, a person leaves all of it out, or the sensor was never still.
     """
+    log = windows.log
 
     def never_still(why: str) -> InputError:
         if segmentation.size is not None:
@@ -186,15 +184,15 @@ def detected_holds(
             )
         return InputError(
             f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "
-            f"of {window:g} s varies by {survey.quietest():.3g} m/s². Lay it down for some seconds "
-            "in each of ten or more attitudes, on a table or in a fixture"
+            f"of {window:g} s varies by {windows.quietest():.3g} m/s². Lay it down for some "
+            "seconds in each of ten or more attitudes, on a table or in a fixture"
         )
 
     warnings = []
-    if survey.gaps:
-        warnings.append(f"{counted(survey.gaps, 'gap')} in time; no hold spans one")
-    if survey.frozen and not survey.coarse:
-        share = 100 * survey.frozen / survey.total
+    if windows.gaps:
+        warnings.append(f"{counted(windows.gaps, 'gap')} in time; no hold spans one")
+    if windows.frozen.any() and not windows.coarse:
+        share = 100 * windows.frozen.sum() / windows.centred.sum()
         warnings.append(
             f"a channel does not change over a window in {share:.2g} % of the log; left out"
         )
@@ -226,10 +224,10 @@ def detected_holds(
         segments=segments,
         left_out=left_out,
         conditions=_conditions(list(segments.values()), log.conditions),
-        noise=hold_noise(used, log.step, survey.steps),
+        noise=hold_noise(used, log.step, windows.steps),
         threshold=threshold,
         step=log.step,
-        resolution=survey.steps,
+        resolution=windows.steps,
         envelope=segmentation.envelope,
         warnings=tuple(warnings),
         size=segmentation.size,

@@ -33,7 +33,7 @@ from accelstudy.campaign.importing.settings import (
     parse_selection,
 )
 from accelstudy.campaign.importing.sources import LogFile, Source
-from accelstudy.campaign.importing.windows import surveyed, usual_window
+from accelstudy.campaign.importing.windows import Windows, samples_in, threshold_of, usual_window
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import overlay
 
@@ -190,11 +190,11 @@ def _import_blocks(
         selection = parse_selection(each.exclude, each.join)
         if "time" not in _parts(log)[0].places and (selection.spans or selection.joined_spans):
             raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
-        survey, threshold, blocks = segment_blocks(
+        windows, threshold, blocks = segment_blocks(
             log, each.block, each.threshold_mps2, _full_range(each)
         )
-        window = survey.width * log.step
-        holds = detected_holds(log, survey, threshold, blocks, selection, window, 0.0, 0.0)
+        window = windows.width * log.step
+        holds = detected_holds(windows, threshold, blocks, selection, window, 0.0, 0.0)
         result[name] = campaign_of_holds(paths, each, log, holds)
     return result
 
@@ -205,8 +205,7 @@ def _whole_files(log: LogSeries, settings: ImportSettings) -> bool:
         return True
     window = settings.window_s or usual_window(log)
     least = window + 2 * settings.trim_s + settings.shortest_s
-    firsts = (next(part.chunks(), None) for part in log.parts)
-    return all(rows is not None and len(rows.time) * log.step < least for rows in firsts)
+    return all(len(part.samples.time) * log.step < least for part in log.parts)
 
 
 def find_joint_holds(
@@ -251,11 +250,14 @@ def find_joint_holds(
         was never still.
     """
     window = window or usual_window(logs[0])
-    surveys = surveyed(logs, window, threshold)
-    segmentations = segment_logs(logs, surveys, trim, shortest, full_range, one_each)
+    width = samples_in(logs[0], window)
+    windows = [Windows(log, width) for log in logs]
+    thresholds = [threshold_of(each, threshold) for each in windows]
+    segmentations = segment_logs(windows, thresholds, trim, shortest, full_range, one_each)
+    selection = selection or Selection()
     return [
-        detected_holds(log, *survey, segmentation, selection or Selection(), window, trim, shortest)
-        for log, survey, segmentation in zip(logs, surveys, segmentations, strict=True)
+        detected_holds(*each, selection, window, trim, shortest)
+        for each in zip(windows, thresholds, segmentations, strict=True)
     ]
 
 

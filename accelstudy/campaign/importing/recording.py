@@ -1,4 +1,4 @@
-"""Raw accelerometer logs, read in chunks, so that their size does not matter.
+"""Raw accelerometer logs.
 
 A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
 lines), a MATLAB file or a Parquet file. It gives times in s since its first sample, and specific
@@ -8,12 +8,12 @@ forces in m/s². An error is one line with its place in the file.
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,48 +61,23 @@ _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
 
-class Rows(NamedTuple):
-    """Neighbouring samples of a log.
+class Samples(NamedTuple):
+    """Samples of a log, n of them, in their order; rows without a usable reading are left out.
 
     Attributes
     ----------
-    time : (k,) array, s
-    forces : (k, 3) array, m/s², in forward, right, down
-    conditions : (k, c) array, °C or m/s², NaN where nothing is known
-    anew : bool, whether another recording begins here, so that no hold continues
+    time : (n,) array, s
+    forces : (n, 3) array, m/s², in forward, right, down
+    conditions : (n, c) array, °C or m/s², NaN where nothing is known
+    row : (n,) int array, row of the table that each sample comes from
+    recording : (n,) int array, which of several recordings it belongs to
     """
 
     time: Array
     forces: Array
     conditions: Array
-    anew: bool = False
-
-
-class Recording(Protocol):
-    """What the detector of holds takes: a log, or several."""
-
-    @property
-    def path(self) -> Path:
-        """The file that messages name."""
-        ...
-
-    @property
-    def step(self) -> float:
-        """Usual time between two samples, s."""
-        ...
-
-    @property
-    def conditions(self) -> tuple[str, ...]:
-        """Which of `CONDITIONS` there are."""
-        ...
-
-    def chunks(self) -> Iterator[Rows]:
-        """Samples from the beginning to the end."""
-        ...
-
-    def likely_unit(self) -> str:
-        """Hint for a message about an odd rate; empty if there is none."""
-        ...
+    row: NDArray[np.int_]
+    recording: NDArray[np.int_]
 
 
 def open_log(
@@ -119,7 +94,6 @@ def open_log(
     variable: str | None = None,
     delimiter: str | None = None,
     frame: Frame = FRD,
-    chunk_size: int = CHUNK,
     source: Source | None = None,
 ) -> Log:
     """Find out how a log is laid out.
@@ -138,7 +112,6 @@ def open_log(
     variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
     delimiter : str, between the columns of a text, see `LogLayout`
     frame : Frame, the axes of the log
-    chunk_size : int, rows held in memory at a time
     source : Source, the file if it is open already
 
     Raises
@@ -187,7 +160,6 @@ def open_log(
         time_factor=time_factor_of(source, places, time_unit),
         conversion=conversion,
         frame=frame,
-        chunk_size=chunk_size,
     )
 
 
@@ -313,19 +285,19 @@ def absurd(raw: Array, forces: Array, limit: float) -> NDArray[np.bool_]:
     return (np.abs(forces) > limit) | np.isin(raw, SENTINELS)
 
 
-def absurd_from(source: Source, places: Mapping[str, int], conversion: Conversion) -> float:
+def absurd_from(raw: Array, conversion: Conversion) -> float:
     """Size, m/s², from which on a reading is absurd: `ABSURD`, and a thousand times the usual one.
 
-    The latter since the unit, which may be wrong, is checked by the means of the holds.
+    The latter since the unit, which may be wrong, is checked by the means of the holds. `raw` are
+    the readings of a log, (n, 3).
     """
-    with closing(source.read([places[axis] for axis in AXES], TYPICAL)) as chunks:
-        raw = next(chunks, np.empty((0, 3)))
+    raw = raw[:TYPICAL]
     raw = raw[(np.abs(raw) <= LARGEST).all(axis=1) & ~np.isin(raw, SENTINELS).any(axis=1)]
     usual = np.median(np.linalg.norm(conversion.to_si(raw), axis=1)) if len(raw) else 0.0
     return max(ABSURD, 1000 * float(usual))
 
 
-@dataclass
+@dataclass(frozen=True)
 class Losses:
     """Rows of a log that are left out, since a reading is missing or absurd.
 
@@ -335,23 +307,9 @@ class Losses:
     first : list of (row, key), the first ones, and what is missing there
     """
 
-    rows: int = 0
-    count: int = 0
-    first: list[tuple[int, str]] = field(default_factory=list)
-
-    def add(self, lost: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        """Add rows, (k,) for each column whether they lack it; which of them lack something."""
-        each = np.array([*lost.values()])
-        of_any: NDArray[np.bool_] = np.any(each, axis=0)
-        for i in np.flatnonzero(of_any)[: NAMED - len(self.first)]:
-            self.first.append((self.rows + int(i), list(lost)[int(np.argmax(each[:, i]))]))
-        self.rows += len(of_any)
-        self.count += int(of_any.sum())
-        return of_any
-
-    def update(self, other: Losses) -> None:
-        """Take over those of another reading."""
-        self.rows, self.count, self.first = other.rows, other.count, other.first
+    rows: int
+    count: int
+    first: list[tuple[int, str]]
 
 
 @dataclass(frozen=True)
@@ -368,11 +326,9 @@ class Log:
     time_factor : float, s per unit of that column
     conversion : Conversion, of forces to m/s², in the axes of the log
     frame : Frame, the axes of the log
-    chunk_size : int, rows held in memory at a time
     lively : bool, whether each channel must change; in a single position, one of a coarse sensor
         may be constant
     beside : mapping of names to columns of other sensors, which lose the same rows
-    losses : Losses, of the last reading to the end
     """
 
     path: Path
@@ -382,29 +338,43 @@ class Log:
     time_factor: float
     conversion: Conversion
     frame: Frame
-    chunk_size: int
     lively: bool = True
     beside: Mapping[str, int] = field(default_factory=dict)
-    losses: Losses = field(default_factory=Losses, compare=False)
 
     @property
     def conditions(self) -> tuple[str, ...]:
         """Which of `CONDITIONS` the log has."""
         return tuple(key for key in CONDITIONS if key in self.places)
 
+    @property
+    def samples(self) -> Samples:
+        """Samples from the beginning to the end; times count from the first one.
+
+        Raises
+        ------
+        InputError
+            If time does not increase, a channel is constant, the log is empty, or many rows lack a
+            reading.
+        """
+        return self._read[0]
+
+    @property
+    def losses(self) -> Losses:
+        """Rows that are no samples."""
+        return self._read[1]
+
     @cached_property
     def step(self) -> float:
-        """Usual time between two samples, s: the mean over the first chunk, without gaps.
+        """Usual time between two samples, s: the mean, without gaps.
 
         Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
         and only the mean fits the number of samples.
         """
         if self.rate is not None:
             return 1.0 / self.rate
-        for rows in self.chunks():
-            if len(rows.time) > 1:
-                return usual_step(np.diff(rows.time))
-        raise InputError(f"{self.path}: too few samples")
+        if len(self.samples.time) < 2:
+            raise InputError(f"{self.path}: too few samples")
+        return usual_step(np.diff(self.samples.time))
 
     @cached_property
     def start(self) -> float:
@@ -431,88 +401,71 @@ class Log:
             f"--time-unit {unit}"
         )
 
-    def chunks(self) -> Iterator[Rows]:
-        """Samples from the beginning to the end; times count from the first one.
-
-        Rows in which a reading is missing or absurd are left out.
-
-        Raises
-        ------
-        InputError
-            Where time does not increase; at the end if the log is empty, a channel is constant, or
-            many rows are left out.
-        """
-        row, last = 0, -np.inf
-        lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
-        # What is wrong in the middle of a file must not leave it open.
-        with closing(self.all_rows()) as chunks:
-            for rows, lost in chunks:
-                row += len(lost)
-                if lost.any():
-                    rows = Rows(rows.time[~lost], rows.forces[~lost], rows.conditions[~lost])
-                if not len(rows.time):
-                    continue
-                if self.rate is None:
-                    self._check_order(rows.time, last, np.flatnonzero(~lost) + row - len(lost))
-                last = rows.time[-1]
-                lowest = np.minimum(lowest, rows.forces.min(axis=0))
-                highest = np.maximum(highest, rows.forces.max(axis=0))
-                yield rows
-        if row < 2:
-            raise InputError(f"{self.path}: too few samples ({row})")
-        same = (lowest == highest)[np.argsort(self.frame.order)]
-        for axis, constant in zip(AXES, same, strict=True):
-            if constant and self.lively:
-                name = self.source.names[self.places[axis]]
-                raise InputError(f"{self.path}: column {name} ({axis}) is constant")
-
-    def all_rows(self) -> Generator[tuple[Rows, NDArray[np.bool_]], None, None]:
-        """Rows from the beginning to the end, and which of them have a missing or absurd reading.
-
-        Raises
-        ------
-        InputError
-            At the end, if many have.
-        """
+    @cached_property
+    def _read(self) -> tuple[Samples, Losses]:
         columns = {**self.places, **self.beside}
-        keys = list(columns)
-        others = [keys.index(key) for key in self.conditions]
-        sensors = [AXES, *zip(*[iter(self.beside)] * 3, strict=True)]
-        clock, start = self.places.get("time"), np.nan
-        limit = absurd_from(self.source, self.places, self.conversion)
-        losses = Losses()
-        with closing(self.source.read(list(columns.values()), self.chunk_size, clock)) as chunks:
-            for raw in chunks:
-                values = dict(zip(keys, raw.T, strict=True))
-                lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
-                for key in self.conditions:
-                    values[key][lost.pop(key)] = np.nan
-                for axes in sensors:
-                    readings = np.column_stack([values[key] for key in axes])
-                    forces = self.conversion.to_si(readings)
-                    for key, none in zip(axes, absurd(readings, forces, limit).T, strict=True):
-                        lost[key] |= none
-                    if axes is AXES:
-                        own = self.frame.to_frd(forces)
-                time = np.arange(losses.rows, losses.rows + len(raw)) / (self.rate or 1.0)
-                of_any = losses.add(lost)
-                if clock is not None:
-                    time = values["time"] * self.time_factor
-                    time += 1e-9 * values.get("nanoseconds", 0.0)
-                    if np.isnan(start) and not of_any.all():
-                        start = time[np.argmin(of_any)]
-                    time -= start
-                yield Rows(time, own, raw[:, others]), of_any
-        self.losses.update(losses)
+        clock = self.places.get("time")
+        chunks = [*self.source.read([*columns.values()], CHUNK, clock)]
+        raw = np.concatenate(chunks) if chunks else np.empty((0, len(columns)))
+        values = dict(zip(columns, raw.T, strict=True))
+        lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
+        for key in self.conditions:
+            values[key][lost.pop(key)] = np.nan
+        limit = absurd_from(np.column_stack([values[axis] for axis in AXES]), self.conversion)
+        for axes in (AXES, *zip(*[iter(self.beside)] * 3, strict=True)):
+            readings = np.column_stack([values[key] for key in axes])
+            forces = self.conversion.to_si(readings)
+            for key, none in zip(axes, absurd(readings, forces, limit).T, strict=True):
+                lost[key] |= none
+            if axes is AXES:
+                own = self.frame.to_frd(forces)
+        usable = ~np.any([*lost.values()], axis=0)
+        row = np.flatnonzero(usable)
+        first = [
+            (int(i), next(key for key, none in lost.items() if none[i]))
+            for i in np.flatnonzero(~usable)[:NAMED]
+        ]
+        losses = Losses(len(raw), len(raw) - len(row), first)
+        if clock is None:
+            time = row / (self.rate or 1.0)
+        else:
+            time = values["time"] * self.time_factor + 1e-9 * values.get("nanoseconds", 0.0)
+            time = time[row] - (time[row[0]] if len(row) else 0.0)
+        samples = Samples(
+            time,
+            np.asfortranarray(own[row]),
+            np.column_stack([np.empty((len(row), 0)), *(values[k][row] for k in self.conditions)]),
+            row,
+            np.zeros(len(row), dtype=int),
+        )
+        self._check(samples, losses)
+        return samples, losses
+
+    def _check(self, samples: Samples, losses: Losses) -> None:
+        backward = np.diff(samples.time) <= 0
+        if self.rate is None and backward.any():
+            row = int(samples.row[1 + np.argmax(backward)])
+            where, cell = self.source.look_up(row, self.places["time"])
+            raise InputError(
+                f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
+                f"time does not increase ({cell}); give the rate if it does not count"
+            )
         if losses.count > MANY * losses.rows:
             hint = "; give the rate (--rate) instead" if losses.first[0][1] == "time" else ""
             raise InputError(
                 f"{self.path}: {self._lost(*losses.first[0])}, not a usable number{hint}; "
                 f"{losses.count} of {counted(losses.rows, 'row')} lack one, which are too many"
             )
+        if losses.rows < 2:
+            raise InputError(f"{self.path}: too few samples ({losses.rows})")
+        constant = (samples.forces == samples.forces[:1]).all(axis=0)[np.argsort(self.frame.order)]
+        if self.lively and constant.any():
+            axis = AXES[int(np.argmax(constant))]
+            name = self.source.names[self.places[axis]]
+            raise InputError(f"{self.path}: column {name} ({axis}) is constant")
 
     def warnings(self) -> list[str]:
-        """What could not be read, of a log that was read to the end."""
+        """What could not be read."""
         losses = self.losses
         if not losses.count:
             return [*self.source.warnings]
@@ -529,16 +482,6 @@ class Log:
         place = {**self.places, **self.beside}[key]
         where, cell = self.source.look_up(row, place)
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
-
-    def _check_order(self, time: Array, last: float, rows: NDArray[np.int_]) -> None:
-        backward = np.diff(time, prepend=last) <= 0
-        if backward.any():
-            row = int(rows[np.argmax(backward)])
-            where, cell = self.source.look_up(row, self.places["time"])
-            raise InputError(
-                f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
-                f"time does not increase ({cell}); give the rate if it does not count"
-            )
 
 
 @dataclass(frozen=True)
@@ -581,21 +524,32 @@ class LogSeries:
         return bool(np.all(np.diff(starts) > 0))
 
     def likely_unit(self) -> str:
-        """See `Recording`."""
+        """See `Log`."""
         return self.parts[0].likely_unit()
 
-    def chunks(self) -> Iterator[Rows]:
+    @cached_property
+    def samples(self) -> Samples:
         """Samples of all parts; if their times do not tell, each begins where the last one ends."""
-        end = 0.0
-        for part in self.parts:
+        end, parts = 0.0, []
+        for i, part in enumerate(self.parts):
             start = part.start - self.parts[0].start if self.timed else end
             if start < end - self.step / 2:  # a clock rounds
                 raise InputError(f"{part.path}: begins before the recording before it ends")
             columns = [part.conditions.index(key) for key in self.conditions]
-            anew = True
-            for rows in part.chunks():
-                yield Rows(rows.time + start, rows.forces, rows.conditions[:, columns], anew)
-                anew, end = False, start + rows.time[-1] + self.step
+            own = part.samples
+            parts.append(
+                own._replace(
+                    time=own.time + start,
+                    conditions=own.conditions[:, columns],
+                    recording=own.recording + i,
+                )
+            )
+            end = start + own.time[-1] + self.step
+        return Samples(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+Recording = Log | LogSeries
+"""What the detector of holds takes: a log, or several."""
 
 
 def usual_step(steps: Array) -> float:

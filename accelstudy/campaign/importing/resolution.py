@@ -37,30 +37,18 @@ _WITHIN = _RATIO**2 + 1 / 12 - _LEFT
 """Variance of the readings within a hold in the same unit: of all, less what the mean has of it."""
 
 
-class Readings:
-    """The different readings of three axes, collected as a log goes by."""
-
-    def __init__(self) -> None:
-        self._different: list[Array | None] = [np.empty(0)] * 3
-        self._count = 0
-
-    def add(self, forces: Array) -> None:
-        """Add samples (n, 3)."""
-        self._count += len(forces)
-        for axis, known in enumerate(self._different):
-            if known is not None:
-                together = np.union1d(known, forces[:, axis])
-                self._different[axis] = together if len(together) <= MOST else None
-
-    @property
-    def steps(self) -> Array:
-        """Step of each axis, (3,), m/s²; 0 where none is found."""
-        often = [
-            None if different is None or OFTEN * len(different) > self._count else different
-            for different in self._different
-        ]
-        steps = [0.0 if different is None else step_of(different) for different in often]
-        return np.array([float(f"{step:.6g}") for step in steps])
+def steps_of(readings: Array) -> Array:
+    """Step of each axis of readings (n, 3), (3,), m/s²; 0 where none is found."""
+    steps = np.zeros(3)
+    for axis, values in enumerate(readings.T):
+        different = np.empty(0)
+        for first in range(0, len(values), MOST):  # most axes of fine steps show it at once
+            different = np.union1d(different, values[first : first + MOST])
+            if len(different) > MOST:
+                break
+        if len(different) <= min(MOST, len(values) / OFTEN):
+            steps[axis] = float(f"{step_of(different):.6g}")
+    return steps
 
 
 def step_of(different: Array) -> float:

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from tempfile import SpooledTemporaryFile
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing.recording import GAP, Recording
-from accelstudy.campaign.importing.resolution import Readings
+from accelstudy.campaign.importing.resolution import steps_of
 
 Array = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 8, 10**6  # samples
-IN_MEMORY = 2**22
-"""Bytes of windows that are kept in memory."""
+_TOGETHER = 2**16
+"""Windows of which the sums are taken together: what a processor keeps at hand is small."""
 FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
 QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
@@ -36,30 +31,6 @@ COARSE = 1.75
 same number all the time: that of noise of 0.4 steps."""
 
 _BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
-
-
-def surveyed(
-    logs: Sequence[Recording], window: float, threshold: float | None
-) -> list[tuple[Survey, Threshold]]:
-    """Read logs of simultaneous samples once, each for its noise and for what is at rest in it.
-
-    Parameters
-    ----------
-    logs : sequence of Recording
-    window : float, s
-    threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
-        the data of each log if None
-
-    Raises
-    ------
-    InputError
-        If a log cannot be read, or no threshold can be told from it.
-    """
-    width = samples_in(logs[0], window)
-    surveys = [survey_log(log, width) for log in logs]
-    if threshold is not None:
-        return [(survey, given_threshold(threshold)) for survey in surveys]
-    return [(s, choose_threshold(s, log)) for s, log in zip(surveys, logs, strict=True)]
 
 
 def usual_window(log: Recording) -> float:
@@ -85,69 +56,125 @@ def samples_in(log: Recording, window: float) -> int:
     return round(samples) | 1
 
 
-@dataclass(frozen=True)
 class Windows:
-    """Neighbouring windows, one centred at each of m samples.
+    """Windows that slide over the samples of a log by one sample; none spans a gap.
 
-    `piece` is the number of gaps so far, `recording` the number of recordings that ended, and
-    `index` the place of the first of these samples in the log.
+    Parameters
+    ----------
+    log : Log or LogSeries
+    width : int, samples of a window; odd
+
+    Attributes
+    ----------
+    log, width
+    gaps : int, gaps in time within a recording
+    variance : (n,) array, (m/s²)², norm of the variances of the axes in the window about each
+        sample; NaN about those too near to a gap or an end for a window
+    frozen : (n,) bool array, whether an axis does not change in the window
+    centred : (n,) bool array, where there is a window
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, or is too short for a window.
     """
 
-    piece: int
-    recording: int
-    index: int
-    time: Array
-    forces: Array
-    conditions: Array
-    variance: Array
-    frozen: NDArray[np.bool_]
-
-
-def windows(log: Recording, width: int) -> Iterator[Windows]:
-    """Windows of `width` samples (odd), sliding by one; none spans a gap."""
-    half, piece, recording, row = width // 2, 0, 0, 0
-    times, forces, others = np.empty(0), _columns(3), _columns(len(log.conditions))
-    for rows in log.chunks():
-        before = times[-1:] if len(times) else rows.time[:1]
-        jumps = np.diff(rows.time, prepend=before) > GAP * log.step
-        if rows.anew and row > 0:
-            jumps[0], recording = True, recording + 1
-        edges = sorted({0, *np.flatnonzero(jumps).tolist(), len(rows.time)})
-        for first, end in pairwise(edges):
-            if jumps[first]:
-                piece += 1
-                times, forces, others = times[:0], forces[:0], others[:0]
-            times = np.concatenate([times, rows.time[first:end]])
-            forces = np.concatenate([forces, rows.forces[first:end]])
-            others = np.concatenate([others, rows.conditions[first:end]])
-            row += end - first
-            centred = max(0, len(times) - width + 1)
-            empty = np.empty(0), np.empty(0, dtype=bool)
-            variance, frozen = _spread(forces, width) if centred else empty
-            inside = slice(half, half + centred)
-            yield Windows(
-                piece,
-                recording,
-                row - len(times) + half,
-                times[inside],
-                np.asfortranarray(forces[inside]),
-                np.asfortranarray(others[inside]),
-                variance,
-                frozen,
+    def __init__(self, log: Recording, width: int) -> None:
+        self.log, self.width = log, width
+        time, forces = log.samples.time, log.samples.forces
+        another = np.diff(log.samples.recording) > 0
+        jumps = (np.diff(time) > GAP * log.step) & ~another
+        self.gaps = int(jumps.sum())
+        self.variance = np.full(len(time), np.nan)
+        self.frozen = np.zeros(len(time), dtype=bool)
+        half = width // 2
+        pieces = [0, *(1 + np.flatnonzero(jumps | another)).tolist(), len(time)]
+        for start, end in pairwise(pieces):
+            for first in range(start, end - width + 1, _TOGETHER):
+                beyond = min(first + _TOGETHER + width - 1, end)
+                middle = slice(first + half, beyond - half)
+                spread = _spread(forces[first:beyond], width)
+                self.variance[middle], self.frozen[middle] = spread
+        self.centred = np.isfinite(self.variance)
+        if not self.centred.any():
+            raise InputError(
+                f"{log.path}: too few samples for a window of {width}, or gaps all over"
+                f"{log.likely_unit()}"
             )
-            times, forces, others = times[centred:], forces[centred:], others[centred:]
+
+    @cached_property
+    def extremes(self) -> Array:
+        """Of the lowest and of the highest readings the outermost and the next, (2, 2, 3)."""
+        ends = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
+        for axis, force in enumerate(self.log.samples.forces.T):
+            centred = force[self.centred]
+            for end, pick, rest in ((0, np.min, np.greater), (1, np.max, np.less)):
+                ends[end, 0, axis] = pick(centred)
+                others = centred[rest(centred, ends[end, 0, axis])]
+                if len(others):
+                    ends[end, 1, axis] = pick(others)
+        return ends
+
+    @cached_property
+    def steps(self) -> Array:
+        """Steps in which the axes are read, (3,), m/s²; 0 where there are none."""
+        return steps_of(self.log.samples.forces[self.centred])
+
+    @property
+    def rounding(self) -> float:
+        """Noise of a window by rounding alone, m/s²."""
+        return float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
+
+    @cached_property
+    def coarse(self) -> bool:
+        """Whether the steps explain that a channel at rest does not change over a window.
+
+        If all windows that change are motion, nothing else explains it either.
+        """
+        if not self.rounding > 0:
+            return False
+        noise = _noise_floor(_histogram(self.variance))
+        return bool(noise <= COARSE * self.rounding or noise > RESTLESS * STANDARD_GRAVITY)
+
+    @cached_property
+    def counts(self) -> NDArray[np.int_]:
+        """Histogram of the variances of windows in which no channel is frozen."""
+        return _histogram(self.variance[~self.frozen])
+
+    @property
+    def counts_at_rest(self) -> NDArray[np.int_]:
+        """Histogram of the windows that may be at rest; none has less noise than that of rounding.
+
+        A channel that does not change is frozen, unless its steps explain it.
+        """
+        if not self.coarse:
+            return self.counts
+        counts = _histogram(self.variance)
+        least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
+        counts[least] += counts[:least].sum() + np.sum(self.variance == 0)
+        counts[:least] = 0
+        return counts
+
+    def at_rest(self, sd: float) -> NDArray[np.bool_]:
+        """Whether the window about each sample is at rest, (n,), up to a standard deviation."""
+        return (self.variance <= sd**2) & (self.coarse | ~self.frozen)
+
+    def quietest(self) -> float:
+        """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), 0.01 * self.counts.sum())
+        return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
 
 
-def _columns(count: int) -> Array:
-    """No row yet of columns each of which lies in one piece, as sums along them are faster."""
-    return np.empty((0, count), order="F")
+def _histogram(variance: Array) -> NDArray[np.int_]:
+    """Numbers of windows by the logarithms of their variances."""
+    counts: NDArray[np.int_] = np.histogram(np.log10(variance[variance > 0]), _BINS)[0]
+    return counts
 
 
 def _spread(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
     """Norm of the variances of the axes in each window, and whether an axis does not change."""
     squares = np.zeros(len(forces) - width + 1)
     frozen = np.zeros(len(squares), dtype=bool)
-    # Axis by axis, as what a processor keeps at hand is small.
     for force in forces.T:
         # Squares of large numbers lose digits.
         offsets = force - force.mean()
@@ -199,145 +226,22 @@ class Threshold:
     reason: str
 
 
-class KeptWindows:
-    """Windows of a log that are kept for a second reading, since to read text takes long.
+def threshold_of(windows: Windows, given: float | None) -> Threshold:
+    """Threshold that a person chose, m/s², or the one that the data tell.
 
-    They are kept in memory up to `IN_MEMORY` bytes, beyond that in a temporary file. Where that
-    has no room, the log is read again.
+    Raises
+    ------
+    InputError
+        If it is not positive, or no threshold can be told from the data.
     """
-
-    def __init__(self, log: Recording, width: int) -> None:
-        self._log, self._width = log, width
-        # It lives as long as the survey, which no block of code does.
-        self._file = SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115
-        finalize(self, self._file.close)
-        self._count = 0
-
-    def first(self) -> Iterator[Windows]:
-        """Read the log, and keep its windows."""
-        for batch in windows(self._log, self._width):
-            if self._count >= 0:
-                try:
-                    pickle.dump(batch, self._file, pickle.HIGHEST_PROTOCOL)
-                    self._count += 1
-                except OSError:
-                    self._count = -1
-            yield batch
-
-    def again(self) -> Iterator[Windows]:
-        """Yield the same windows as in the first reading."""
-        if self._count < 0:
-            yield from windows(self._log, self._width)
-        self._file.seek(0)
-        for _ in range(self._count):
-            yield pickle.load(self._file)
+    if given is None:
+        return choose_threshold(windows)
+    if not (np.isfinite(given) and given > 0):
+        raise InputError(f"threshold: must be positive, not {given:g}")
+    return Threshold(given, np.nan, "as given")
 
 
-class Survey:
-    """Noise and extremes of a log, collected in a first pass over windows of `width` samples."""
-
-    def __init__(self, log: Recording, width: int) -> None:
-        self.width, self.kept = width, KeptWindows(log, width)
-        self.counts, self._counts_frozen = np.zeros((2, len(_BINS) - 1), dtype=int)
-        self._constant = 0
-        self._readings = Readings()
-        self.total = self.frozen = self.gaps = 0
-        self.span = (np.nan, np.nan)
-        # Per axis the lowest and the highest value, and the ones next to them.
-        self.extremes = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
-
-    def add(self, batch: Windows) -> None:
-        """Add windows, in their order."""
-        self.gaps = batch.piece - batch.recording
-        if not len(batch.time):
-            return
-        self.span = (batch.time[0] if np.isnan(self.span[0]) else self.span[0], batch.time[-1])
-        self.total += len(batch.time)
-        self.frozen += int(batch.frozen.sum())
-        varies = batch.variance > 0
-        self._constant += int(np.sum(~varies))
-        for counts, chosen in (
-            (self.counts, varies & ~batch.frozen),
-            (self._counts_frozen, varies & batch.frozen),
-        ):
-            counts += np.histogram(np.log10(batch.variance[chosen]), _BINS)[0]
-        self._readings.add(batch.forces)
-        self.extremes[0] = _two_lowest(self.extremes[0], batch.forces)
-        self.extremes[1] = -_two_lowest(-self.extremes[1], -batch.forces)
-
-    @cached_property
-    def steps(self) -> Array:
-        """Steps in which the axes are read, (3,), m/s²; 0 where there are none."""
-        return self._readings.steps
-
-    @property
-    def rounding(self) -> float:
-        """Noise of a window by rounding alone, m/s²."""
-        return float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
-
-    @cached_property
-    def coarse(self) -> bool:
-        """Whether the steps explain that a channel at rest does not change over a window.
-
-        If all windows that change are motion, nothing else explains it either.
-        """
-        if not self.rounding > 0:
-            return False
-        noise = _noise_floor(self.counts + self._counts_frozen)
-        return bool(noise <= COARSE * self.rounding or noise > RESTLESS * STANDARD_GRAVITY)
-
-    @property
-    def counts_at_rest(self) -> NDArray[np.int_]:
-        """Histogram of the windows that may be at rest; none has less noise than that of rounding.
-
-        A channel that does not change is frozen, unless its steps explain it.
-        """
-        if not self.coarse:
-            return self.counts
-        counts = self.counts + self._counts_frozen
-        least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
-        counts[least] += counts[:least].sum() + self._constant
-        counts[:least] = 0
-        return counts
-
-    def quietest(self) -> float:
-        """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
-        rank = np.searchsorted(np.cumsum(self.counts), 0.01 * self.counts.sum())
-        return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
-
-
-def _two_lowest(before: Array, forces: Array) -> Array:
-    """Lowest value of each axis and the one next to it, (2, 3), with those before."""
-    result = before.copy()
-    for (lowest, next_to_it), force, ends in zip(before.T, forces.T, result.T, strict=True):
-        if force.min() < next_to_it:
-            candidates = np.append(force[force < next_to_it], [lowest, next_to_it])
-            ends[0] = candidates.min()
-            ends[1] = candidates[candidates > ends[0]].min(initial=np.inf)
-    return result
-
-
-def survey_log(log: Recording, width: int) -> Survey:
-    """Read a log once, in windows of `width` samples."""
-    survey = Survey(log, width)
-    for batch in track(survey.kept.first(), f"noise of {log.path.name}"):
-        survey.add(batch)
-    if not survey.total:
-        raise InputError(
-            f"{log.path}: too few samples for a window of {width}, or gaps all over"
-            f"{log.likely_unit()}"
-        )
-    return survey
-
-
-def given_threshold(sd: float) -> Threshold:
-    """Threshold that a person chose, m/s²."""
-    if not (np.isfinite(sd) and sd > 0):
-        raise InputError(f"threshold: must be positive, not {sd:g}")
-    return Threshold(sd, np.nan, "as given")
-
-
-def choose_threshold(survey: Survey, log: Recording) -> Threshold:
+def choose_threshold(windows: Windows) -> Threshold:
     """Choose a multiple of the noise floor, which is the usual noise of windows at rest.
 
     Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
@@ -348,9 +252,11 @@ def choose_threshold(survey: Survey, log: Recording) -> Threshold:
     threshold is below 0.003 g: a quiet sensor feels footsteps and pumps, and whatever moves less
     than that in a second is not being turned.
     """
-    counts = survey.counts_at_rest
+    counts = windows.counts_at_rest
     if not counts.any():
-        raise InputError(f"{log.path}: a channel does not change in any window; is it frozen?")
+        raise InputError(
+            f"{windows.log.path}: a channel does not change in any window; is it frozen?"
+        )
     noise = _noise_floor(counts)
     sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
     return Threshold(
