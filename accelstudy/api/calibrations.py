@@ -34,7 +34,7 @@ from accelstudy.campaign.calibration.applying import (
 from accelstudy.campaign.calibration.assessment import assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.leveling import Leveling, level_frame
+from accelstudy.campaign.calibration.leveling import level_frame
 from accelstudy.campaign.calibration.output import (
     calibration_content,
     draw_residuals,
@@ -212,9 +212,7 @@ class Calibration(Result):
         log = log_of(log)
         reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
         sensor = calibration_of(self.content)
-        table, leveled = level_frame(
-            Leveling(sensor, log.file, log.layout, reading, start), log.table
-        )
+        table, leveled = level_frame(sensor, log.file, log.layout, reading, start, log.table)
         table.attrs["warnings"] = list(map(python_words, leveled.warnings))
         return table
 

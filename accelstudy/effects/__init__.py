@@ -16,7 +16,7 @@ from accelstudy.effects.base import (
     register,
 )
 from accelstudy.effects.hold_conditions import HoldConditions
-from accelstudy.effects.lag import Course
+from accelstudy.effects.lag import Course, course_of_log
 
 __all__ = [
     "Course",
@@ -24,6 +24,7 @@ __all__ = [
     "HoldConditions",
     "Parameter",
     "Setting",
+    "course_of_log",
     "effect_names",
     "effects_without",
     "get_effect",

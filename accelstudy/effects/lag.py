@@ -23,17 +23,6 @@ class Course:
     time: Array
     temperature: Array
 
-    def then(self, time: Array, temperature: Array) -> Course:
-        """Continue the course with readings (n,) of a thermometer; one per second is kept."""
-        last = np.floor(self.time[-1]) if len(self.time) else -np.inf
-        known = np.isfinite(temperature) & np.isfinite(time) & (np.floor(time) > last)
-        time, temperature = time[known], temperature[known]
-        _, kept = np.unique(np.floor(time), return_index=True)
-        return Course(
-            np.concatenate([self.time, time[kept]]),
-            np.concatenate([self.temperature, temperature[kept]]),
-        )
-
     def behind(self, time: ArrayLike, tau: float) -> Array:
         """Temperature of a body that follows the course with a first-order lag, less the course, K.
 
@@ -56,3 +45,10 @@ class Course:
         i = np.maximum(np.searchsorted(known, at, side="right") - 1, 0)
         since = np.maximum(at - known[i], 0.0)
         return np.asarray((np.array(behind)[i] + rise[i]) * np.exp(-since / tau) - rise[i])
+
+
+def course_of_log(time: Array, temperature: Array) -> Course | None:
+    """Course by the readings (n,) of a thermometer, one per second; None if there is none."""
+    known = np.isfinite(temperature) & np.isfinite(time)
+    _, kept = np.unique(np.floor(time[known]), return_index=True)
+    return Course(time[known][kept], temperature[known][kept]) if len(kept) else None

@@ -317,8 +317,8 @@ def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
     assert "a reading in counts" in header
     assert "x is read as −y" in header
     readings = readings_of(log_of(raw, tmp_path), calibration, {"columns": COLUMNS})
-    ((_, read, _),) = readings.chunks()
-    np.testing.assert_allclose(axes.from_frd(calibration.correct(read)), expected, atol=1e-8)
+    corrected = calibration.correct(readings.forces)
+    np.testing.assert_allclose(axes.from_frd(corrected), expected, atol=1e-8)
 
 
 COLUMNS = {"fx": 0, "fy": 1, "fz": 2}

@@ -1,4 +1,4 @@
-"""Apply a calibration to a log and level with it, a chunk of rows at a time."""
+"""Apply a calibration to a log and level with it."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from accelstudy.basics.units import (
 from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch, noise_of_reading
 from accelstudy.campaign.calibration.readings import Readings, readings_of
-from accelstudy.campaign.calibration.tables import chunk_writer, column_names, is_parquet
+from accelstudy.campaign.calibration.tables import ROWS, is_parquet, typed, write_table
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.importing.recording import AXES
-from accelstudy.campaign.importing.sources import CHUNK, LogFile
+from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import near_pole
 from accelstudy.sensors.frames import Frame
@@ -41,9 +41,6 @@ range."""
 
 NEAR_POLE = "near_pole"
 """Column that says whether a row is too close to the roll pole for its sigmas."""
-
-RAGGED = "ragged"
-"""Key of an unusable line that has more or fewer cells than the others."""
 
 DECIMALS = 9
 """Decimals of the added columns: far below any noise, and half the digits of a double."""
@@ -65,66 +62,72 @@ class Leveled:
     warnings: tuple[str, ...]
 
 
-class Leveling:
-    """A calibration that levels a log, a chunk of rows at a time; see `level_log`."""
+def level(
+    calibration: Calibration,
+    log: LogFile,
+    given: Mapping[str, Any] | None = None,
+    sigma: float | None = None,
+    start: float | None = None,
+) -> tuple[Readings, dict[str, pa.ChunkedArray], Leveled]:
+    """Level a log; see `level_log`.
 
-    def __init__(
-        self,
-        calibration: Calibration,
-        log: LogFile,
-        given: Mapping[str, Any] | None = None,
-        sigma: float | None = None,
-        start: float | None = None,
-    ) -> None:
-        self._calibration = calibration
-        self._readings = readings_of(log, calibration, given, start or 0.0)
-        if sigma is not None:
-            bounds.SIGMA_READING.check_key("--sigma", sigma)
-        self._noise = noise_of_reading(calibration) if sigma is None else sigma
-        self._account = Account(calibration, self._readings)
-        self._started = start is not None
-
-    def chunks(
-        self, size: int = CHUNK, typed: bool = False
-    ) -> Iterator[tuple[pa.Table, dict[str, pa.Array]]]:
-        """Rows as they are in the log, and the columns that are added; see `read_chunks`."""
-        calibration, frame = self._calibration, self._readings.frame
-        for table, forces, hold in track(self._readings.chunks(size, typed), "leveling"):
-            corrected, near, added = _leveled(calibration, frame, forces, hold, self._noise)
-            self._account.add(table, forces, corrected, near, hold)
-            yield table, added
-        self._account.close()
-
-    def summary(self) -> Leveled:
-        """Return what is to be known of the rows that were leveled."""
-        calibration, account = self._calibration, self._account
-        doubts = (
-            *_implausible(calibration),
-            *_mended(calibration, self._readings),
-            *_estimated(calibration),
+    Returns
+    -------
+    readings : Readings, with the rows as they were read
+    added : dict of columns, calibrated forces, roll and pitch and their standard deviations
+    leveled : Leveled
+    """
+    readings = readings_of(log, calibration, given, start or 0.0)
+    if sigma is not None:
+        bounds.SIGMA_READING.check_key("--sigma", sigma)
+    noise = noise_of_reading(calibration) if sigma is None else sigma
+    starts = range(0, len(readings.forces), ROWS)
+    parts = [
+        _leveled(
+            calibration,
+            readings.frame,
+            readings.forces[first : first + ROWS],
+            readings.hold.take(np.arange(first, min(first + ROWS, len(readings.forces)))),
+            noise,
         )
-        assumed = () if self._started else account.assumptions()
-        return Leveled(account.rows, account.empty, (*doubts, *assumed, *account.warnings()))
+        for first in track(starts, "leveling")
+    ] or [_leveled(calibration, readings.frame, readings.forces, readings.hold, noise)]
+    corrected = np.concatenate([part[0] for part in parts])
+    near = np.concatenate([part[1] for part in parts])
+    added = {name: pa.chunked_array([part[2][name] for part in parts]) for name in parts[0][2]}
+    account = Account(calibration, readings, corrected, near)
+    doubts = (
+        *_implausible(calibration),
+        *_mended(calibration, readings),
+        *_estimated(calibration),
+        *(account.assumptions() if start is None else ()),
+        *account.warnings(),
+    )
+    return readings, added, Leveled(account.rows, account.empty, doubts)
 
 
 def level_frame(
-    leveling: Leveling, frame: pd.DataFrame | None = None
+    calibration: Calibration,
+    log: LogFile,
+    given: Mapping[str, Any] | None = None,
+    sigma: float | None = None,
+    start: float | None = None,
+    frame: pd.DataFrame | None = None,
 ) -> tuple[pd.DataFrame, Leveled]:
     """Return what `level_log` writes, with nothing written.
 
     Parameters
     ----------
-    leveling : Leveling
+    calibration, log, given, sigma, start : as of `level_log`
     frame : DataFrame, optional
         The rows of the log as their owner has them, whose index and columns stay as they are; as
         they were read if omitted.
     """
-    rows, added = zip(*leveling.chunks(typed=True), strict=True)
+    readings, added, leveled = level(calibration, log, given, sigma, start)
     if frame is None:
-        frame = pa.concat_tables(rows).to_pandas()
-    columns = pa.concat_tables(map(pa.table, added)).to_pandas()
-    values = {name: column.to_numpy() for name, column in columns.items()}
-    return frame.assign(**values), leveling.summary()
+        frame = typed(readings.source, readings.table).to_pandas()
+    values = {name: column.to_numpy() for name, column in added.items()}
+    return frame.assign(**values), leveled
 
 
 def level_log(
@@ -134,7 +137,6 @@ def level_log(
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
     start: float | None = None,
-    chunk_size: int = CHUNK,
 ) -> Leveled:
     """Write a log with calibrated forces, roll and pitch and their standard deviations.
 
@@ -150,7 +152,6 @@ def level_log(
         How to read the log; see `readings_of`.
     sigma : float, m/s², noise of a reading; see `noise_of_reading` if omitted
     start : float, s, from the start of the calibration session to the first row; 0 if omitted
-    chunk_size : int, rows held in memory at a time
 
     Raises
     ------
@@ -158,11 +159,12 @@ def level_log(
         If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
         far from gravity in most rows that it must be in another unit.
     """
-    leveling = Leveling(calibration, log, given, sigma, start)
-    with chunk_writer(out) as write:
-        for table, added in leveling.chunks(chunk_size, typed=is_parquet(out)):
-            write(_with(table, added))
-    return leveling.summary()
+    readings, added, leveled = level(calibration, log, given, sigma, start)
+    table = readings.table
+    # The row labels that pandas writes as a column are not part of the log.
+    table = table.drop_columns([n for n in table.column_names if n.startswith("__index_level_")])
+    write_table(out, _with(typed(readings.source, table) if is_parquet(out) else table, added))
+    return leveled
 
 
 def _implausible(calibration: Calibration) -> tuple[str, ...]:
@@ -223,7 +225,7 @@ def _leveled(
     return corrected, near, {**columns, NEAR_POLE: pa.array(near, mask=lost)}
 
 
-def _with(table: pa.Table, added: dict[str, pa.Array]) -> pa.Table:
+def _with(table: pa.Table, added: Mapping[str, pa.ChunkedArray]) -> pa.Table:
     """Table with added columns; existing columns of the same name are replaced."""
     for name, column in added.items():
         if name in table.column_names:
@@ -240,69 +242,51 @@ def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
 
 
 class Account:
-    """Collects what the user should know about a log; chunks are added one after the other.
+    """What the user should know about a log that was leveled.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    readings : Readings
+    corrected : (n, 3) array, m/s² in frd, calibrated forces of the rows; NaN where there is none
+    near : (n,) bool array, rows that are too close to the roll pole for their sigmas
 
     Attributes
     ----------
-    rows : int, so far
+    rows : int
     empty : int, rows without a calibrated force
+
+    Raises
+    ------
+    InputError
+        If no row is usable, or most readings are far from gravity.
     """
 
-    def __init__(self, calibration: Calibration, readings: Readings) -> None:
-        self._calibration, self._readings = calibration, readings
-        self._watch = Watch(calibration.ranges)
-        self._first_forces = np.empty((0, 3))
-        self._usable = self._far = self._after = self._near = 0
-        self._first_empty: tuple[int, str | None] = (0, None)
-        self.rows = self.empty = 0
-
-    def add(
+    def __init__(
         self,
-        table: pa.Table,
-        forces: Array,
+        calibration: Calibration,
+        readings: Readings,
         corrected: Array,
         near: NDArray[np.bool_],
-        hold: HoldConditions,
     ) -> None:
-        """Add rows, their readings and calibrated forces (k, 3), m/s² in frd, and conditions.
-
-        `near` says which of them are too close to the roll pole for their sigmas.
-
-        Raises
-        ------
-        InputError
-            If all readings of the first chunk are nowhere near gravity.
-        """
-        lost = np.isnan(corrected[:, 0])
-        if lost.any() and not self.empty:
-            first = int(np.argmax(lost))
-            absent = bool(np.isnan(forces[first]).any())
-            self._first_empty = self.rows + first, self._unusable(table, first, absent)
-        self.rows += len(lost)
-        self.empty += int(lost.sum())
-        self._near += int(near.sum())
-        norms = np.linalg.norm(forces, axis=1)
-        measured = np.isfinite(norms)
-        norms = norms[measured]
-        # Even bad sensors are wrong by some tenths only; larger differences come from motion.
-        gravity = self._calibration.gravity
-        self._far += int(np.sum((norms < gravity / 2) | (norms > gravity * 2)))
-        if not self._usable and len(norms):
-            self._first_forces = forces[measured]
-            if self._far == len(norms):
-                raise self._wrong_unit()
-        self._usable += len(norms)
-        if self._calibration.drifts and hold.time is not None:
-            self._after += int(np.sum(hold.time > (1 + MARGIN) * self._session_end))
-        self._watch.look_at(corrected, hold)
-
-    def close(self) -> None:
-        """Raise `InputError` if no row is usable, or most readings are far from gravity."""
-        if not self._usable:
-            path = self._readings.source.path
+        self._calibration, self._readings = calibration, readings
+        self._empty = np.isnan(corrected[:, 0])
+        self.rows, self.empty = len(corrected), int(self._empty.sum())
+        self._near = int(near.sum())
+        norms = np.linalg.norm(readings.forces, axis=1)
+        norms = norms[np.isfinite(norms)]
+        if not len(norms):
+            path = readings.source.path
             raise InputError(f"{path}: no row has three numbers; the first: {self._reason()}")
-        if 2 * self._far > self._usable:
+        # Even bad sensors are wrong by some tenths only; larger differences come from motion.
+        gravity, time = calibration.gravity, readings.hold.time
+        if 2 * np.sum((norms < gravity / 2) | (norms > gravity * 2)) > len(norms):
             raise self._wrong_unit()
+        self._after = 0
+        if calibration.drifts and time is not None:
+            self._after = int(np.sum(time > (1 + MARGIN) * self._session_end))
+        self._watch = Watch(calibration.ranges)
+        self._watch.look_at(corrected, readings.hold)
 
     def assumptions(self) -> Iterator[str]:
         """Assumptions that are made if the user does not say when the log was started."""
@@ -356,39 +340,26 @@ class Account:
             f"{p.name} = {quantity_text(float(values[p.name]), p.unit)}" for p in effect.parameters
         )
 
-    def _unusable(self, table: pa.Table, row: int, absent: bool) -> str | None:
-        """Key of the first used column that has no number, or an absurd one, in a row of a chunk.
-
-        `absent` says whether a reading is missing there.
-        """
-        names = column_names(self._readings.source)
-        if all(not cell.is_valid for column in table.columns for cell in column.slice(row, 1)):
-            return RAGGED
-        values = {}
-        for key, place in self._readings.places.items():
-            (values[key],) = self._readings.numbers(table[names[place]].slice(row, 1), place)
-            if not np.isfinite(values[key]):
-                return key
-        return max(AXES, key=lambda axis: abs(values[axis])) if absent else None
-
     def _reason(self) -> str:
         """Say why the first empty row is empty, and where it is."""
-        source, places = self._readings.source, self._readings.places
-        row, key = self._first_empty
+        readings, source = self._readings, self._readings.source
+        row = int(np.argmax(self._empty))
+        keys = [key for key, values in readings.values.items() if not np.isfinite(values[row])]
+        if not keys and np.isnan(readings.forces[row]).any():  # it is absurd
+            keys = [max(AXES, key=lambda axis: abs(readings.values[axis][row]))]
         # This reads the file again to find the line.
-        where, cell = source.look_up(row, places.get(key or "", places["fx"]))
-        if key == RAGGED:
-            return f"{where} does not have {len(source.names)} columns like the others"
-        if key is not None:
-            return f"{where}, column {source.names[places[key]]} ({key}): {cell}"
+        where, cell = source.look_up(row, readings.places[keys[0] if keys else "fx"])
+        if keys:
+            return f"{where}, column {source.names[readings.places[keys[0]]]} ({keys[0]}): {cell}"
         full = self._calibration.content.get("range_mps2")
         end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
         return f"{where}: the calibration has no force for such a reading{end}"
 
     def _wrong_unit(self) -> InputError:
         readings, gravity = self._readings, self._calibration.gravity
-        raw = self._first_forces / abs(float(readings.conversion.scale[0]))
-        fault = likely_fault(raw, self._first_forces, readings.unit, gravity)
+        forces = readings.forces[np.isfinite(readings.forces).all(axis=1)]
+        raw = forces / abs(float(readings.conversion.scale[0]))
+        fault = likely_fault(raw, forces, readings.unit, gravity)
         looks = f"these look like {fault.cause}; give --unit {fault.cause}"
         return InputError(
             f"{readings.source.path}: the readings are about {fault.given:.3g} {readings.unit}: "

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import closing
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import Calibration
 from accelstudy.campaign.calibration.export import campaign_conversion, mending
-from accelstudy.campaign.calibration.tables import column_names, numbers, read_chunks
+from accelstudy.campaign.calibration.tables import column_names
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.clocks import nanoseconds
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import (
     AXES,
-    TYPICAL,
     absurd,
     absurd_from,
     locate,
@@ -28,8 +26,8 @@ from accelstudy.campaign.importing.recording import (
     time_factor_of,
     told_by_names,
 )
-from accelstudy.campaign.importing.sources import CHUNK, LogFile, Source
-from accelstudy.effects import Course, HoldConditions
+from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
+from accelstudy.effects import HoldConditions, course_of_log
 from accelstudy.files.reading import overlay
 from accelstudy.files.validation import checked
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -54,7 +52,7 @@ class Readings:
     source : Source, a file or a table in memory
     places : mapping of fx, fy, fz, time, temperature and vibration to columns, as far as known
     rate : float, 1/s, if the time comes from it
-    time_factor : float, s per unit of the column of time
+    time_factor : float, s per unit of the column of time, of whose dates these are ns
     start : float, s, from the start of the calibration session to the first row
     unit : str, of the forces
     conversion : Conversion, of forces to m/s², in the axes of the log
@@ -72,61 +70,52 @@ class Readings:
     frame: Frame
     mending: Array
 
-    def chunks(
-        self, chunk_size: int = CHUNK, typed: bool = False
-    ) -> Iterator[tuple[pa.Table, Array, HoldConditions]]:
-        """Rows as they are in the file, their forces (k, 3) in m/s² in frd, and their conditions.
+    @cached_property
+    def table(self) -> pa.Table:
+        """Rows as they are in the file, with all their columns."""
+        names = column_names(self.source)
+        return pa.table(self.source.columns(range(len(names))), names=names)
 
-        See `read_chunks` for `typed`.
-        """
-        names, places = column_names(self.source), list(self.places.items())
-        row, first = 0, np.nan
-        with closing(self.source.read([self.places[axis] for axis in AXES], TYPICAL)) as first_rows:
-            limit = absurd_from(next(first_rows, np.empty((0, 3))), self.conversion)
-        course = Course(np.empty(0), np.empty(0))
-        for table in read_chunks(self.source, chunk_size, typed):
-            values = {key: self.numbers(table[names[place]], place) for key, place in places}
-            raw = np.column_stack([values[axis] for axis in AXES])
-            forces = self.conversion.to_si(raw)
-            forces[absurd(raw, forces, limit)] = np.nan
-            time = values.get("time")
-            if time is not None and "nanoseconds" in values:
-                time = time + 1e-9 * values["nanoseconds"]
-            if self.rate is not None:
-                time = self.start + np.arange(row, row + len(table)) / self.rate
-            elif time is not None:
-                if np.isnan(first):
-                    first = next(iter(time[np.isfinite(time)]), np.nan)
-                time = self.start + (time - first) * self.time_factor
-            temperature = values.get("temperature")
-            if time is not None and temperature is not None:
-                course = course.then(time, temperature)
-            # A log has no position before: effects that depend on it add nothing.
-            still = np.zeros(len(table))
-            hold = HoldConditions(
-                time=time,
-                temperature=temperature,
-                vibration=values.get("vibration"),
-                step_x=still,
-                step_y=still,
-                step_z=still,
-                course=course if len(course.time) else None,
-            )
-            read = self.frame.to_frd(forces)
-            yield table, read @ self.mending.T, hold
-            row += len(table)
+    @cached_property
+    def values(self) -> dict[str, NDArray[Any]]:
+        """Numbers of the columns that are used, NaN where there is none."""
+        places = [*self.places.values()]
+        columns = [self.table.column(place) for place in places]
+        return dict(zip(self.places, self.source.numbers(places, columns), strict=True))
 
-    def numbers(self, column: pa.ChunkedArray, place: int) -> Array:
-        """Numbers of a column at a place; of dates, s since 1970."""
-        kind = column.type
-        if place in self.source.dates:
-            return 1e-9 * nanoseconds(column.to_pandas())
-        if not (
-            pa.types.is_string(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind)
-        ):
-            name = self.source.names[place]
-            raise InputError(f"{self.source.path}: column {name} is {kind}, not numbers")
-        return numbers(column)
+    @cached_property
+    def forces(self) -> Array:
+        """Forces of the rows, (n, 3), m/s² in frd; NaN where a reading is missing or absurd."""
+        raw = np.column_stack([self.values[axis] for axis in AXES])
+        forces = self.conversion.to_si(raw)
+        forces[absurd(raw, forces, absurd_from(raw, self.conversion))] = np.nan
+        return self.frame.to_frd(forces) @ self.mending.T
+
+    @cached_property
+    def hold(self) -> HoldConditions:
+        """What else is known of the rows, for effects that need it."""
+        time = None
+        if self.rate is not None:
+            time = self.start + np.arange(len(self.forces)) / self.rate
+        elif "time" in self.values:
+            time = counted_from_first(self.values["time"])[0] * self.time_factor
+            time = time + 1e-9 * self.values.get("nanoseconds", 0)
+            time = self.start + counted_from_first(time)[0]
+        temperature = self.values.get("temperature")
+        course = None
+        if time is not None and temperature is not None:
+            course = course_of_log(time, temperature)
+        # A log has no position before: effects that depend on it add nothing.
+        still = np.zeros(len(self.forces))
+        return HoldConditions(
+            time=time,
+            temperature=temperature,
+            vibration=self.values.get("vibration"),
+            step_x=still,
+            step_y=still,
+            step_z=still,
+            course=course,
+        )
 
 
 def readings_of(

@@ -19,9 +19,9 @@ from accelstudy.campaign.importing.making import (
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, locate
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import LogFile, Source, read_columns
+from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.campaign.session import Campaign
-from accelstudy.sensors.conversion import conversion_of
+from accelstudy.sensors.conversion import LARGEST, conversion_of
 
 Array = NDArray[np.float64]
 
@@ -147,12 +147,23 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
         )
     if settings.time is not None:
         places |= locate(source, {"time": settings.time}, ("time",))
-    rows = read_columns(source, places, places.get("time"))
-    values = dict(zip(places, rows.T, strict=True))
+    columns = source.numbers([*places.values()])
+    if not len(columns[0]):
+        raise InputError(f"{source.path}: no row of numbers")
+    values = {}
+    for key, column in zip(places, columns, strict=True):
+        bad = ~np.isfinite(column) if key == "time" else ~(np.abs(column) <= LARGEST)
+        if bad.any():
+            where, cell = source.look_up(int(np.argmax(bad)), places[key])
+            raise InputError(
+                f"{source.path}: {where}, column {source.names[places[key]]} ({key}): "
+                f"{cell}, not a usable number"
+            )
+        values[key] = column.astype(float)
     if "time" in places:
-        factor = UNITS["s"][settings.time_unit]
-        first = float(next(source.read([places["time"]], 1))[0, 0]) * factor
-        values["time"] = values["time"] * factor + (first if abs(first) < _YEARS else 0.0)
+        factor = 1e-9 if places["time"] in source.dates else UNITS["s"][settings.time_unit]
+        time, first = counted_from_first(columns[[*places].index("time")])
+        values["time"] = (time + (first if abs(first * factor) < _YEARS else 0.0)) * factor
     return values, warnings
 
 

@@ -10,11 +10,11 @@ from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER, open_bag, open
 from accelstudy.campaign.importing.sources import (
     GZIP,
     LogFile,
-    ParquetSource,
     Source,
     TableSource,
     TextSource,
     open_matlab,
+    open_parquet,
 )
 from accelstudy.files.reading import readable
 
@@ -62,7 +62,7 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
     if not start:
         raise InputError(f"{path}: the file is empty")
     if path.suffix.lower() in (".parquet", ".pq"):
-        return ParquetSource(path)
+        return open_parquet(path)
     if start.startswith(GZIP):
         kind = Path(path.stem).suffix.lower()
         if kind in (".parquet", ".pq", ".mat"):

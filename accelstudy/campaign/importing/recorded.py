@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import ArraySource, chosen_of
+from accelstudy.campaign.importing.sources import TableSource, chosen_of, table_of
 from accelstudy.files.reading import readable
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ MOST_FIELDS = 10_000
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
-def open_bag(path: Path, topic: str | None = None) -> ArraySource:
+def open_bag(path: Path, topic: str | None = None) -> TableSource:
     """Read the forces of a bag; their frame is flu, or frd where its name ends in _ned (REP 103).
 
     Parameters
@@ -102,7 +102,7 @@ def open_bag(path: Path, topic: str | None = None) -> ArraySource:
         "time_unit": "s",
         "frame": "frd" if frame.endswith("_ned") else "flu",
     }
-    return ArraySource(path, rows, ["time", *columns.values()], layout, warnings)
+    return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
 
 
 _PACKERS = {
@@ -169,7 +169,7 @@ def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
     return next((some for some in (found, beside) if len({c.topic for c in some}) == 1), [])
 
 
-def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
+def open_ulog(path: Path, instance: str | None = None) -> TableSource:
     """Read the forces of a flight log.
 
     Parameters
@@ -232,7 +232,7 @@ def open_ulog(path: Path, instance: str | None = None) -> ArraySource:
             f"the flight log ends early or is damaged: its samples are whole up to {whole:.1f} s, "
             f"and end at {rows[-1, 0] - rows[0, 0]:.1f} s"
         )
-    return ArraySource(path, rows, ["time", *columns.values()], layout, warnings)
+    return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
 
 
 class _ToTheEnd(BufferedReader):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,7 +26,7 @@ from accelstudy.campaign.importing.names import (
     without_unit,
 )
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.sources import CHUNK, LogFile, Source
+from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
 from accelstudy.sensors.frames import FRD, Frame
 
@@ -251,11 +250,12 @@ def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) ->
     InputError
         If a column of dates, or of seconds beside ns, gets a unit.
     """
-    known = "nanoseconds" in nanoseconds_beside(source, places)
-    if "time" in places and time_unit != "s" and (known or places["time"] in source.dates):
+    dated = places.get("time") in source.dates
+    known = dated or "nanoseconds" in nanoseconds_beside(source, places)
+    if "time" in places and time_unit != "s" and known:
         name = source.names[places["time"]]
         raise InputError(f"{source.path}: column {name} tells its unit; leave --time-unit out")
-    return UNITS["s"][time_unit]
+    return 1e-9 if dated else UNITS["s"][time_unit]
 
 
 def _place(source: Source, key: str, column: Column) -> int:
@@ -281,7 +281,7 @@ def _place(source: Source, key: str, column: Column) -> int:
 
 
 def absurd(raw: Array, forces: Array, limit: float) -> NDArray[np.bool_]:
-    """Which readings (k, 3) are none that a sensor gives; raw and in m/s², `limit` as below."""
+    """Which readings are none that a sensor gives; raw and in m/s², `limit` as below."""
     return (np.abs(forces) > limit) | np.isin(raw, SENTINELS)
 
 
@@ -323,7 +323,7 @@ class Log:
     places : mapping of "fx", "fy", "fz" and perhaps "time", "nanoseconds" (to be added to a time
         in whole seconds) and `CONDITIONS` to columns
     rate : float, 1/s; None with a column of time
-    time_factor : float, s per unit of that column
+    time_factor : float, s per unit of that column, of whose dates these are ns
     conversion : Conversion, of forces to m/s², in the axes of the log
     frame : Frame, the axes of the log
     lively : bool, whether each channel must change; in a single position, one of a coarse sensor
@@ -376,16 +376,10 @@ class Log:
             raise InputError(f"{self.path}: too few samples")
         return usual_step(np.diff(self.samples.time))
 
-    @cached_property
+    @property
     def start(self) -> float:
         """Time of the first sample as written in the file, s; NaN without a column of time."""
-        if self.rate is not None:
-            return np.nan
-        places = [self.places[key] for key in ("time", "nanoseconds") if key in self.places]
-        with closing(self.source.read(places, TYPICAL)) as chunks:
-            whole = (rows[np.isfinite(rows).all(axis=1)] for rows in chunks)
-            first = next((rows[0] for rows in whole if len(rows)), np.full(2, np.nan))
-        return float(first[0] * self.time_factor + 1e-9 * first[1:].sum())
+        return self._read[2]
 
     def likely_unit(self) -> str:
         """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
@@ -402,44 +396,50 @@ class Log:
         )
 
     @cached_property
-    def _read(self) -> tuple[Samples, Losses]:
+    def _read(self) -> tuple[Samples, Losses, float]:
         columns = {**self.places, **self.beside}
-        clock = self.places.get("time")
-        chunks = [*self.source.read([*columns.values()], CHUNK, clock)]
-        raw = np.concatenate(chunks) if chunks else np.empty((0, len(columns)))
-        values = dict(zip(columns, raw.T, strict=True))
+        values = dict(zip(columns, self.source.numbers([*columns.values()]), strict=True))
+        time, start = np.arange(len(values["fx"])) / (self.rate or 1.0), np.nan
+        if self.rate is None:
+            values["time"], start = counted_from_first(values["time"])
+            time = values["time"] * self.time_factor + 1e-9 * values.get("nanoseconds", 0)
         lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
-        for key in self.conditions:
-            values[key][lost.pop(key)] = np.nan
-        limit = absurd_from(np.column_stack([values[axis] for axis in AXES]), self.conversion)
+        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
+        limit = absurd_from(usual, self.conversion)
         for axes in (AXES, *zip(*[iter(self.beside)] * 3, strict=True)):
-            readings = np.column_stack([values[key] for key in axes])
-            forces = self.conversion.to_si(readings)
-            for key, none in zip(axes, absurd(readings, forces, limit).T, strict=True):
-                lost[key] |= none
+            converted = []
+            for i, key in enumerate(axes):
+                reading = values.pop(key)
+                converted.append(self.conversion.of_axis(i).to_si(reading))
+                lost[key] |= absurd(reading, converted[i], limit)
             if axes is AXES:
-                own = self.frame.to_frd(forces)
+                # Each axis in one piece, as sums along it are faster.
+                forces = self.frame.to_frd(np.array(converted).T)
+        unknown = [lost.pop(key) for key in self.conditions]
+        conditions = np.empty((len(forces), len(unknown)), order="F")
+        for i, (key, none) in enumerate(zip(self.conditions, unknown, strict=True)):
+            conditions[:, i] = np.where(none, np.nan, values[key])
         usable = ~np.any([*lost.values()], axis=0)
         row = np.flatnonzero(usable)
+        if len(row) < len(usable):
+            time, forces, conditions = time[row], forces[row], conditions[row]
         first = [
             (int(i), next(key for key, none in lost.items() if none[i]))
             for i in np.flatnonzero(~usable)[:NAMED]
         ]
-        losses = Losses(len(raw), len(raw) - len(row), first)
-        if clock is None:
-            time = row / (self.rate or 1.0)
-        else:
-            time = values["time"] * self.time_factor + 1e-9 * values.get("nanoseconds", 0.0)
-            time = time[row] - (time[row[0]] if len(row) else 0.0)
+        losses = Losses(len(usable), len(usable) - len(row), first)
+        if self.rate is None and len(row):
+            start = start * self.time_factor + time[0]
+            time = time - time[0]
         samples = Samples(
             time,
-            np.asfortranarray(own[row]),
-            np.column_stack([np.empty((len(row), 0)), *(values[k][row] for k in self.conditions)]),
+            np.asfortranarray(forces),
+            np.asfortranarray(conditions),
             row,
             np.zeros(len(row), dtype=int),
         )
         self._check(samples, losses)
-        return samples, losses
+        return samples, losses, start
 
     def _check(self, samples: Samples, losses: Losses) -> None:
         backward = np.diff(samples.time) <= 0

@@ -37,18 +37,15 @@ _WITHIN = _RATIO**2 + 1 / 12 - _LEFT
 """Variance of the readings within a hold in the same unit: of all, less what the mean has of it."""
 
 
-def steps_of(readings: Array) -> Array:
-    """Step of each axis of readings (n, 3), (3,), m/s²; 0 where none is found."""
-    steps = np.zeros(3)
-    for axis, values in enumerate(readings.T):
-        different = np.empty(0)
-        for first in range(0, len(values), MOST):  # most axes of fine steps show it at once
-            different = np.union1d(different, values[first : first + MOST])
-            if len(different) > MOST:
-                break
-        if len(different) <= min(MOST, len(values) / OFTEN):
-            steps[axis] = float(f"{step_of(different):.6g}")
-    return steps
+def step_in(readings: Array) -> float:
+    """Step of the readings (n,) of an axis, m/s²; 0 if there is none."""
+    different = np.empty(0)
+    for first in range(0, len(readings), MOST):  # most axes of fine steps show it at once
+        different = np.union1d(different, readings[first : first + MOST])
+        if len(different) > MOST:
+            return 0.0
+    often = len(readings) >= OFTEN * len(different)
+    return float(f"{step_of(different):.6g}") if often else 0.0
 
 
 def step_of(different: Array) -> float:

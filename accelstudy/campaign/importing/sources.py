@@ -1,4 +1,4 @@
-"""Files of numbers in columns: text of any layout, MATLAB, Parquet, bags and flight logs."""
+"""Tables of numbers: text of any layout, MATLAB, Parquet, or a table in memory."""
 
 from __future__ import annotations
 
@@ -7,57 +7,65 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from io import TextIOWrapper
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TextIO, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
+from accelstudy.basics.progress import stage
 from accelstudy.basics.wording import counted, one_line
-from accelstudy.campaign.importing.clocks import is_stamp, nanoseconds
 from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import Unpacked, readable
-from accelstudy.sensors.conversion import LARGEST
 
 # Slow to import, so where a file needs it: what calibrates a campaign reads no log.
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
 Array = NDArray[np.float64]
-
-CHUNK = 65536
-"""Rows that are held in memory at a time."""
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
 _LONGEST = 2**20  # characters of a line
+_BLOCK = 2**23  # bytes that hold any such line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
 _SEPARATORS = {"tab": "\t", "blank": None}
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
-_BUFFER = 2**20  # bytes of a Parquet column
+_DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
+_NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
 _IS_NUMBER = re.compile("double|single|u?int[0-9]+")  # classes of MATLAB arrays
+_CLOCK = r"\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?"
+_ISO = r"\d{4}-?\d\d-?\d\d[T ]\d\d(:?\d\d.*)?"
+_DAY = r"(\d{4}(?P<of>[-/.])\d{1,2}(?P=of)\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4})"
+_STAMP = re.compile(rf"{_ISO}|{_DAY}[T ]+{_CLOCK}|{_CLOCK}")
+"""The order of day and month is plain in 31.1.2024, but not in 3/1/2024."""
+_AS_ISO = (
+    (r"(:\d\d:\d\d)[,:](\d+)$", r"\1.\2"),  # "12:30:05:500", as LabVIEW and others write it
+    (r"^(\d{1,2})\.(\d{1,2})\.(\d{4})", r"\3-\2-\1"),
+    (r"^(\d{1,2}:)", r"1970-01-01 \1"),
+    (r"[T ]+(\d):", r" 0\1:"),
+)
 
 
-class Source(Protocol):
-    """A file of numbers in columns.
+class Source:
+    """A table of numbers, in a file or in memory.
 
     Attributes
     ----------
     path : Path
     names : list of str, of the columns; their places, counted from 0, where the file has no names
     named : bool, whether the file has names
-    dates : set of int, places of columns of dates with times, which `read` gives in s
+    dates : set of int, places of columns of dates with times, of which the numbers are in ns
     layout : mapping, what the format says of the keys of `LogLayout`; empty for a plain table
     notes : sequence of str, how the file was read, in lines for people
     warnings : sequence of str, what of the file could not be read
@@ -66,28 +74,55 @@ class Source(Protocol):
     path: Path
     names: list[str]
     named: bool
-    dates: Set[int]
+    dates: Set[int] = frozenset()
     layout: Mapping[str, Any]
-    warnings: Sequence[str]
+    warnings: Sequence[str] = ()
 
     @property
     def notes(self) -> Sequence[str]:
         """How the file was read, in lines for people."""
-        ...
+        return ()
 
-    def read(
-        self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Generator[Array, None, None]:
-        """Rows of the columns at `places`, (k, len(places)), k > 0; NaN where there is no number.
+    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Columns as they are in the file: of a text, of text; rows that are none are null."""
+        raise NotImplementedError
 
-        The column at the place `clock` counts from its first value, since a time in ns since 1970
-        has more digits than a float.
+    def numbers(
+        self, places: Sequence[int], columns: Sequence[pa.ChunkedArray] | None = None
+    ) -> list[NDArray[Any]]:
+        """Numbers of columns, NaN where there is none; dates and other whole numbers as integers.
+
+        A time in ns since 1970 has more digits than a float. The columns are read unless they were.
         """
-        ...
+        import pyarrow as pa
+
+        left = self._cells_of_numbers(places) if columns is None else [*columns]
+        # A text takes more memory than its numbers, so it goes as these come.
+        numbers = [self._numbers(left.pop(0), place) for place in places]
+        pa.default_memory_pool().release_unused()
+        return numbers
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Describe where a row is in the file, and what its cell in a column says."""
-        ...
+        raise NotImplementedError
+
+    def _cells_of_numbers(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Columns of which only the numbers matter."""
+        return self.columns(places)
+
+    def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
+        import pyarrow as pa
+
+        kind = column.type
+        if place in self.dates:
+            return nanoseconds(column.to_pandas())
+        if isinstance(self, TextSource) and pa.types.is_string(kind):
+            return _numbers_of_text(column)
+        if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+            raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
+        if column.null_count:
+            column = column.cast(pa.float64(), safe=False)
+        return column.to_numpy()
 
 
 def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None) -> str:
@@ -103,7 +138,7 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
     return next(iter(found)) if wanted is None else wanted
 
 
-class TextSource:
+class TextSource(Source):
     """Numbers in lines of text.
 
     Attributes
@@ -115,12 +150,10 @@ class TextSource:
     decimal : str, mark between units and tenths
     comment : str, from which on the rest of a line is no data
     first : int, lines before the data
-    width, least : int, cells of a row: at most, and usual if the last ones are empty
-    repeated : int, how often the header stands between the rows, as far as these were read
+    width : int, cells of a row; a row with fewer lacks the last ones
+    repeated : int, how often the header stands between the rows, once these were read
     dates, layout, notes, warnings : see `Source`
     """
-
-    warnings: Sequence[str] = ()
 
     def __init__(self, path: Path, delimiter: str | None = None) -> None:
         self.path, self.repeated = path, 0
@@ -146,8 +179,8 @@ class TextSource:
             advice = "" if delimiter is None else f" with --delimiter {delimiter!r}"
             raise InputError(f"{path}: no line of numbers at the beginning{advice}")
         self.delimiter, self.decimal = table.delimiter, table.decimal
-        self.first, self.width, self.least = table.first, table.width, table.least
-        self.dates: Set[int] = table.dates
+        self.first, self.width = table.first, table.width
+        self.dates, self._long = table.dates, table.long
         self.comment = next((c for c in "#%" for line in lines if line.lstrip()[:1] == c), "#")
         self.named = table.names is not None
         self.names = table.names or [str(i) for i in range(self.width)]
@@ -155,8 +188,14 @@ class TextSource:
         self.layout = layout_by_names(self.names)
         self._comments = _comments(self.delimiter)
         self._marks = ('"', *self._comments, *self._repeats)
+        if self.delimiter is None:
+            self._marks += ("  ", "\t", "\n ", " \n")
+        mark = re.escape(self.delimiter or " ")
         # A cell in quotation marks that holds neither another mark nor the delimiter.
-        self._quoted = re.compile(f'"[^"\n{re.escape(self.delimiter or " ")}]*"')
+        self._quoted = re.compile(f'"[^"\n{mark}]*"')
+        # Blanks before a cell in quotation marks or, as a delimiter, between any cells.
+        blanks = rf'(?<={mark})[ ]+(?=")' if self.delimiter else r"\s+"
+        self._blanks = re.compile(blanks + r'(?=(?:[^"]*"[^"]*")*[^"]*$)')
 
     @property
     def notes(self) -> list[str]:
@@ -164,56 +203,94 @@ class TextSource:
         again = f"the header stands {counted(self.repeated, 'more time')} between the rows"
         return [*self._notes, *([again] if self.repeated else [])]
 
-    def read(
-        self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Generator[Array, None, None]:
-        """Rows of some columns; see `Source`. A row with too many cells has no numbers."""
-        import pandas as pd
+    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Cells of columns, without blanks around them; a row with too many cells is null.
+
+        Nobody knows which of its cells are right.
+        """
+        import pyarrow as pa
+        import pyarrow.compute as pc
 
         try:
-            with (
-                self._readable(),
-                self._open(self.first) as file,
-                pd.read_csv(
-                    cast(TextIO, _Lines(self, file)),
-                    sep=self.delimiter or r"\s+",
-                    decimal=self.decimal,
-                    # With columns to use, a row may have more cells than the first line.
-                    usecols=sorted({*places, self.width}),
-                    header=0,
-                    index_col=False,
-                    comment=self.comment,
-                    skipinitialspace=True,
-                    low_memory=False,
-                    chunksize=chunk_size,
-                ) as reader,
-            ):
-                yield from self._rows(reader, places, clock)
-        except InputError:
-            raise
-        except pd.errors.EmptyDataError:
-            return
-        except pd.errors.ParserError as error:
+            table, ragged = self._read(dict.fromkeys(places, pa.string()))
+        except pa.ArrowInvalid as error:
             raise InputError(f"{self.path}: no table: {one_line(error)}") from None
+        if ragged:
+            table = self._with_ragged(table, ragged)
+        columns = {}
+        for name in table.column_names:
+            cells = table[name]
+            if pc.any(pc.match_substring(cells, " ")).as_py():
+                cells = pc.utf8_trim_whitespace(cells)
+            if self.decimal == ",":
+                cells = pc.replace_substring_regex(cells, _DECIMAL_COMMA, r"\1.\2")
+            columns[int(name)] = cells
+        return [columns[place] for place in places]
 
-    def _rows(
-        self, chunks: Iterable[pd.DataFrame], places: Sequence[int], clock: int | None
-    ) -> Iterator[Array]:
-        def columns() -> Iterator[list[NDArray[Any]]]:
-            for chunk in chunks:
-                values = [
-                    nanoseconds(chunk[str(place)])
-                    if place in self.dates
-                    else _numbers_of_text(chunk[str(place)], self.decimal)
-                    for place in places
-                ]
-                # A surplus cell ends up in the column after the last.
-                surplus = chunk[str(self.width)].notna().to_numpy()
-                if surplus.any():
-                    values = [np.where(surplus, np.nan, column) for column in values]
-                yield values
+    def _cells_of_numbers(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Columns as numbers where all cells are, which saves time and memory."""
+        import pyarrow as pa
 
-        return rows_of(columns(), places, self.dates, clock)
+        if self.decimal == "." and not self.dates & {*places}:
+            types = {p: pa.int64() if p in self._long else pa.float64() for p in places}
+            try:
+                table, ragged = self._read(types)
+            except pa.ArrowInvalid:
+                return self.columns(places)
+            if not ragged:
+                return [table[str(place)] for place in places]
+        return self.columns(places)
+
+    def _read(self, types: Mapping[int, pa.DataType]) -> tuple[pa.Table, list[tuple[int, str]]]:
+        """Columns of these places and types, and the rows with fewer or more cells than others."""
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+
+        names = [str(place) for place in range(self.width)]
+        ragged: list[tuple[int, str]] = []
+
+        def set_aside(row: Any) -> str:
+            ragged.append((row.number - 1, row.text))
+            return "skip"
+
+        kinds = {names[place]: kind for place, kind in types.items()}
+        with self._readable(), stage(f"reading {self.path.name}"):
+            content = self._rows_as_text()
+            if not content:
+                return pa.schema(kinds).empty_table(), ragged
+            table = arrow_csv.read_csv(
+                pa.BufferReader(content),
+                # Of several threads none knows the number of its row.
+                arrow_csv.ReadOptions(column_names=names, use_threads=False, block_size=_BLOCK),
+                arrow_csv.ParseOptions(
+                    delimiter=self.delimiter or " ", invalid_row_handler=set_aside
+                ),
+                arrow_csv.ConvertOptions(
+                    column_types=kinds, include_columns=[*kinds], strings_can_be_null=False
+                ),
+            )
+        return table, ragged
+
+    def _with_ragged(self, table: pa.Table, ragged: Sequence[tuple[int, str]]) -> pa.Table:
+        """Rows with those that have fewer or more cells, by their places, where they belong."""
+        import pyarrow as pa
+
+        rows: list[Sequence[str | None]] = []
+        for _, text in ragged:
+            cells = split_line(text, self.delimiter)
+            filled = [*cells, *[""] * self.width][: self.width]
+            rows.append([None] * self.width if any(cells[self.width :]) else filled)
+        columns = [[row[int(name)] for row in rows] for name in table.column_names]
+        more = pa.table([pa.array(c, pa.string()) for c in columns], table.column_names)
+        places = np.array([place for place, _ in ragged])
+        order = np.insert(
+            np.arange(len(table)),
+            places - np.arange(len(places)),
+            len(table) + np.arange(len(places)),
+        )
+        # Blank lines and the like are no rows.
+        none = [place for place, text in ragged if self._row(text) is None]
+        return pa.concat_tables([table, more]).take(np.delete(order, none))
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """See `Source`; reads the file again, which only errors need."""
@@ -234,16 +311,29 @@ class TextSource:
                 if number > self.first and (row := self._row(line.rstrip("\n"))) is not None:
                     yield number, row
 
-    def of_table(self, text: str) -> str:
+    def _rows_as_text(self) -> bytes:
+        """Rows of the table, each in a line of its own, in UTF-8."""
+        self.repeated = 0
+        parts = []
+        with self._open(self.first) as file:
+            while text := file.read(_BLOCK // 8):
+                if not text.endswith("\n"):
+                    text += (end := file.readline(_LONGEST))
+                    if len(end) == _LONGEST:
+                        raise InputError(
+                            f"{self.path}: a line of more than {_LONGEST} characters; is it text?"
+                        )
+                parts.append(self._of_table(text).encode())
+        return b"".join(parts)
+
+    def _of_table(self, text: str) -> str:
         """Lines of a text without those that are no rows."""
-        if not any(mark in text for mark in self._marks):
+        if not any(mark in text for mark in self._marks) and not text.startswith(" "):
             return text
         lines = text.split("\n")
         self.repeated += sum(line.strip() in self._repeats for line in lines)
-        if '"' in text and '"' not in self._quoted.sub("", text):
-            rows = [row for line in lines if (row := self._row(line, closed=True)) is not None]
-        else:
-            rows = [row for line in lines if (row := self._row(line)) is not None]
+        closed = '"' not in self._quoted.sub("", text)
+        rows = (row for line in lines if (row := self._row(line, closed)) is not None)
         return "".join(f"{row}\n" for row in rows)
 
     def _row(self, line: str, closed: bool = False) -> str | None:
@@ -254,14 +344,20 @@ class TextSource:
         content = line.strip(_blanks(self.delimiter))
         if not content or content.startswith(self._comments) or line.strip() in self._repeats:
             return None
-        if closed or '"' not in line:
-            return line
-        try:
-            reader = csv.reader([line, ""], delimiter=self.delimiter or " ", skipinitialspace=True)
-            closed = sum(1 for _ in reader) == 2
-        except csv.Error:
-            closed = False
-        return line if closed else line.replace('"', "")
+        row = line
+        if self.comment in line and (start := line.split(self.comment)[0]).count('"') % 2 == 0:
+            row = start
+        if '"' in row and not closed:
+            try:
+                mark = self.delimiter or " "
+                reader = csv.reader([row, ""], delimiter=mark, skipinitialspace=True)
+                closed = sum(1 for _ in reader) == 2
+            except csv.Error:
+                closed = False
+            row = row if closed else row.replace('"', "")
+        if '"' in row:
+            return self._blanks.sub("" if self.delimiter else " ", row.strip(" "))
+        return row if self.delimiter else " ".join(row.split())
 
     def _open_binary(self) -> BinaryIO:
         with self.path.open("rb") as start:
@@ -288,32 +384,6 @@ class TextSource:
             raise InputError(f"{self.path}: not a whole gzip file") from None
 
 
-class _Lines:
-    """The rows of a text as a file; before them a line with a cell more than they have."""
-
-    def __init__(self, source: TextSource, file: TextIO) -> None:
-        self._source, self._file = source, file
-        self._first = (source.delimiter or " ").join(map(str, range(source.width + 1))) + "\n"
-        source.repeated = 0
-
-    def __iter__(self) -> Iterator[str]:  # by which pandas knows a file
-        return iter(self.read, "")
-
-    def read(self, size: int = -1) -> str:
-        """Some whole lines; an empty text at the end."""
-        first, self._first = self._first, ""
-        while not first and (text := self._file.read(size)):
-            if not text.endswith("\n"):
-                text += (end := self._file.readline(_LONGEST))
-                if len(end) == _LONGEST:
-                    raise InputError(
-                        f"{self._source.path}: a line of more than {_LONGEST} characters; is it "
-                        "text?"
-                    )
-            first = self._source.of_table(text)
-        return first
-
-
 class _Table:
     """Lines of a text as a table, if a delimiter and a decimal mark are the right ones.
 
@@ -322,8 +392,9 @@ class _Table:
     delimiter, decimal : see `TextSource`
     score : int, numbers in rows of the usual width, of which the right marks give most; 0 if the
         lines are no table
-    first, width, least, dates, names, notes : see `TextSource`; no names where there are none
+    first, width, dates, names, notes : see `TextSource`; no names where there are none
     header : tuple of str, lines with names and units
+    long : set of int, places of columns of whole numbers with more digits than a float
     """
 
     def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
@@ -346,14 +417,15 @@ class _Table:
         full = next(place for place, (i, _) in enumerate(alike) if numbers[i] >= many)
         before = takewhile(lambda row: self._lacks(row[1], alike[full][1]), alike[full - 1 :: -1])
         self.first = min([alike[full][0], *(i for i, _ in before if full)])
-        self.width = self.least = usual
+        self.width = usual
         cells = [cells for i, cells in rows if i >= self.first]
         self.header: tuple[str, ...] = ()
         self.names: list[str] | None = None
         self.notes: list[str] = []
         self._read_header(lines[: self.first], cells)
-        firsts = (next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual))
+        firsts = [next((row[i] for row in cells if row[i:] and row[i]), "") for i in range(usual)]
         self.dates = {i for i, cell in enumerate(firsts) if is_stamp(cell)}
+        self.long = {i for i, cell in enumerate(firsts) if re.fullmatch("-?[0-9]{16,19}", cell)}
 
     def _lacks(self, cells: Sequence[str], full: Sequence[str]) -> bool:
         """Whether a row is like a full one, but for some readings."""
@@ -399,7 +471,7 @@ class _Table:
         while len(names) > longest and not names[-1]:
             names = names[:-1]
         if len(names) == self.width - 1 and not any(row[len(names) :][:1] != [""] for row in rows):
-            self.width = self.least = len(names)
+            self.width = len(names)
             self.notes.append("a delimiter at the end of each row is no column")
         if self.width < len(names) == longest:
             self.width = len(names)
@@ -454,83 +526,75 @@ def _most_frequent(counts: Iterable[int]) -> int:
     return max(Counter(counts).items(), key=lambda item: item[::-1])[0]
 
 
-def _numbers_of_text(column: pd.Series, decimal: str) -> NDArray[Any]:
-    """Numbers of a column, NaN where there is none; whole numbers stay integers."""
-    import pandas as pd
+def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Numbers of cells, NaN where there is none; whole numbers as integers."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
 
-    if pd.api.types.is_bool_dtype(column):
-        return np.full(len(column), np.nan)
-    if decimal != "." and not pd.api.types.is_numeric_dtype(column):
-        # Beside a cell without a number, pandas leaves all of them as they are.
-        column = column.astype("str").str.replace(decimal, ".", regex=False)
-    numbers = pd.to_numeric(column, errors="coerce")
-    if numbers.dtype.kind in "iu":
-        return numbers.to_numpy()
-    return numbers.to_numpy(dtype=float, na_value=np.nan)
-
-
-def rows_of(
-    chunks: Iterable[Sequence[NDArray[Any]]],
-    places: Sequence[int],
-    dates: Set[int],
-    clock: int | None,
-) -> Generator[Array, None, None]:
-    """Columns of each chunk as rows of `Source.read`; dates in ns become s."""
-    zero: Any = None
-    for columns in chunks:
-        if not len(columns[0]):
-            continue
-        if zero is None and clock is not None:
-            times = columns[places.index(clock)]
-            zero = next(iter(times[np.isfinite(times)]), None)
-        each = [(c, zero if i == clock else None, i) for c, i in zip(columns, places, strict=True)]
-        yield beside([since(c, start) * (1e-9 if i in dates else 1) for c, start, i in each])
+    if pc.all(pc.match_substring_regex(column[:9], "^-?[0-9]+$")).as_py():
+        try:
+            return column.cast(pa.int64()).to_numpy()
+        except pa.ArrowInvalid:
+            pass
+    try:
+        return column.cast(pa.float64()).to_numpy()
+    except pa.ArrowInvalid:
+        # Somewhere is what is no number, or is written as Arrow does not take it.
+        column = pc.utf8_trim_whitespace(column)
+        column = pc.if_else(pc.match_substring_regex(column, _NUMBER), column, None)
+        column = pc.replace_substring_regex(column, r"^[+]", "")
+        return column.cast(pa.float64()).to_numpy()
 
 
-class ArraySource:
-    """An array (n, c) in memory, which was read as a whole.
-
-    Attributes
-    ----------
-    path, names, named, dates, layout, notes, warnings : see `Source`
-    values : (n, c) array
-    """
-
-    dates: Set[int] = frozenset()
-    notes: Sequence[str] = ()
+class TableSource(Source):
+    """A table in memory, which messages may call by a name instead of a path; see `Source`."""
 
     def __init__(
         self,
-        path: Path,
-        values: NDArray[Any],
-        names: Sequence[str] = (),
+        path: str | Path,
+        table: pa.Table,
         layout: Mapping[str, Any] | None = None,
         warnings: Sequence[str] = (),
+        named: bool = True,
     ) -> None:
-        self.path, self.values, self.layout = path, values, layout or {}
-        self.warnings = warnings
-        self.named = bool(names)
-        self.names = list(names) or [str(i) for i in range(values.shape[1])]
+        import pyarrow as pa
 
-    def read(
-        self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Generator[Array, None, None]:
-        """Rows of some columns; see `Source`."""
-        starts = range(0, len(self.values), chunk_size)
-        chunks = (self.values[i : i + chunk_size] for i in starts)
-        columns = ([rows[:, place] for place in places] for rows in chunks)
-        return rows_of(columns, places, self.dates, clock)
+        self.path, self.table, self.warnings, self.named = Path(path), table, warnings, named
+        self.names = [printable(" ".join(name.split())) for name in table.column_names]
+        self.layout = layout_by_names(self.names) if layout is None else layout
+        self.dates = {
+            i
+            for i, kind in enumerate(table.schema.types)
+            if pa.types.is_timestamp(kind) or (len(table) and is_stamp(str(table.column(i)[0])))
+        }
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
+        """Columns as they are; see `Source`."""
+        return [self.table.column(place) for place in places]
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Where a value stands, and the value; see `Source`."""
-        return f"row {row + 1}", f"{self.values[row, place]:g}"
+        (values,) = self.numbers([place])
+        value = values[row] * (1e-9 if place in self.dates else 1)
+        return f"row {row + 1}", f"{value:g}"
 
 
-def open_matlab(path: Path, variable: str | None = None) -> ArraySource:
+def table_of(values: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
+    """Array (n, c) as a table; its columns have their places as names if they have no others."""
+    import pyarrow as pa
+
+    names = names or [str(place) for place in range(values.shape[1])]
+    return pa.table([*map(pa.array, values.T)], names=[*names])
+
+
+def open_matlab(path: Path, variable: str | None = None) -> TableSource:
     """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
     try:
         with readable(path):
-            return ArraySource(path, _matlab_array(path, variable))
+            return TableSource(path, table_of(_matlab_array(path, variable)), named=False)
     except InputError:
         raise
     except NotImplementedError:
@@ -560,162 +624,48 @@ def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
     return array.T if array.shape[0] < array.shape[1] else array
 
 
-def open_parquet(path: Path) -> AbstractContextManager[pq.ParquetFile]:
-    """Open a file to be read page by page, since one group of rows may be the whole file."""
-    return whole_parquet(path, pre_buffer=False, buffer_size=_BUFFER)
-
-
-class TypedSource:
-    """Columns of types, from where `batches` has them; see `Source`."""
-
-    notes: Sequence[str] = ()
-    warnings: Sequence[str] = ()
-
-    def __init__(self, path: Path, schema: pa.Schema) -> None:
-        import pyarrow as pa
-
-        self.path = path
-        first = next(self.batches(1), None)
-        self._columns, self._types = schema.names, schema.types
-        self.names = [printable(" ".join(name.split())) for name in schema.names]
-        self.named = True
-        self.layout = layout_by_names(self.names)
-        self.dates: Set[int] = {
-            i
-            for i, kind in enumerate(schema.types)
-            if pa.types.is_timestamp(kind) or (first and is_stamp(str(first.column(i)[0])))
-        }
-
-    def read(
-        self, places: Sequence[int], chunk_size: int, clock: int | None = None
-    ) -> Generator[Array, None, None]:
-        """Rows of some columns; see `Source`."""
-        import pyarrow as pa
-
-        for place in places:
-            kind = self._types[place]
-            is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
-            if not is_number and place not in self.dates:
-                raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
-            if self._columns.count(self._columns[place]) > 1:
-                raise InputError(f"{self.path}: there are several columns {self.names[place]!r}")
-        names = [self._columns[place] for place in places]
-        batches = self.batches(chunk_size, names)
-        columns = ([_numbers(batch.column(name)) for name in names] for batch in batches)
-        yield from rows_of(columns, places, self.dates, clock)
-
-    def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """Where a value stands, and the value; see `Source`."""
-        for chunk in self.read([place], CHUNK):
-            if row < len(chunk):
-                return f"row {row + 1}", f"{chunk[row, 0]:g}"
-            row -= len(chunk)
-        return f"row {row + 1}", "nothing"
-
-    def batches(
-        self, chunk_size: int, columns: Sequence[str] | None = None
-    ) -> Iterator[pa.RecordBatch]:
-        """Rows as they are, of all columns or of some."""
-        raise NotImplementedError
-
-
-class ParquetSource(TypedSource):
-    """Columns of a Parquet file."""
-
-    def __init__(self, path: Path) -> None:
-        with open_parquet(path) as file:
-            schema = file.schema_arrow
-        super().__init__(path, schema)
-
-    def batches(
-        self, chunk_size: int, columns: Sequence[str] | None = None
-    ) -> Iterator[pa.RecordBatch]:
-        """Rows as they are, of all columns or of some."""
-        with open_parquet(self.path) as file:
-            yield from file.iter_batches(chunk_size, columns=columns)
-
-
-class TableSource(TypedSource):
-    """A table in memory, which messages call by a name instead of a path."""
-
-    def __init__(self, name: str, table: pa.Table) -> None:
-        self._table = table
-        super().__init__(Path(name), table.schema)
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-    def batches(
-        self, chunk_size: int, columns: Sequence[str] | None = None
-    ) -> Iterator[pa.RecordBatch]:
-        """Rows as they are, of all columns or of some."""
-        table = self._table if columns is None else self._table.select(columns)
-        yield from table.to_batches(chunk_size)
+def open_parquet(path: Path) -> TableSource:
+    """Open a Parquet file."""
+    with whole_parquet(path) as file:
+        return TableSource(path, file.read())
 
 
 LogFile: TypeAlias = str | Path | TableSource
 """Where a log is: the path of a file, or a table in memory."""
 
 
-def _numbers(column: pa.Array) -> NDArray[Any]:
-    """Numbers of a column, dates in ns, NaN where there is none; whole numbers stay integers."""
-    import pyarrow as pa
-
-    kind = column.type
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        return nanoseconds(column.to_pandas())
-    if column.null_count or not pa.types.is_integer(column.type):
-        column = column.cast(pa.float64(), safe=False)
-    return column.to_numpy(zero_copy_only=False)
-
-
-def beside(columns: Sequence[Array]) -> Array:
-    """Columns (k,) as one array (k, c), each of them contiguous, as sums along them are faster."""
-    return np.array(columns).T
-
-
 def since(values: NDArray[Any], zero: Any) -> Array:
-    """Numbers as floats, counted from `zero` unless that is None.
-
-    Whole numbers are subtracted as integers: a time in ns since 1970 has more digits than a float.
-    """
-    if zero is None:
-        return values.astype(float)
+    """Numbers as floats, counted from `zero`, one of them; whole numbers as integers."""
     if values.dtype.kind in "iu" and isinstance(zero, np.integer):
         return (values.astype(np.int64) - zero.astype(np.int64)).astype(float)
     return values.astype(float) - float(zero)
 
 
-def check_numbers(
-    source: Source, places: Mapping[str, int], raw: Array, row: int = 0, gaps: Sequence[str] = ()
-) -> None:
-    """Raise `InputError` at the first value that is no usable number.
+def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
+    """Numbers counted from the first of them, and that first one; NaN if there is none."""
+    zero = next(iter(values[np.isfinite(values)]), np.nan)
+    return since(values, zero), float(zero)
 
-    Parameters
-    ----------
-    source : Source
-    places : mapping of key to column, in the order of the columns of `raw`
-    raw : (k, len(places)) array
-    row : int, number of rows before these
-    gaps : sequence of str, columns that may have cells without a number
+
+def is_stamp(text: str) -> bool:
+    """Whether a text is a date with a time, or a time of day, that `nanoseconds` reads."""
+    return _STAMP.fullmatch(text.strip()) is not None
+
+
+def nanoseconds(column: pd.Series) -> NDArray[Any]:
+    """Dates with times as ns since 1970, NaN where there is none; of a time of day, since midnight.
+
+    One without a zone is in UTC, so that all of a column go together. Years that do not fit into
+    ns (before 1678 and after 2261) are no dates of a log.
     """
-    bad = ~(np.abs(raw) <= LARGEST)
-    bad &= ~(np.isnan(raw) & np.isin(list(places), gaps))
-    if bad.any():
-        i, j = (int(k) for k in np.argwhere(bad)[0])
-        key, column = list(places.items())[j]
-        where, cell = source.look_up(row + i, column)
-        raise InputError(
-            f"{source.path}: {where}, column {source.names[column]} ({key}): "
-            f"{cell}, not a usable number"
-        )
+    import pandas as pd
 
-
-def read_columns(source: Source, places: Mapping[str, int], clock: int | None = None) -> Array:
-    """All rows of some columns, (n, len(places)), for small tables; `clock` as in `Source`."""
-    chunks = list(source.read(list(places.values()), CHUNK, clock))
-    if not chunks:
-        raise InputError(f"{source.path}: no row of numbers")
-    values = np.concatenate(chunks)
-    check_numbers(source, places, values)
-    return values
+    dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
+    if dates.isna().any() and not pd.api.types.is_datetime64_any_dtype(column):
+        text = column.astype("str").str.strip()
+        for pattern, iso in _AS_ISO:
+            text = text.str.replace(pattern, iso, regex=True)
+        dates = pd.to_datetime(text, format="ISO8601", utc=True, errors="coerce")
+    dates = dates.where((dates.dt.year > 1677) & (dates.dt.year < 2262))
+    numbers = dates.dt.as_unit("ns").astype("int64").to_numpy()
+    return np.where(dates.isna(), np.nan, numbers) if dates.isna().any() else numbers

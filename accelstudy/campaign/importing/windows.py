@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing.recording import GAP, Recording
-from accelstudy.campaign.importing.resolution import steps_of
+from accelstudy.campaign.importing.resolution import step_in
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ class Windows:
     @cached_property
     def steps(self) -> Array:
         """Steps in which the axes are read, (3,), m/s²; 0 where there are none."""
-        return steps_of(self.log.samples.forces[self.centred])
+        return np.array([step_in(force[self.centred]) for force in self.log.samples.forces.T])
 
     @property
     def rounding(self) -> float:
