@@ -1,19 +1,23 @@
 """Snakemake as the tests run it."""
 
 import gc
+import multiprocessing
 import os
 import re
+import runpy
 import subprocess
 import sys
 import warnings
-from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import chdir, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory
 
 import pytest
 import yaml
 from places import ROOT
+from snakemake.benchmark import benchmarked
 from snakemake.cli import main
+from snakemake.script import PythonScript
 
 SNAKEMAKE = [sys.executable, "-m", "snakemake", "--workflow-profile", ROOT / "profiles" / "default"]
 ENVIRONMENT = {
@@ -23,6 +27,17 @@ ENVIRONMENT = {
     "NO_COLOR": "1",
 }
 ENVIRONMENT.pop("SNAKEMAKE_PROFILE", None)
+FORKS = multiprocessing.get_context("forkserver")
+"""Processes that begin with everything imported, as copies of one that has only imported it."""
+IMPORTED = {
+    *("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.pyplot"),
+    *("pyarrow.parquet", "scipy.optimize", "scipy.stats", "snakemake.script", "sympy"),
+    *re.findall("^from (accelstudy.*) import", "\n".join(
+        path.read_text("utf-8") for path in (ROOT / "workflow" / "scripts").iterdir()
+    ), re.MULTILINE),
+}  # fmt: skip
+FORKED_JOB = str(Path(__file__).with_name("forked_job.py"))
+FORKS.set_forkserver_preload(sorted(IMPORTED))
 TARGETS = ("study", "campaigns", "round_trip", "plan_example", "total")
 """Lines of Snakemake's list of jobs that are no jobs."""
 
@@ -30,10 +45,28 @@ TARGETS = ("study", "campaigns", "round_trip", "plan_example", "total")
 def snakemake(folder, *words, environment=ENVIRONMENT):
     """Run Snakemake in a folder, within this process; exit status, and both streams together.
 
-    It is what the command calls, and jobs are processes in any case. To start Python and to import
-    everything would take ten times as long as a run that makes nothing.
+    It is what the command calls. Jobs are processes in any case, but those of Python are forked. To
+    start Python and to import everything would take ten times as long as what most of them do.
     """
-    with pytest.MonkeyPatch.context() as patch, chdir(folder), TemporaryFile() as said:
+
+    def execute_script(job, script, edit=False):
+        given = {"script": os.path.abspath(script), "folder": os.getcwd(),
+                 "environment": dict(os.environ), "printed": said.name}  # fmt: skip
+        process = FORKS.Process(target=runpy.run_path, args=(FORKED_JOB, given))
+        process.start()
+        with benchmarked(process.pid, job.bench_record) if job.bench_record else nullcontext():
+            process.join()
+        if process.exitcode:
+            raise subprocess.CalledProcessError(process.exitcode, f"python {script}")
+
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        chdir(folder),
+        TemporaryDirectory() as place,
+        open(Path(place, "printed"), "a+b") as said,  # to which this process and jobs append
+    ):
+        if environment.get("PYTHONPATH") == ENVIRONMENT.get("PYTHONPATH"):  # no other package
+            patch.setattr(PythonScript, "execute_script", execute_script)
         for name in os.environ.keys() - environment.keys():
             patch.delenv(name)
         for name, value in environment.items():
