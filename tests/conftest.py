@@ -1,8 +1,9 @@
-"""Settings of all tests: the same examples, no clock, and angles in gon whatever the user chose."""
+"""Settings of all tests: the same examples, no clock, no pictures, and angles in gon."""
 
 import os
 
 import pytest
+import stand_ins
 from hypothesis import settings
 
 from accelstudy.drawing import saving
@@ -10,6 +11,7 @@ from accelstudy.drawing import saving
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 os.environ.pop("ACCELSTUDY_ANGLE_UNIT", None)
+saving._element = stand_ins.element  # unless a test asks for `composed` or `drawn`
 
 
 LONGEST = (
@@ -27,6 +29,14 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture
-def not_rendered(monkeypatch):
-    """Figures of pages are composed, but not rendered, which takes more time than all the rest."""
-    monkeypatch.setattr(saving, "save", lambda *_: "<svg></svg>")
+def composed():
+    """Figures of pages are composed, but not rendered."""
+    with stand_ins.composed():
+        yield
+
+
+@pytest.fixture
+def drawn():
+    """Figures of pages are drawn."""
+    with stand_ins.drawn():
+        yield

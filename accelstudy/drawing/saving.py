@@ -73,20 +73,21 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
     figures : mapping of name to a function that draws the figure
     folder : Path
     """
-    elements = {}
-    for name, draw in figures.items():
-        try:
-            with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-                figure = draw()
-            _simplify(figure)
-            svg, png = folder / f"{name}.svg", folder / f"{name}.png"
-            elements[name] = save(figure, svg, png, name, PAGE_DPI)
-        except OSError:  # such as a full disk, which is no failure of the figure
-            raise
-        except Exception as error:
-            said = failure(f"The figure {name!r} could not be drawn", error)
-            elements[name] = f'<p class="failed">{html.escape(said)}</p>'
-    return elements
+    return {name: _element(draw, folder, name) for name, draw in figures.items()}
+
+
+def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
+    """Return the element of one figure, or what is said in its place."""
+    try:
+        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+            figure = draw()
+        _simplify(figure)
+        return save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, PAGE_DPI)
+    except OSError:  # such as a full disk, which is no failure of the figure
+        raise
+    except Exception as error:
+        said = failure(f"The figure {name!r} could not be drawn", error)
+        return f'<p class="failed">{html.escape(said)}</p>'
 
 
 def _simplify(figure: Figure) -> None:

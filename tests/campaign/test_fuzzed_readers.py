@@ -26,7 +26,6 @@ from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.drawing import saving
 
 LOG = pd.DataFrame(np.random.default_rng(1).normal(0, 5, (30, 3)), columns=["fx", "fy", "fz"])
 SETTINGS = {
@@ -46,14 +45,6 @@ SETTINGS = {
     "trim_s": 0.0,
     "shortest_s": 1.0,
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _not_rendered():
-    """As `not_rendered` does, for all examples of a test: what is read is tested, no picture."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(saving, "save", lambda *_: "<svg></svg>")
-        yield
 
 
 @pytest.fixture(scope="module")

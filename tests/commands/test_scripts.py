@@ -9,12 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from calling import succeed
-from matplotlib.figure import Figure
 
 from accelstudy.basics import suggested
 from accelstudy.schemes import get_scheme
-
-UNDRAWN = "accelstudy.campaign.calibration.output.residual_figure", lambda *_: Figure()
 
 
 @pytest.fixture
@@ -23,7 +20,6 @@ def made(tmp_path_factory, monkeypatch):
     rng, holds = np.random.default_rng(1), np.repeat(get_scheme("fibonacci-20").directions, 150, 0)
     readings = -9.80665 * holds + 0.005 * rng.standard_normal(holds.shape)
     monkeypatch.chdir(tmp_path_factory.mktemp("my work"))
-    monkeypatch.setattr(*UNDRAWN)
     np.savetxt("log.csv", readings, "%.5f", delimiter=",")
     succeed("simulate-campaign", "--out", "accepted")
     succeed("simulate-campaign", "--out", "rejected", "--effect", "quadratic_scale", "--size", 5)
@@ -73,7 +69,7 @@ def test_what_is_suggested_writes_into_no_campaign(tmp_path, monkeypatch, typed)
 
 
 @pytest.mark.usefixtures("made")
-def test_all_that_is_suggested_runs_from_the_log_to_the_last_page(monkeypatch):
+def test_all_that_is_suggested_runs_from_the_log_to_the_last_page():
     """Two sensors of one log, with the files where the user has them."""
     shutil.copytree("rejected", "imu/left")
     shutil.copytree("accepted", "imu/right")
@@ -84,7 +80,6 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page(monkeypatch):
     reading = ("--columns", "fx=0,fy=1,fz=2", "--rate", "50")
     (diagnose, apply) = suggestions(printed)
     succeed(*apply, *reading)
-    monkeypatch.setattr("accelstudy.diagnosis.report.output.diagnosis_figures", lambda *_: {})
     done = succeed(*diagnose, "--replicates", "100", "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")

@@ -25,13 +25,6 @@ N = 36
 VERDICTS = {"no_effect", "named", "unknown", "noise_model", "gross_error"}
 
 
-@pytest.fixture(autouse=True)
-def not_drawn(monkeypatch):
-    """Pages have no figures here: no test looks at one, and to compose them takes longest."""
-    place = "accelstudy.diagnosis.report.output.save_all"
-    monkeypatch.setattr(place, lambda figures, _: dict.fromkeys(figures, "<svg></svg>"))
-
-
 @pytest.fixture(scope="module")
 def robot():
     return campaign()[0]

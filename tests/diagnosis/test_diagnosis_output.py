@@ -18,6 +18,7 @@ from calling import call
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
+from stand_ins import composed
 
 import accelstudy
 from accelstudy.approaches import get_approach
@@ -41,7 +42,6 @@ from accelstudy.diagnosis.report.output import write_diagnosis
 from accelstudy.diagnosis.report.words import headline, question, verdict_lines
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.drawing import saving
 from accelstudy.drawing.style import STYLE
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
@@ -91,21 +91,6 @@ def simulated(case, folder):
 RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location"),
             "learned": ("shape",)}  # fmt: skip
 """Figures that are rendered, by case; all others are only composed, which takes far less time."""
-render = saving.save
-
-
-def rendering(*names):
-    """A way to save figures that renders those of some names, and writes a stand-in for others."""
-
-    def save(figure, svg_path, png_path, title, dpi):
-        if title in names:
-            return render(figure, svg_path, png_path, title, dpi)
-        svg_path.parent.mkdir(exist_ok=True)
-        svg_path.write_text("<svg></svg>", encoding="utf-8")
-        png_path.write_bytes(bytes(2000))
-        return "<svg></svg>"
-
-    return save
 
 
 @pytest.fixture(scope="module")
@@ -117,8 +102,7 @@ def written(tmp_path_factory):
         if case not in made:
             simulated(case, root / case)
             out = root / f"{case}-out"
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(saving, "save", rendering(*RENDERED.get(case, ())))
+            with composed(*RENDERED.get(case, ())):
                 result = call("diagnose", root / case, "--out", out, "--replicates", 100)
             assert result.exit_code == 0, result.output
             content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
@@ -188,7 +172,7 @@ def explained(*explanations):
     return tuple(Explanation(names, tuple((n,) for n in names), p) for *names, p in explanations)
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     examined = examine(named.frame.solution)
     shapes = examined.candidates
@@ -227,7 +211,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path):
     """With its parameters, as the headline, in the calibration; the verdict has no effects."""
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
@@ -252,7 +236,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     assert "b_T_x" in str(calibration["parameters"])
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 @pytest.mark.parametrize(("after", "better"), [(98.0, "base"), (82.5, "extended")])
 def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better):
     """On the page and its commands, in the terminal, and in both files for programs."""
@@ -266,7 +250,7 @@ def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better
     assert ("accelstudy apply" in page) == (better == "extended")
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_no_other_signature_is_said_only_without_a_rival_like_it(named, tmp_path):
     """A rival whose cosine prints as 1.000 is named instead."""
     (found,) = named.found
@@ -372,7 +356,7 @@ def test_positions_say_what_was_held_out(written):
     assert {"residual_x_before_mps2", "residual_z_after_mps2", "temperature_degC"} <= set(positions)
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_a_bumped_position_is_left_out(tmp_path):
     campaign = simulated("no_effect", tmp_path / "c")
     campaign.forces[7] += (0.05, -0.04, 0.06)
@@ -397,12 +381,12 @@ def test_the_model_is_a_study(written, case):
     assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
 
 
-def test_same_seed_same_files(written, tmp_path, monkeypatch):
-    monkeypatch.setattr(saving, "save", rendering(*RENDERED["named"]))
+def test_same_seed_same_files(written, tmp_path):
     out, _, _ = written("named")
     first = Path(shutil.copytree(out, tmp_path / "first"))
-    # Its commands name the folder.
-    accelstudy.diagnose(out.parent / "named", replicates=100).save(out)
+    with composed(*RENDERED["named"]):
+        # Its commands name the folder.
+        accelstudy.diagnose(out.parent / "named", replicates=100).save(out)
     for path in sorted(first.rglob("*.*")):
         if path.is_file() and path.suffix != ".parquet":
             again = out / path.relative_to(first)
@@ -413,7 +397,7 @@ def test_same_seed_same_files(written, tmp_path, monkeypatch):
         pd.testing.assert_frame_equal(*tables)
 
 
-def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path, monkeypatch):
+def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     loop = close_loop(named, 300, seed=3)
     assert not loop.contains("old", "base")
     assert loop.contains("new", "base")
@@ -432,8 +416,7 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path, monk
         (out / "report.html").read_text("utf-8")
     )
 
-    monkeypatch.setattr(saving, "save", rendering())
-    with angles_in("deg"):
+    with angles_in("deg"), composed():
         document = write_diagnosis(named, tmp_path / "deg", loop=loop)
     assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
     page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
@@ -442,7 +425,7 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path, monk
     assert re.findall(r"(?:[^.\w]|m)gon", page) == []
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     settings = CampaignSettings(scheme="d-optimal-10", approach="gravity")
     diagnosis = diagnose(simulate_campaign(settings)[0], NINE)
@@ -472,7 +455,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("not_rendered")
+@pytest.mark.usefixtures("composed")
 def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
     campaign = simulated("no_effect", tmp_path / "c")
     diagnosis = diagnose(campaign, NINE)

@@ -154,6 +154,7 @@ def arguments(paths, dates=YEARS):
     return [*paths, *(f"--date={date}" for date in dates)]
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("per_year", [0.0, 0.02])
 def test_the_command_writes_what_it_says(per_year, tmp_path):
     """Calibrations come in any order."""

@@ -331,6 +331,7 @@ def test_the_interval_of_a_scatter_holds_it():
     assert held / n == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / n))
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_command_says_what_a_lot_lacks(tmp_path):
     """Eight sensors with a thermal bias, and one without it that has something else."""
     for i in range(9):

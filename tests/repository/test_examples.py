@@ -1,6 +1,7 @@
 """Examples print what the tutorials show; what pages for beginners say of accuracies is so."""
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from golden import kept_of
 from page_helpers import assert_told_alike, numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, same_picture, seen, stale
 from places import ROOT
+from stand_ins import drawn
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
@@ -37,7 +39,8 @@ class Runs(dict):
 
     def __missing__(self, name):
         folder = self.folder_of(name)
-        self[name] = run_example(name, folder), folder
+        with drawn() if name in FIGURES else nullcontext():
+            self[name] = run_example(name, folder), folder
         return self[name]
 
 

@@ -25,7 +25,6 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
 from accelstudy.diagnosis.round_trip import parse_round_trip
-from accelstudy.drawing import saving
 from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
@@ -153,9 +152,7 @@ def test_batches_and_the_round_trip_take_a_composition():
 @pytest.fixture(scope="module")
 def diagnosed(made):
     """Folder of the diagnosis of the campaign, which lacks both effects."""
-    with pytest.MonkeyPatch.context() as patch:  # to draw its figures would take most of the time
-        patch.setattr(saving, "save", lambda *_: "<svg></svg>")
-        run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
+    run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
     return made / "d"
 
 

@@ -116,7 +116,6 @@ def squared():
     _parameters.cache_clear()
 
 
-@pytest.mark.usefixtures("not_rendered")
 def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp_path):
     text = succeed("effects").output
     assert "squared_scale: f_i² k2_i/g" in text
