@@ -197,7 +197,7 @@ def dof_of_squares(
     limit = np.exp(optimize.brentq(too_often, least, most, xtol=NEAR)) / f
 
     def beyond_that(log: float) -> float:
-        return float(np.log(stats.f.isf(level, f, np.exp(log)) / limit))
+        return float(np.log(special.fdtri(f, np.exp(log), 1 - level) / limit))
 
     fewest, many = np.log([max(0.1, min(dof) / 4), 1e9])
     if beyond_that(many) > 0:
