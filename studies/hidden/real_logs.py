@@ -91,7 +91,8 @@ class Donor:
         if timed:
             time = samples.time
         else:
-            time = interval / (settings.block or 1) * (np.arange(len(forces)) + 0.5)
+            middles = np.arange(len(forces)) + 0.5
+            time = np.asarray(interval / (settings.block or 1) * middles, dtype=float)
         return cls(name, settings, forces, time, timed, spans, tuple(own))
 
     def means(self, values: Array, spans: NDArray[np.int_]) -> Array:
