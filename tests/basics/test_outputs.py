@@ -319,6 +319,7 @@ def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
     assert out.is_file()
 
 
+@pytest.mark.usefixtures("drawn")  # figures are what does not fit
 @pytest.mark.parametrize(
     ("name", "room"),
     [*((name, 0) for name in commands(Path(), Path())), ("calibrate", 7000), ("calibrate", 20_000)],
