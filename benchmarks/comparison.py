@@ -101,8 +101,9 @@ def test_of(fit):
     """What the global test says."""
     if fit.global_test is None:
         return "no redundancy"
-    said = "accepted" if fit.global_test.accepted else "rejected"
-    return f"{said}, r = {fit.adjustment.redundancy}"
+    test = fit.global_test
+    said = "rejected" if not test.accepted else "cannot tell" if test.powerless else "accepted"
+    return f"{said}, r = {test.dof}"
 
 
 def ferraris(folder):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -27,6 +28,7 @@ class Observations:
     ----------
     forces : (R, n, 3) array, m/s², sensor output f_s
     sigma_force : float or (n, 3) array, m/s²
+    sigma_dof : float, degrees of freedom of the square of `sigma_force`; infinite where it is known
     angles : (R, n, 2) array, rad, roll and pitch of the robot; None without a robot
     sigma_angle : float or (n, 2) array, rad
     gravity : float or (R,) array, m/s²; one number where it is held fixed
@@ -52,6 +54,7 @@ class Observations:
     known: Known = field(default_factory=dict)
     common: Array | None = None
     angle_errors: AngleErrors | None = None
+    sigma_dof: float = math.inf
 
     def take(self, positions: NDArray[np.int_]) -> Observations:
         """Return the sessions with some of their positions."""

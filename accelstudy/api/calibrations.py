@@ -29,6 +29,7 @@ from accelstudy.campaign.calibration import export as forms
 from accelstudy.campaign.calibration.applying import (
     NO_CALIBRATION,
     calibration_of,
+    dof_of,
     read_calibration_content,
 )
 from accelstudy.campaign.calibration.assessment import assess, tilt_left
@@ -139,8 +140,8 @@ class Calibration(Result):
     def intervals(self, level: float = 0.95) -> pd.DataFrame:
         """Return the interval of each parameter that holds it with a probability, SI.
 
-        It is that of the normal distribution where sigma was stated, and of Student's t with the
-        redundancy where it was estimated from the residuals.
+        It is that of the normal distribution where the noise is known, and of Student's t where it
+        was estimated, from the residuals or from the samples within the holds.
 
         Parameters
         ----------
@@ -156,9 +157,7 @@ class Calibration(Result):
         of_type("level", level, float, expected="a probability between 0 and 1")
         if not 0 < level < 1:
             raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
-        known = self.content["sigma_source"] == "a priori"
-        freedom = np.inf if known else self.content["redundancy"]
-        half = stats.t.ppf((1 + level) / 2, freedom) * self.parameters["sigma"]
+        half = stats.t.ppf((1 + level) / 2, dof_of(self.content)) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 

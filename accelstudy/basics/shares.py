@@ -16,23 +16,23 @@ Z95 = 1.959963984540054
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
-def sigmas_95(redundancy: int | None = None) -> float:
+def sigmas_95(dof: float = math.inf) -> float:
     """Return how many standard deviations on either side hold 95 %.
 
-    A standard deviation from r redundant observations is itself uncertain, by 1/√(2r) of it. So it
+    A standard deviation with r degrees of freedom is itself uncertain, by 1/√(2r) of it. So it
     takes more of them, by Student's t: 2.13 with r = 15, where 1.96 would hold 93.1 %.
 
     Parameters
     ----------
-    redundancy : int, optional
-        That of the residuals that the standard deviation was estimated from; NaN is returned where
-        there is none. By default it is known.
+    dof : float
+        Degrees of freedom of the standard deviation, as the redundancy of the residuals that it was
+        estimated from; NaN is returned where there are none. By default it is known.
     """
-    if redundancy is None:
+    if math.isinf(dof):
         return Z95
     from scipy import special  # a job that only draws goes without
 
-    return float(special.stdtrit(redundancy, 0.975))
+    return float(special.stdtrit(dof, 0.975))
 
 
 def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:

@@ -285,6 +285,7 @@ def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
         gravity=header.gravity.value_mps2,
         sigma_gravity=header.gravity.sigma_mps2,
         sigma_force=None if noise is None else noise.sigma_mps2,
+        sigma_dof=None if noise is None else noise.degrees_of_freedom,
         sigma_angle=sigma_angle,
         reference=header.reference,
         nominal=None if header.nominal is None else header.conversion("forces"),
@@ -326,7 +327,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
 
 def _content_of(campaign: Campaign) -> dict[str, Any]:
     """Content of `campaign.yaml`."""
-    content = {
+    content: dict[str, Any] = {
         "schema_version": 1,
         "name": campaign.name,
         "sensor": campaign.sensor,
@@ -339,6 +340,8 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
         content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
     if campaign.sigma_force is not None:
         content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
+        if campaign.sigma_dof is not None:
+            content["sensor_noise"]["degrees_of_freedom"] = campaign.sigma_dof
     if campaign.full_range is not None:
         content["range_mps2"] = campaign.full_range
     if campaign.resolution is not None:

@@ -165,6 +165,9 @@ class _SensorNoise(Block):
     """A-priori noise of the sensor; without it, the residuals tell it."""
 
     sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
+    degrees_of_freedom: Positive | None = Field(
+        None, description="of that sigma, where it is an estimate; without them it counts as known"
+    )
 
 
 class _Robot(Block):

@@ -37,6 +37,7 @@ class Campaign:
     sensor : str, optional
     date : str, optional, ISO 8601
     sigma_force : float, m/s², a-priori sd of a position mean; None if unknown
+    sigma_dof : float, degrees of freedom of `sigma_force`, where it is an estimate
     angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
     sigma_angle : float, rad, of a level hold; None without a robot
     reference : ReferenceSensor, optional, which gave the angles instead of a robot
@@ -64,6 +65,7 @@ class Campaign:
     sensor: str | None = None
     date: str | None = None
     sigma_force: float | None = None
+    sigma_dof: float | None = None
     angles: Array | None = None
     sigma_angle: float | None = None
     reference: ReferenceSensor | None = None

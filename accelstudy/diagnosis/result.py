@@ -125,7 +125,7 @@ class Verdict:
         """Test of the base model against the a-priori sigma."""
         if not self.sigma_known:
             return None
-        return global_test(self.base.omega, self.base.redundancy)
+        return global_test(self.base.omega, self.base.redundancy, sigma_dof=self.base.sigma_dof)
 
     @property
     def sigma_position(self) -> float:

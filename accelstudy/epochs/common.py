@@ -44,7 +44,7 @@ class Common:
     model : SensorModel, the effects that all have
     values : (n, p) array, SI
     covariances : (n, p, p) array
-    dof : (n,) array, degrees of freedom by which the noise was estimated; inf if it was stated
+    dof : (n,) array, degrees of freedom by which the noise was estimated; inf if it is known
     """
 
     model: SensorModel
@@ -94,7 +94,7 @@ def in_common(calibrations: Sequence[Calibration]) -> Common:
     values, covariances = zip(
         *(_brought_to(one, model, fewest[one is fewest[0]]) for one in calibrations), strict=True
     )
-    dof = np.array([_dof(one) for one in calibrations])
+    dof = np.array([one.dof for one in calibrations])
     return Common(model, np.array(values), np.array(covariances), dof)
 
 
@@ -121,12 +121,6 @@ def session_like(like: Calibration, directions: Array) -> Campaign:
 def _effects(calibration: Calibration) -> list[str]:
     """Effects of the sensor: the rig of a session stays behind."""
     return [effect.spec for effect in calibration.model.effects if effect.part == "sensor"]
-
-
-def _dof(calibration: Calibration) -> float:
-    """Degrees of freedom by which its noise was estimated; inf if it was stated."""
-    content = calibration.content
-    return np.inf if content["sigma_source"] == "a priori" else float(content["redundancy"])
 
 
 def _brought_to(

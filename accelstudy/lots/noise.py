@@ -83,7 +83,7 @@ class LotNoise:
 
 def with_noise(campaign: Campaign, noise: LotNoise | None) -> Campaign:
     """Return a campaign with the noise of its type, if it is known, in place of its own."""
-    return campaign if noise is None else replace(campaign, sigma_force=noise.sigma)
+    return campaign if noise is None else replace(campaign, sigma_force=noise.sigma, sigma_dof=None)
 
 
 def noise_of_type(
@@ -100,7 +100,9 @@ def noise_of_type(
     beside = any(fit is not None and fit.approach.uses_angles for fit in fits)
     for _ in range(REFITS if beside else 0):
         sigma = noise.sigma
-        again = lot_noise(fits_of([replace(one, sigma_force=sigma) for one in campaigns]))
+        again = lot_noise(
+            fits_of([replace(one, sigma_force=sigma, sigma_dof=None) for one in campaigns])
+        )
         off = float(np.log(again.sigma / sigma))
         if abs(off) < AGREE:
             return again

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from test_import_holds import shared
 
+from accelstudy.adjustment.quality import global_test
 from accelstudy.campaign.importing.allan import (
     accuracy_of_mean,
     allan_moments,
@@ -122,3 +123,46 @@ def test_xsens_is_coloured():
     assert np.all((curve.pooled[flat] > 0.5e-3) & (curve.pooled[flat] < 1.5e-3))
     assert abs(slope(curve, 1, 5)) < 0.25
     assert first.std(axis=0).mean() / np.sqrt(730) == pytest.approx(0.29e-3, rel=0.05)
+
+
+def drawn_accuracies(n, duration, walk, count):
+    """Accuracies from `count` logs at 20 Hz, each of 26 holds of n samples."""
+    rng = np.random.default_rng(7)
+    for _ in range(count):
+        noise = rng.standard_normal((2, 26, n))
+        holds = noise[0] + walk * np.cumsum(noise[1], axis=1)
+        curve = pooled_deviation([allan_moments(hold) for hold in holds], 0.05)
+        yield accuracy_of_mean(curve, duration, np.sqrt(np.mean(holds.var(axis=1))), n)
+
+
+@pytest.mark.parametrize("walk", [0.0, 0.1])
+def test_degrees_of_freedom_are_those_of_the_scatter(walk):
+    """Within the averaging times of the data ν = 2 / var(log σ²)."""
+    accuracies = list(drawn_accuracies(80, 0.5, walk, 300))
+    seen = 2 / np.var([2 * np.log(accuracy.allan) for accuracy in accuracies])
+    # For white noise it is 1.3 times as much, by Greenhall & Riley (2003); twice is no harm.
+    assert 0.45 < accuracies[0].dof / seen < 1.3
+
+
+@pytest.mark.parametrize(("walk", "highest"), [(0.0, 0.015), (0.02, 0.02)])
+def test_right_calibrations_from_a_short_log_are_rejected_as_often_as_the_level_says(walk, highest):
+    """Holds of 2 s: sigma is an estimate, and its degrees of freedom say how good.
+
+    The sum of squares of r = 17 residuals is independent of the noise within the holds. The sigma
+    of a random walk is taken for right on average, so that only its scatter counts.
+    """
+    accuracies = list(drawn_accuracies(40, 2.0, walk, 400))
+    estimated = np.array([accuracy.allan for accuracy in accuracies])
+    right = np.sqrt(np.mean(estimated**2)) if walk else 1 / np.sqrt(40)
+    omegas = np.random.default_rng(8).chisquare(17, (50, 400)) * (right / estimated) ** 2
+
+    def rejected(dofs):
+        tests = (
+            global_test(omega, 17, sigma_dof=dof).accepted
+            for row in omegas
+            for dof, omega in zip(dofs, row, strict=True)
+        )
+        return 1 - np.mean(list(tests))
+
+    assert rejected(np.full(400, np.inf)) > 0.018
+    assert 0.005 < rejected([accuracy.dof for accuracy in accuracies]) < highest

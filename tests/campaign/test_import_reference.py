@@ -88,7 +88,9 @@ def test_from_two_logs_to_the_sensor(plate, tmp_path):
         *("--model", "bias-scale-nonorthogonality-crossaxis"),
     )
     content = json.loads((tmp_path / "out" / "calibration.json").read_text())
-    assert content["quality"]["state"] == "accepted"
+    # Fourteen holds of four seconds hardly tell their own noise, so nothing is accepted by it.
+    assert campaign.sigma_dof < 8
+    assert content["quality"]["state"] == "cannot tell"
     assert content["reference"]["calibration"] == "alone"
     tilt = content["quality"]["tilt_rms_mgon"]
     assert 0 < tilt["reference_roll"] < tilt["parameters_roll"]

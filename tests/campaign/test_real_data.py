@@ -47,9 +47,9 @@ def imported(name):
 def diagnosed(name: str, sigma: str = "") -> Diagnosis:
     campaign = imported(name)
     if sigma == WHITE:
-        campaign = replace(campaign, sigma_force=0.000296)
+        campaign = replace(campaign, sigma_force=0.000296, sigma_dof=None)
     elif sigma == UNKNOWN:
-        campaign = replace(campaign, sigma_force=None)
+        campaign = replace(campaign, sigma_force=None, sigma_dof=None)
     return diagnose(campaign, NINE)
 
 

@@ -23,6 +23,7 @@ from accelstudy.adjustment.quality.tests import (
     Suspect,
     global_test,
     holm,
+    pooled_variance,
     position_tests,
     suspects,
 )
@@ -42,6 +43,7 @@ __all__ = [
     "held_out",
     "holm",
     "noncentrality",
+    "pooled_variance",
     "position_tests",
     "redundancy_numbers",
     "reliability",

@@ -36,12 +36,9 @@ class Redundancy:
 
 def redundancy_numbers(solution: Solution) -> Redundancy:
     """Redundancy numbers of observations and positions (Baarda 1968; Koch 1999, chapter 4)."""
-    b = np.linalg.solve(solution.whitening, solution.jac_observations)
     observed = solution.observed.sigma_gravity > 0
-    # v = −Q B̃ᵀ e, so that Q_vv Q⁻¹ = Q B̃ᵀ R B̃, which also holds for an observation without noise.
-    shares = solution.variances * np.einsum("nco,ncd,ndo->no", b, solution.blocks, b)
     return Redundancy(
-        observations=shares,
+        observations=solution.shares,
         positions=np.einsum("ncc->n", solution.blocks),
         gravity=float(1 - np.sum(solution.basis[-1] ** 2)) if observed else None,
     )

@@ -100,6 +100,26 @@ class Solution:
         return diagonal_blocks(self.basis, *self.misclosures.shape)
 
     @cached_property
+    def sigma_dof(self) -> float:
+        """Degrees of freedom of the stated noise in Ω; infinite where it is known.
+
+        Beside angles they are those of σ² of the forces over the square of the share that the
+        forces have in r.
+        """
+        dof, angles = self.observed.sigma_dof, self.variances.shape[1] > 3
+        if not (angles and np.isfinite(dof) and self.redundancy > 0):
+            return dof
+        return float(dof / (self.shares[:, :3].sum() / self.redundancy) ** 2)
+
+    @cached_property
+    def shares(self) -> Array:
+        """Diagonal of Q_vv Q⁻¹, (n, o): share of an error of an observation that shows in v."""
+        b = np.linalg.solve(self.whitening, self.jac_observations)
+        # v = −Q B̃ᵀ e, so that Q_vv Q⁻¹ = Q B̃ᵀ R B̃, which also holds for an observation without
+        # noise.
+        return np.asarray(self.variances * np.einsum("nco,ncd,ndo->no", b, self.blocks, b))
+
+    @cached_property
     def root(self) -> tuple[Array, NDArray[np.int_]]:
         """H (n, c, c) with H Hᵀ = R⁺ of each position, and the rank of R, (n,)."""
         return root_of(self.blocks)

@@ -18,16 +18,21 @@ Array = NDArray[np.float64]
 
 NO_POWER = 2
 """With this redundancy or less the global test finds next to nothing."""
+HARDLY_KNOWN = 8
+"""With fewer degrees of freedom of σ0 it accepts residuals of 2.5 times σ0 and more."""
 
 
 @dataclass(frozen=True)
 class GlobalTest:
-    """Test of the whole model, Ω/σ0² ~ χ²_r, two-sided (Koch 1999, chapter 4).
+    """Test of the whole model, two-sided (Koch 1999, chapter 4).
+
+    Ω/σ0² ~ χ²_r, or Ω/(r σ0²) ~ F(r, ν) where σ0 was itself estimated with ν degrees of freedom.
 
     Attributes
     ----------
     statistic : float
     dof : int, r
+    sigma_dof : float, ν; infinite where σ0 is known
     p_value : float
     accepted : bool, at the level asked for
     """
@@ -36,15 +41,28 @@ class GlobalTest:
     dof: int
     p_value: float
     accepted: bool
+    sigma_dof: float = np.inf
 
     @property
     def powerless(self) -> bool:
-        """Whether the redundancy is so small that the test hardly ever rejects."""
-        return self.dof <= NO_POWER
+        """Whether something is so little that the test hardly ever rejects."""
+        return bool(self.lacking)
+
+    @property
+    def lacking(self) -> str:
+        """What the test lacks to reject: redundancy, or degrees of freedom of sigma; else empty."""
+        if self.dof <= NO_POWER:
+            return f"redundancy {self.dof}"
+        few = self.sigma_dof < HARDLY_KNOWN
+        return f"{self.sigma_dof:.0f} degrees of freedom of sigma" if few else ""
 
 
 def global_test(
-    omega: float, redundancy: int, alpha: float = REFUTED, variance: float = 1.0
+    omega: float,
+    redundancy: int,
+    alpha: float = REFUTED,
+    variance: float = 1.0,
+    sigma_dof: float = np.inf,
 ) -> GlobalTest | None:
     """Test Ω against its distribution; None without redundancy, where there is nothing to test.
 
@@ -53,17 +71,32 @@ def global_test(
     omega, redundancy : of the adjustment
     alpha : float, level
     variance : float, σ0² a priori
+    sigma_dof : float, ν of σ0², where it is an estimate
     """
     if redundancy <= 0:
         return None
     statistic = omega / variance
-    below, above = special.chdtr(redundancy, statistic), special.chdtrc(redundancy, statistic)
+    if np.isfinite(sigma_dof):
+        ratio = statistic / redundancy
+        tails = (f(redundancy, sigma_dof, ratio) for f in (special.fdtr, special.fdtrc))
+    else:
+        tails = (f(redundancy, statistic) for f in (special.chdtr, special.chdtrc))
+    p_value = float(2 * min(tails))
     return GlobalTest(
         statistic=float(statistic),
         dof=redundancy,
-        p_value=float(2 * min(below, above)),
-        accepted=bool(2 * min(below, above) >= alpha),
+        p_value=p_value,
+        accepted=p_value >= alpha,
+        sigma_dof=sigma_dof,
     )
+
+
+def pooled_variance(omega: float, redundancy: int, sigma_dof: float) -> float:
+    """Variance of unit weight by the stated noise and the residuals together; 1 where it is known.
+
+    A variance of 1 with ν degrees of freedom and one of Ω/r with r give (ν + Ω)/(ν + r) with ν + r.
+    """
+    return (sigma_dof + omega) / (sigma_dof + redundancy) if np.isfinite(sigma_dof) else 1.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +107,8 @@ class PositionTests:
     ----------
     gross_errors : (n, c) array, m/s², estimated error of |f_b| or of the vector f_b
     dof : (n,) int array, q, the directions in which the position is controlled; 0 is not testable
-    statistic : (n,) array, ~ χ²_q if σ0 is known (Baarda 1968)
+    statistic : (n,) array, ~ χ²_q if σ0 is known (Baarda 1968), q F(q, ν) if it was estimated
+        beforehand with ν degrees of freedom
     studentised : (n,) array, ~ F(q, r − q) if σ0 is not; σ0 estimated without the position
     tau : (n,) array, √(statistic / (q σ̂0²)), after Pope (1976); its p-values are those of F
     p_known, p_unknown : (n,) arrays, two-sided p-values with σ0 known or not; NaN: not testable
@@ -129,7 +163,11 @@ def position_tests(solution: Solution) -> PositionTests:
         rest = np.where(r > q, np.maximum(omega - statistic, 0.0) / (r - q), np.nan)
         studentised = statistic / q / rest
         tau = np.sqrt(statistic / q / (omega / r if r > 0 else np.nan))
-        p_known = np.where(q > 0, special.chdtrc(q, statistic), np.nan)
+        nu = solution.sigma_dof
+        p_known = special.chdtrc(q, statistic)
+        if np.isfinite(nu):
+            p_known = special.fdtrc(q, nu, statistic / q)
+        p_known = np.where(q > 0, p_known, np.nan)
         p_unknown = special.fdtrc(q, r - q, studentised)
     return PositionTests(
         gross_errors=np.einsum("nbc,ncd,nd->nb", solution.whitening, root, normalised),

@@ -73,6 +73,11 @@ class Calibration:
     log: LogLayout | None = None
     ranges: Mapping[str, list[float]] = field(default_factory=dict)
 
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
+        return dof_of(self.content)
+
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
         """Effects that need more than the force, each with a column of `HoldConditions`."""
@@ -227,6 +232,7 @@ class _Document(BaseModel):
     gravity_mps2: Gravity
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
     redundancy: Annotated[int, *within(REDUNDANCY)] = 0
+    sigma_dof: Annotated[float, *within(REDUNDANCY)] | None = None
     sigma_position_mps2: ParameterSigma | None
     sigma_reading_mps2: ParameterSigma | None = None
     sigmas_95: ParameterSigma | None = None
@@ -266,6 +272,13 @@ def _check_covariance(covariance: Array) -> None:
         raise ValueError("covariance: must be symmetric")
     if np.linalg.eigvalsh(correlation)[0] < -ROUNDED:
         raise ValueError("covariance: no estimates have it; it is not positive semidefinite")
+
+
+def dof_of(content: Mapping[str, Any]) -> float:
+    """Degrees of freedom of the noise in the sigmas of a calibration; infinite if it is known."""
+    if content["sigma_source"] == "a posteriori":
+        return float(content["redundancy"])
+    return float(content.get("sigma_dof") or np.inf)
 
 
 def read_calibration(path: str | Path) -> Calibration:

@@ -57,6 +57,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
+        "sigma_dof": json_number(fit.dof),
         "sigmas_95": json_number(fit.sigmas_95),
         "sigma_position_mps2": json_number(fit.sigma_position),
         "sigma_position_priori_mps2": json_number(campaign.sigma_force),
@@ -117,11 +118,10 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
         else {
             "statistic": test.statistic,
             "dof": test.dof,
+            "sigma_dof": json_number(test.sigma_dof),
             "p_value": test.p_value,
             "accepted": test.accepted,
-            "remark": f"redundancy {test.dof}: the test has next to no power"
-            if test.powerless
-            else "",
+            "remark": f"{test.lacking}: the test has next to no power" if test.powerless else "",
         },
         "suspects": [
             {"position": int(positions[s.position]), "p_value": json_number(s.p_value)}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.observations import AngleErrors, Known
-from accelstudy.adjustment.quality import GlobalTest, global_test
+from accelstudy.adjustment.quality import GlobalTest, global_test, pooled_variance, solve
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import sigmas_95
@@ -93,7 +93,18 @@ class CampaignFit:
         """Test of the whole model; None where sigma is unknown or there is no redundancy."""
         if not self.sigma_known:
             return None
-        return global_test(float(self.adjustment.omega[0]), self.adjustment.redundancy)
+        return global_test(self._omega, self.adjustment.redundancy, sigma_dof=self.sigma_dof)
+
+    @property
+    def _omega(self) -> float:
+        return float(self.adjustment.omega[0])
+
+    @cached_property
+    def sigma_dof(self) -> float:
+        """Degrees of freedom of the stated noise in Ω; infinite where it is known."""
+        if not np.isfinite(self.observed.sigma_dof):
+            return self.observed.sigma_dof
+        return solve(self.model, self.approach, self.observed, self.adjustment).sigma_dof
 
     @property
     def trusts_sigma(self) -> bool:
@@ -105,10 +116,22 @@ class CampaignFit:
 
     @property
     def variance_factor(self) -> float:
-        """Variance of unit weight to quote: 1 if the stated noise is trusted, else a posteriori."""
+        """Variance of unit weight to quote.
+
+        Of a stated noise that is trusted it is 1, or pooled with the residuals if that noise is
+        itself an estimate; else it is that of the residuals.
+        """
         if self.judged is not None:
             return self.judged.variance
-        return 1.0 if self.trusts_sigma else float(self.adjustment.variance_posteriori[0])
+        if self.trusts_sigma:
+            return pooled_variance(self._omega, self.adjustment.redundancy, self.sigma_dof)
+        return float(self.adjustment.variance_posteriori[0])
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the noise that is quoted; infinite where it is known."""
+        r = self.adjustment.redundancy
+        return self.sigma_dof + r if self.trusts_sigma else r
 
     @property
     def sigma_position(self) -> float:
@@ -153,8 +176,8 @@ class CampaignFit:
 
     @property
     def sigmas_95(self) -> float:
-        """Number of quoted sigmas on either side that hold 95 %; by Student's t a posteriori."""
-        return sigmas_95(None if self.trusts_sigma else self.adjustment.redundancy)
+        """Number of quoted sigmas on either side that hold 95 %; by Student's t of an estimate."""
+        return sigmas_95(self.dof)
 
     @property
     def gravity(self) -> float:
@@ -223,6 +246,7 @@ def campaign_observations(campaign: Campaign) -> Observations:
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
         known=_known(campaign),
+        sigma_dof=campaign.sigma_dof or np.inf,
     )
 
 

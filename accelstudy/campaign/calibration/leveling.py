@@ -39,6 +39,8 @@ CLIPPED = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
 
+MANY_SIGMAS = 2.2
+"""Sigmas that hold 95 % with 12 degrees of freedom; with more, 2 of them hold 93 % and above."""
 NEAR_POLE = "near_pole"
 """Column that says whether a row is too close to the roll pole for its sigmas."""
 
@@ -189,12 +191,12 @@ def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
 
 
 def _estimated(calibration: Calibration) -> tuple[str, ...]:
-    """Say how many sigmas hold 95 %, if a calibration with few residuals makes that more than 2."""
+    """Say how many sigmas hold 95 %, if its noise is hardly known."""
     needed = calibration.content["sigmas_95"] or 0.0
-    if needed <= 2:
+    if needed <= MANY_SIGMAS:
         return ()
     return (
-        "the sigmas of the calibration come from few residuals: to hold 95 % of the errors it "
+        "the noise in the sigmas of the calibration is hardly known: to hold 95 % of the errors it "
         f"takes up to {needed:.2f} sigmas of roll and pitch",
     )
 

@@ -47,12 +47,12 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
     """
     model, approach = fit.model, fit.approach
     noise = campaign_noise(fit.campaign)
-    if not fit.trusts_sigma:
-        if not np.isfinite(fit.sigma_position):
-            raise InputError(
-                f"{fit.campaign.name}: no noise is stated, and no redundancy tells it: there is no "
-                "sigma to check"
-            )
+    if not np.isfinite(fit.sigma_position):
+        raise InputError(
+            f"{fit.campaign.name}: no noise is stated, and no redundancy tells it: there is no "
+            "sigma to check"
+        )
+    if fit.variance_factor != 1:
         noise = replace(noise, sigma_force=fit.sigma_position)
     directions = -fit.corrected
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -109,11 +109,13 @@ def what_it_finds(fit: CampaignFit) -> str:
     """
     noise, test = quantity_text(fit.sigma_position, "m/s^2"), fit.global_test
     if fit.trusts_sigma:
+        known = np.isinf(fit.sigma_dof)
+        what = "the stated noise" if known else "the noise by holds and residuals together"
         judged = (
             "nothing tells" if test is None else f"the global test tells ({p_value(test.p_value)})"
         )
         return (
-            f"The simulation has the stated noise of {noise}, and so have the sigmas. A ratio far "
+            f"The simulation has {what} of {noise}, and so have the sigmas. A ratio far "
             f"from 1 says that the adjustment is wrong; whether that noise is right, {judged}."
         )
     r = fit.adjustment.redundancy

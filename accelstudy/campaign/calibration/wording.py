@@ -69,8 +69,13 @@ def approach_words(fit: CampaignFit) -> str:
 def interval_words(fit: CampaignFit) -> str:
     """Say what the sigmas are, and how many of them hold 95 %."""
     many = f"{fit.sigmas_95:.2f} of them hold 95 %"
-    if fit.trusts_sigma:
+    if fit.trusts_sigma and np.isinf(fit.dof):
         return f"sigmas of the stated noise; {many}"
+    if fit.trusts_sigma:
+        return (
+            f"sigmas of the stated noise, an estimate, and the residuals; {many} (Student's t, "
+            f"{fit.dof:.0f} degrees of freedom)"
+        )
     r = fit.adjustment.redundancy
     return f"sigmas of the noise in the residuals; {many} (Student's t, r = {r})"
 

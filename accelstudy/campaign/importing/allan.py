@@ -140,6 +140,8 @@ class MeanAccuracy:
     tau : float, s, largest averaging time that the data determine
     slope : float, d log σ / d log τ by which `allan` was extrapolated from `tau` to `duration`;
         None if that was not necessary
+    dof : float, degrees of freedom of the square of `allan`; of overlapping differences these
+        are about as many as are independent (Greenhall & Riley 2003, flicker noise)
     """
 
     duration: float
@@ -147,6 +149,7 @@ class MeanAccuracy:
     allan: float
     tau: float
     slope: float | None
+    dof: float
 
     @property
     def ratio(self) -> float:
@@ -169,21 +172,29 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: i
     n : int, samples in `duration`
     """
     white = float(np.sqrt(np.mean(np.square(sd)))) / np.sqrt(n)
+    channels = curve.deviation.shape[1]
     usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
     if not usable.any():
-        return MeanAccuracy(duration, white, white, 0.0, None)
+        samples = int(curve.differences[0]) if len(curve.tau) else n - 1
+        return MeanAccuracy(duration, white, white, 0.0, None, max(1.0, channels * samples))
     log_tau, log_sigma = np.log(curve.tau[usable]), np.log(curve.pooled[usable])
-    tau = float(np.exp(log_tau[-1]))
+    tau, differences = float(np.exp(log_tau[-1])), channels * curve.differences[usable]
     if duration <= tau * (1 + 1e-9):
         allan = np.exp(np.interp(np.log(duration), log_tau, log_sigma))
-        return MeanAccuracy(duration, white, float(allan), tau, None)
+        dof = np.interp(np.log(duration), log_tau, differences)
+        return MeanAccuracy(duration, white, float(allan), tau, None, float(dof))
     last = log_tau >= log_tau[-1] - np.log(4.0) - 1e-9
-    x, y, weight = log_tau[last], log_sigma[last], curve.differences[usable][last]
-    slope = -0.5
+    x, y, weight = log_tau[last], log_sigma[last], differences[last]
+    slope, middle, beyond = -0.5, np.average(x, weights=weight), np.log(duration)
     if len(x) > 1:
         # The variance of log σ is proportional to one over the independent differences.
         slope = float(np.clip(np.polyfit(x, y, 1, w=np.sqrt(weight))[0], -0.5, 0.5))
-    level = np.average(y - slope * x, weights=weight)
-    return MeanAccuracy(
-        duration, white, float(np.exp(level + slope * np.log(duration))), tau, slope
-    )
+    allan = float(np.exp(np.average(y - slope * x, weights=weight) + slope * beyond))
+    # The variance of log σ² at the end of the line, 2/ν. The values within two octaves count as
+    # three, as neighbouring ones share their differences; each has ν of flicker noise, which is
+    # near the number of differences. A slope that is that of white noise has no error.
+    variance = 1 / np.sum(weight)
+    if slope > -0.5:
+        variance += (beyond - middle) ** 2 / np.sum(weight * (x - middle) ** 2)
+    dof = min(1.0, 3 / len(x)) / variance
+    return MeanAccuracy(duration, white, allan, tau, slope, max(1.0, float(dof)))

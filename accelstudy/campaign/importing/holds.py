@@ -58,6 +58,7 @@ class HoldNoise:
     accuracy : MeanAccuracy, of the mean over a typical hold in the channels of the sensor
     across : float, m/s², standard deviation of such a mean across gravity
     rounding : float, m/s², what rounding to the steps of the readings leaves in any mean
+    count : int, holds
     """
 
     allan: AllanDeviation
@@ -67,12 +68,23 @@ class HoldNoise:
     of_sensor: slice
     accuracy: MeanAccuracy
     across: float
-    rounding: float = 0.0
+    rounding: float
+    count: int
 
     @property
     def sigma(self) -> float:
         """Standard deviation of the mean over a typical hold, m/s²."""
         return float(np.hypot(self.accuracy.allan, self.rounding))
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the square of `sigma` (Welch and Satterthwaite).
+
+        Those of the part of rounding are the means of the axes that it comes from.
+        """
+        allan, rounding = self.accuracy.allan**2, self.rounding**2
+        parts = allan**2 / self.accuracy.dof + rounding**2 / (3 * self.count)
+        return (allan + rounding) ** 2 / parts if parts > 0 else self.accuracy.dof
 
 
 @dataclass(frozen=True)
@@ -355,7 +367,9 @@ def hold_noise(segments: Sequence[Segment], step: float, resolution: ArrayLike =
     )
     of_axes = np.sqrt(np.mean([segment.sd**2 for segment in segments], axis=0))
     rounding = float(np.sqrt(np.mean(rounding_of_mean(resolution, of_axes) ** 2)))
-    return HoldNoise(allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding)
+    return HoldNoise(
+        allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding, len(segments)
+    )
 
 
 def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:

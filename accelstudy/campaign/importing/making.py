@@ -158,6 +158,7 @@ def campaign_of_holds(
         forces,
         positions=holds.number,
         sigma_force=holds.noise.sigma,
+        sigma_dof=float(round(holds.noise.dof)),
         resolution=holds.resolution if _rounds(holds) else None,
         n_samples=holds.n_samples,
         sd=holds.of_each("sd"),

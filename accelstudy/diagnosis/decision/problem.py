@@ -74,7 +74,7 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     if sd is not None and n is not None and np.all(sd > 0):
         within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
     if stated:
-        return BaseFit(solution, Level.given(), within)
+        return BaseFit(solution, Level.given(solution.sigma_dof), within)
     if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
         return BaseFit(solution, Level.unknown(), within)
     if not 1 / BEYOND_WHITE < fit.sigma_position_posteriori**2 / np.mean(within) < BEYOND_WHITE:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import Solution, global_test
+from accelstudy.adjustment.quality import Solution, global_test, pooled_variance
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.wording import comma_list, grouped, p_value
 from accelstudy.campaign.session import Campaign
@@ -267,7 +267,9 @@ def unless_weak(problem: Problem, detection: Detection, finding: Finding) -> Fin
     What it finds beyond that level counts if something of it has a name, or is certain.
     """
     base = problem.base.solution
-    test = global_test(base.omega, base.redundancy) if problem.evidence.level.known else None
+    test = None
+    if problem.evidence.level.known:
+        test = global_test(base.omega, base.redundancy, sigma_dof=base.sigma_dof)
     accepted = test is not None and test.accepted and not test.powerless
     if finding.verdict != "unknown" or detection.p_value < REFUTED or not accepted:
         return finding
@@ -447,8 +449,9 @@ def tests_of_noise(
 def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
     """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
     if frame is problem.frame:
-        return level_test(Residuals.of(problem.base.solution))
-    return level_test(frame.residuals)
+        base = problem.base.solution
+        return level_test(Residuals.of(base), base.sigma_dof)
+    return level_test(frame.residuals, frame.solution.sigma_dof)
 
 
 def sigma_holds(problem: Problem, frame: Frame) -> bool:
@@ -458,8 +461,12 @@ def sigma_holds(problem: Problem, frame: Frame) -> bool:
 
 
 def unit_variance(problem: Problem, frame: Frame) -> float:
-    """Variance of unit weight: 1 where the given sigma holds, else a posteriori."""
-    return 1.0 if sigma_holds(problem, frame) else frame.residuals.variance
+    """Variance of unit weight: of the given sigma where that holds, else a posteriori."""
+    residuals = frame.residuals
+    if not sigma_holds(problem, frame):
+        return residuals.variance
+    r = residuals.redundancy
+    return pooled_variance(r * residuals.variance, r, frame.solution.sigma_dof)
 
 
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:

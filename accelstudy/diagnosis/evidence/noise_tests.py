@@ -60,11 +60,11 @@ def force_residuals(residuals: Residuals, errors: Array) -> Array:
     return np.stack(position_products(errors, residuals.force_noise), axis=-1)
 
 
-def level_test(residuals: Residuals) -> NoiseTest:
+def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
     """Whether the residuals are as large as sigma says, two-sided (the global test)."""
     factor = residuals.variance
     omega = factor * residuals.redundancy
-    test = global_test(omega, residuals.redundancy)
+    test = global_test(omega, residuals.redundancy, sigma_dof=sigma_dof)
     assert test is not None
     size = "larger" if factor > 1 else "smaller"
     return NoiseTest(

@@ -66,9 +66,9 @@ class Level:
     known: bool
 
     @classmethod
-    def given(cls) -> Level:
-        """Of a sigma that is given."""
-        return cls((1 - DOUBT, DOUBT), (AS_GIVEN, DOUBTED), known=True)
+    def given(cls, dof: float = AS_GIVEN) -> Level:
+        """Of a sigma that is given, which has so many degrees of freedom if it is right."""
+        return cls((1 - DOUBT, DOUBT), (min(dof, AS_GIVEN), DOUBTED), known=True)
 
     @classmethod
     def within_holds(cls) -> Level:
