@@ -89,14 +89,11 @@ def whitened_jacobian(
     (m, u') array; AᵀA is the normal matrix. With errors that all angles share, and with observed
     gravity, columns and rows are added.
     """
-    problem = CalibrationProblem.of(model, approach, observed)
-    x = problem.initial[:1].copy()
+    problem = CalibrationProblem.of(model, approach, observed.first(1))
+    x = problem.initial.copy()
     x[0, : model.n_parameters] = parameters
-    at = problem.linearised(x[0], problem.observations[0])
-    white = whitened_design(at, problem.cofactors.T)
-    rows = np.moveaxis(white[:, :, 0], 1, -1).reshape(-1, x.shape[1])
     weighted = np.flatnonzero(problem.weights)
-    return np.concatenate([rows, np.diag(np.sqrt(problem.weights))[weighted]])
+    return np.concatenate([problem.rows(x)[0], np.diag(np.sqrt(problem.weights))[weighted]])
 
 
 @dataclass(frozen=True)
@@ -174,15 +171,19 @@ class CalibrationProblem:
         return np.concatenate(self.observed, axis=-1)
 
     def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
-        """Linearise one session at parameters (u',) and observations (n, o)."""
-        forces, latent = adjusted[:, :3], adjusted[:, :3]
+        """Linearise all sessions at parameters (R, u') and observations (R, n, o)."""
+        forces = latent = adjusted[..., :3]
         if not self.conditions.equations.knows_force:
-            p = parameters[: self.model.n_parameters]
-            g = parameters[-1] if self.with_gravity else self.conditions.gravity
+            p = parameters[:, : self.model.n_parameters]
+            g = parameters[:, -1] if self.with_gravity else self.conditions.gravity
             latent = self.model.sensitive_force(forces, p, g, self.conditions.hold)
-        return self.conditions.linearise(
-            parameters[:, None], adjusted.T[:, None], latent.T[:, None]
-        )
+        components = (np.moveaxis(each, -1, 0) for each in (parameters, adjusted, latent))
+        return self.conditions.linearise(*components)
+
+    def rows(self, parameters: Array) -> Array:
+        """Design matrices at unit weight, (R, conditions, u'), of the raw observations."""
+        white = whitened_design(self.linearised(parameters, self.observations), self.cofactors.T)
+        return np.asarray(white.transpose(2, 0, 3, 1).reshape(len(parameters), -1, white.shape[1]))
 
 
 @dataclass(frozen=True)

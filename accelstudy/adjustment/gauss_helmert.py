@@ -143,9 +143,11 @@ def adjust(
     observations : (R, n, o) array, l
     cofactors : (n, o) array of variances, or (n, o, o) array of matrices, Q of each block
     initial : (u,) or (R, u) array, initial values of the parameters
-    parameter_observations, parameter_weights : (R, u) and (u,) arrays, optional
-        Direct observations of parameters (gravity with σ_g, say) and their weights; a weight of
-        zero means that the parameter is not observed.
+    parameter_observations : (R, u) array, optional
+        Direct observations of parameters, such as gravity with σ_g.
+    parameter_weights : (u,) or (u, u) array, optional
+        Their weights, or their weight matrix; a weight of zero means that the parameter is not
+        observed.
     latent : (k, R, n) array, optional
         Initial value of the quantity that the equations carry along.
     max_iterations : int
@@ -169,6 +171,7 @@ def adjust(
     x[:] = np.moveaxis(np.atleast_2d(np.asarray(initial, dtype=float)), -1, 0)
     v = np.zeros_like(observed)
     weights = np.zeros(n_unknowns) if parameter_weights is None else np.asarray(parameter_weights)
+    weights = np.diag(weights) if weights.ndim == 1 else weights
     direct = np.zeros_like(x)
     if parameter_observations is not None:
         direct[:] = np.moveaxis(np.atleast_2d(np.asarray(parameter_observations)), -1, 0)
@@ -186,7 +189,7 @@ def adjust(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for iteration in range(1, max_iterations + 1):
             at = equations.linearise(x, observed + v, latent)
-            redundancy = redundancy_of(at.psi.shape[0] * at.psi.shape[2], weights)
+            redundancy = redundancy_of(at.psi.shape[0] * at.psi.shape[2], np.diag(weights))
             step = _step(at, v, q, weights, direct - x)
             x, v, latent = x + step.dx, step.v, at.latent
             small = step.size <= tolerance[active]
@@ -239,18 +242,18 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     """Solve the linearised problem; `prior_misclosure` is observed minus present parameters."""
     white = whitened(at, v, q)
     normal, right = _normal_equations(white.design, white.misclosures)
-    diagonal = np.einsum("uur->ur", normal)
-    diagonal += weights[:, None]
-    right += weights[:, None] * prior_misclosure
+    normal += weights[..., None]
+    right += weights @ prior_misclosure
 
-    scale = np.sqrt(diagonal)
+    scale = np.sqrt(np.einsum("uur->ur", normal))
     lower = cholesky.factor(normal / (scale[:, None] * scale), PIVOT_TOLERANCE)
     half = cholesky.forward(lower, right / scale)
     dx = cholesky.backward(lower, half) / scale
 
     misclosure, v_new = white.solved(dx)
     omega = np.einsum("crn,crn->r", misclosure, misclosure)
-    omega += (weights[:, None] * (prior_misclosure - dx) ** 2).sum(axis=0)
+    left = prior_misclosure - dx
+    omega += (left * (weights @ left)).sum(axis=0)
 
     # All three must vanish: the step in x, the step in v, and ψ at the adjusted observations.
     size_x = np.sqrt((half**2).sum(axis=0))

@@ -71,7 +71,7 @@ class LinearTheory:
             return None
         problem = CalibrationProblem.of(model, approach, observed)
         x, v = ideal.parameters[0], ideal.residuals[0]
-        at = problem.linearised(x, problem.observations[0] + v)
+        at = problem.linearised(x[None], problem.observations + v)
         white = whitened(at, v.T[:, None], problem.cofactors.T)
         by_errors = cholesky.forward(white.factor, at.jac_observations)
         a = np.moveaxis(white.design[:, :, 0], -1, 0).reshape(-1, len(x))

@@ -24,7 +24,7 @@ from accelstudy.commands.options import (
 if TYPE_CHECKING:
     from accelstudy.campaign.of_type import SensorType
     from accelstudy.campaign.session import Campaign
-    from accelstudy.sequential.information import Prior
+    from accelstudy.sequential.estimate import Prior
 
 POLL = 1.0
 """Seconds between two looks at a growing table."""
@@ -108,10 +108,11 @@ def advise_command(
     about half of single ones leave more in roll or in pitch.
     """
     from accelstudy.approaches import get_approach
+    from accelstudy.basics.errors import InputError
     from accelstudy.basics.suggested import calibrate
     from accelstudy.campaign.calibration.fit import usual_approach
     from accelstudy.sensors.models import get_model
-    from accelstudy.sequential.advisor import Advisor
+    from accelstudy.sequential.advisor import advise
     from accelstudy.sequential.choice import DEFAULTS, candidates
     from accelstudy.sequential.promise import Promise
     from accelstudy.sequential.running import Watch, read_as_it_is
@@ -119,7 +120,7 @@ def advise_command(
 
     session, promise = Watch(campaign), Promise(tilt_accuracy, tilt_range)
     if watch:
-        now = next(session.look()).campaign
+        now = next(session.look())
     else:
         running = read_as_it_is(campaign)
         now = running.campaign
@@ -131,12 +132,11 @@ def advise_command(
     directions = candidates(
         attitudes or DEFAULTS.get(name, "grid"), pole_distance, max_roll, max_pitch
     )
-    advisor = Advisor(sensor, equipment, promise, directions, *_prior(prior, model))
+    known = _prior(prior, model)
 
     def tell(now: Campaign) -> None:
         """Print the advice."""
-        advisor.check(now)
-        advice = advisor.advise(now)
+        advice = advise(now, sensor, equipment, promise, directions, *known)
         show(heading(advice, now, sensor, name))
         for line in lines(advice, now, sensor, promise):
             show(f"  {line}")
@@ -153,14 +153,15 @@ def advise_command(
     try:
         while True:
             time.sleep(POLL)
-            for news in session.look():
+            try:
+                sessions = list(session.look())
+            except InputError as error:
                 click.echo("")
-                if news.remark:
-                    warn(news.remark)
-                if news.again:
-                    advisor.restart()
-                if news.again or not news.remark:
-                    tell(news.campaign)
+                warn(f"waiting for a whole table: {error}")
+                continue
+            for now in sessions:
+                click.echo("")
+                tell(now)
     except KeyboardInterrupt:
         say("\nended")
 
@@ -175,7 +176,7 @@ def _prior(path: Path | None, model: str) -> tuple[Prior] | tuple[Prior, SensorT
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.of_type import read_type
     from accelstudy.sensors.models import get_model
-    from accelstudy.sequential.information import Prior
+    from accelstudy.sequential.estimate import Prior
 
     wanted = get_model(model)
     if path.suffix in TYPES:

@@ -191,7 +191,7 @@ class Prediction:
     def of(cls, fit: Solution, observed: Observations) -> Prediction:
         """Predict by a fit."""
         problem = CalibrationProblem.of(fit.model, fit.approach, replace(observed, initial=None))
-        at = problem.linearised(fit.parameters, problem.observations[0])
+        at = problem.linearised(fit.parameters[None], problem.observations)
         b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
         psi = at.psi[:, 0].T
         lower = whitening_of(b, problem.cofactors)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,10 @@ from accelstudy.design.estimability import is_blind
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch
-from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.choice import Chooser, typical_sizes
-from accelstudy.sequential.information import NOTHING_KNOWN, Prior
+from accelstudy.sequential.estimate import NOTHING_KNOWN, Estimate, Prior, estimate
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, get_rule
-from accelstudy.sequential.recursion import Recursion
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -130,166 +128,151 @@ class Advice:
     enough: bool
 
 
-@dataclass
-class Advisor:
-    """Advice for a session that is being measured.
+def check_session(
+    campaign: Campaign, model: SensorModel, approach: Approach, prior: Prior = NOTHING_KNOWN
+) -> None:
+    """Raise `InputError` where no number of positions would be enough."""
+    if campaign.n_positions:
+        check_campaign(campaign, model, approach)
+    elif approach.uses_angles and campaign.angles is None:
+        raise InputError(
+            f"{campaign.name}: approach {approach.name!r} needs the block `robot` in the header"
+        )
+    noise = campaign_noise(campaign)
+    if prior is NOTHING_KNOWN and is_blind(model, approach, noise, campaign.gravity):
+        or_robot = "" if approach.uses_angles else ", or a robot"
+        raise InputError(
+            f"the {approach.name} approach cannot determine the model {model.name!r} in any "
+            f"positions; take a simpler model{or_robot}"
+        )
+
+
+def advise(
+    campaign: Campaign,
+    model: SensorModel,
+    approach: Approach,
+    promise: Promise,
+    directions: Array,
+    prior: Prior = NOTHING_KNOWN,
+    sensor_type: SensorType | None = None,
+) -> Advice:
+    """Advise in a session that is being measured.
 
     The session so far is calibrated and assessed as any campaign, and advice follows that: which
     positions are odd, how large a tilt error is left, and whether anything is wrong.
 
     Parameters
     ----------
+    campaign : Campaign, the session so far; it may have no positions yet
     model : SensorModel
     approach : Approach
     promise : Promise
     directions : (k, 3) array, attitudes to choose from
     prior : Prior, optional, from an earlier calibration or from the type of the sensor
-    of_type : SensorType, optional, the type, if the prior is from it
+    sensor_type : SensorType, optional, the type, if the prior is from it
+
+    Raises
+    ------
+    InputError
+        If no number of positions would be enough.
     """
+    check_session(campaign, model, approach, prior)
+    no_prior = prior is NOTHING_KNOWN
+    assessed = _assessed(replace(campaign, of_type=sensor_type), model, approach)
+    initial = None
+    if no_prior and campaign.n_positions:
+        initial = initial_values(model, campaign.forces, campaign.gravity)
+    so_far = estimate(model, approach, campaign_observations(campaign), prior, initial)
+    if no_prior and assessed is None:
+        so_far = replace(so_far, solved=np.zeros(1, dtype=bool))
+    solved = bool(so_far.solved[0])
 
-    model: SensorModel
-    approach: Approach
-    promise: Promise
-    directions: Array
-    prior: Prior = NOTHING_KNOWN
-    of_type: SensorType | None = None
-    _recursion: Recursion | None = field(default=None, init=False)
+    noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
+    trusted = stated if assessed is None else assessed.fit.trusts_sigma
+    wrong = assessed is not None and assessed.state in (REJECTED, IMPLAUSIBLE)
+    hold = campaign.hold if campaign.n_positions else next_holds(campaign, np.eye(3)[2:])
+    at = so_far.parameters[0, : model.n_parameters] if solved else None
+    chooser = Chooser(
+        directions,
+        next_rows(campaign, model, approach, noise, directions),
+        promise.tilt_error(model, at, campaign.gravity, hold),
+        promise,
+        "known" if trusted else "bound",
+        typical_sizes(model, so_far.information.shape[-1]),
+    )
+    rms = np.full((1, 2), np.inf)
+    if solved and assessed is not None and stated and (no_prior or sensor_type is not None):
+        rms = tilt_left(assessed.fit, promise.tilt_range)[None]
+    elif solved:
+        rms = chooser.rms(so_far.cofactors, so_far.omega, so_far.redundancy)
+    enough = bool(promise.reached(rms)[0]) and not wrong
 
-    def restart(self) -> None:
-        """Forget all positions, because they have changed."""
-        self._recursion = None
+    last, repeats = None, None
+    if campaign.n_positions:
+        last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
+    latest = _last_position(campaign, assessed)
+    if latest is not None and latest.conflict:
+        repeats = int(campaign.positions[latest.index])
+    # The conditions of later positions are unknown.
+    to_go, varying = None, bool(CONDITIONS & {*model.hold_columns})
+    foreseeable = (trusted or so_far.redundancy >= LEAST_REDUNDANCY) and not varying
+    if foreseeable and not enough and not wrong:
+        variance = 1.0 if trusted else float(so_far.omega[0]) / so_far.redundancy
+        to_go = chooser.positions_to_go(so_far, variance, rms[0], last)
+    if repeats is None or last is None:
+        before = None if last is None else last[None]
+        choice = chooser.choose(so_far.information, so_far.solved, rms, before)[0]
+        best = chooser.directions[choice]
+    else:
+        best = last
+    suspects = () if assessed is None else assessed.suspects
+    return Advice(
+        positions=campaign.positions,
+        last=latest,
+        suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
+        state="" if assessed is None else assessed.state,
+        undetermined=() if solved else _undetermined(campaign, model, approach, so_far),
+        vague=_vague(model, so_far) if solved else (),
+        noise=_noise_taken(so_far, campaign, trusted, noise.sigma_force),
+        rms=rms[0] if np.isfinite(rms).all() else None,
+        next=NextPosition(best, repeats),
+        to_go=to_go,
+        foreseeable=foreseeable,
+        enough=enough,
+    )
 
-    def check(self, campaign: Campaign) -> None:
-        """Raise `InputError` where no number of positions would be enough."""
-        if campaign.n_positions:
-            check_campaign(campaign, self.model, self.approach)
-        elif self.approach.uses_angles and campaign.angles is None:
-            raise InputError(
-                f"{campaign.name}: approach {self.approach.name!r} needs the block `robot` in the "
-                "header"
-            )
-        noise, no_prior = campaign_noise(campaign), self.prior is NOTHING_KNOWN
-        if no_prior and is_blind(self.model, self.approach, noise, campaign.gravity):
-            or_robot = "" if self.approach.uses_angles else ", or a robot"
-            raise InputError(
-                f"the {self.approach.name} approach cannot determine the model "
-                f"{self.model.name!r} in any positions; take a simpler model{or_robot}"
-            )
 
-    def advise(self, campaign: Campaign) -> Advice:
-        """Take the new positions of a session, and give advice.
+def _assessed(campaign: Campaign, model: SensorModel, approach: Approach) -> Assessment | None:
+    """Assess the calibration of the session so far; None if there is none."""
+    if not campaign.n_positions:
+        return None
+    try:
+        return assess(fit_campaign(campaign, model, approach))
+    except InputError:  # it is not determined yet, or does not converge
+        return None
 
-        Parameters
-        ----------
-        campaign : Campaign
-            The session so far; positions that were taken before are unchanged.
-        """
-        observed = campaign_observations(campaign)
-        if self._recursion is None or not self._recursion.solved[0]:
-            initial = None
-            if self.prior is NOTHING_KNOWN and campaign.n_positions:
-                initial = initial_values(self.model, campaign.forces, campaign.gravity)
-            self._recursion = Recursion(self.model, self.approach, observed, self.prior, initial)
-        else:
-            self._recursion.add(observed)
-        return self._advice(campaign, self._recursion, self._assessed(campaign))
 
-    def _assessed(self, campaign: Campaign) -> Assessment | None:
-        """Assess the calibration of the session so far; None if there is none."""
-        if not campaign.n_positions:
-            return None
-        try:
-            known = replace(campaign, of_type=self.of_type)
-            return assess(fit_campaign(known, self.model, self.approach))
-        except InputError:  # it is not determined yet, or does not converge
-            return None
+def _undetermined(
+    campaign: Campaign, model: SensorModel, approach: Approach, so_far: Estimate
+) -> tuple[str, ...]:
+    """Parameters that the positions do not determine better than their typical size."""
+    names, information = model.parameter_names, so_far.information[0]
+    sizes = typical_sizes(model, len(information))
+    covariance = np.linalg.inv(information + np.diag(sizes**-2.0))
+    sigma = np.sqrt(np.diag(covariance))[: len(names)]
+    vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size]
+    if vague or not campaign.n_positions:
+        return tuple(vague)
+    theory = campaign_estimability(campaign, model, approach, sigma_to_show_above(campaign))
+    return tuple(name for name in theory.not_estimable if name in names)
 
-    def _advice(
-        self, campaign: Campaign, recursion: Recursion, assessed: Assessment | None
-    ) -> Advice:
-        noise, no_prior = campaign_noise(campaign), self.prior is NOTHING_KNOWN
-        solved = bool(recursion.solved[0]) and not (no_prior and assessed is None)
-        trusted = campaign.sigma_force is not None
-        if assessed is not None:
-            trusted = assessed.fit.trusts_sigma
-        wrong = assessed is not None and assessed.state in (REJECTED, IMPLAUSIBLE)
-        root = recursion.root_information
-        chooser = Chooser(
-            self.directions,
-            next_rows(campaign, self.model, self.approach, noise, self.directions),
-            self._tilt_error(campaign, recursion.parameters[0] if solved else None),
-            self.promise,
-            "known" if trusted else "bound",
-            typical_sizes(self.model, root.shape[-1]),
-        )
-        rms = np.full((1, 2), np.inf)
-        if solved and assessed is not None and no_prior and campaign.sigma_force is not None:
-            rms = tilt_left(assessed.fit, self.promise.tilt_range)[None]
-        elif solved:
-            rms = chooser.rms(root, recursion.omega, recursion.redundancy)
-        enough = bool(self.promise.reached(rms)[0]) and not wrong
 
-        last, repeats = None, None
-        if campaign.n_positions:
-            last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
-        latest = _last_position(campaign, assessed)
-        if latest is not None and latest.conflict:
-            repeats = int(campaign.positions[latest.index])
-        # The conditions of later positions are unknown.
-        to_go, varying = None, bool(CONDITIONS & {*self.model.hold_columns})
-        foreseeable = (trusted or recursion.redundancy >= LEAST_REDUNDANCY) and not varying
-        if foreseeable and not enough and not wrong:
-            r = recursion.redundancy
-            variance = 1.0 if trusted else float(recursion.omega[0]) / r
-            to_go = chooser.positions_to_go(root[0], variance, r, rms[0], last)
-        if repeats is None or last is None:
-            before = None if last is None else last[None]
-            choice = chooser.choose(root, np.array([solved]), rms, before)[0]
-            best = chooser.directions[choice]
-        else:
-            best = last
-        suspects = () if assessed is None else assessed.suspects
-        return Advice(
-            positions=campaign.positions,
-            last=latest,
-            suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
-            state="" if assessed is None else assessed.state,
-            undetermined=self._undetermined(campaign, root[0], solved),
-            vague=self._vague(recursion) if solved else (),
-            noise=_noise_taken(recursion, campaign, trusted, noise.sigma_force),
-            rms=rms[0] if np.isfinite(rms).all() else None,
-            next=NextPosition(best, repeats),
-            to_go=to_go,
-            foreseeable=foreseeable,
-            enough=enough,
-        )
-
-    def _tilt_error(self, campaign: Campaign, parameters: Array | None) -> TiltError:
-        hold = campaign.hold if campaign.n_positions else next_holds(campaign, np.eye(3)[2:])
-        if parameters is not None:
-            parameters = parameters[: self.model.n_parameters]  # without gravity
-        return self.promise.tilt_error(self.model, parameters, campaign.gravity, hold)
-
-    def _undetermined(self, campaign: Campaign, root: Array, solved: bool) -> tuple[str, ...]:
-        """Parameters that the positions do not determine better than their typical size."""
-        if solved:
-            return ()
-        names, sizes = self.model.parameter_names, typical_sizes(self.model, len(root))
-        covariance = np.linalg.inv(root.T @ root + np.diag(sizes**-2))
-        sigma = np.sqrt(np.diag(covariance))[: len(names)]
-        vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size]
-        if vague or not campaign.n_positions:
-            return tuple(vague)
-        noise = sigma_to_show_above(campaign)
-        theory = campaign_estimability(campaign, self.model, self.approach, noise)
-        return tuple(name for name in theory.not_estimable if name in names)
-
-    def _vague(self, recursion: Recursion) -> tuple[str, ...]:
-        """Parameters that are known less well than they are of any cheap sensor."""
-        names = self.model.parameter_names
-        sigma = np.sqrt(np.diag(recursion.cofactors[0]))[: len(names)]
-        sizes = typical_sizes(self.model, len(names))
-        return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
+def _vague(model: SensorModel, so_far: Estimate) -> tuple[str, ...]:
+    """Parameters that are known less well than they are of any cheap sensor."""
+    names = model.parameter_names
+    sigma = np.sqrt(np.diag(so_far.cofactors[0]))[: len(names)]
+    sizes = typical_sizes(model, len(names))
+    return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
 
 
 def _last_position(campaign: Campaign, assessed: Assessment | None) -> LastPosition | None:
@@ -303,19 +286,17 @@ def _last_position(campaign: Campaign, assessed: Assessment | None) -> LastPosit
     return LastPosition(last, float(assessed.p_adjusted[last]), conflict)
 
 
-def _noise_taken(
-    recursion: Recursion, campaign: Campaign, trusted: bool, unit: float
-) -> NoiseTaken:
+def _noise_taken(so_far: Estimate, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:
     """Noise of a position by which the accuracy is judged."""
-    stated, r = campaign.sigma_force, recursion.redundancy
+    stated, r = campaign.sigma_force, so_far.redundancy
     seen, taken = None, stated
-    if recursion.solved[0] and r > 0:
-        seen = unit * float(np.sqrt(recursion.omega[0] / r))
+    if so_far.solved[0] and r > 0:
+        seen = unit * float(np.sqrt(so_far.omega[0] / r))
     refuted = stated is not None and not trusted
     if refuted:
         taken = seen
     elif stated is None:
-        bound = float(np.sqrt(get_rule("bound")(recursion.omega, r)[0]))
+        bound = float(np.sqrt(get_rule("bound")(so_far.omega, r)[0]))
         taken = unit * bound if np.isfinite(bound) else None
     return NoiseTaken(stated, seen, taken, refuted, r)
 

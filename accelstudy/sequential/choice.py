@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON
-from accelstudy.design.estimability import rank_of
 from accelstudy.design.spaces import (
     Constraint,
     Constraints,
@@ -38,6 +37,7 @@ from accelstudy.design.spaces import (
 )
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sequential.estimate import Estimate, determined
 from accelstudy.sequential.promise import Promise, get_rule, rms_of
 
 Array = NDArray[np.float64]
@@ -113,12 +113,12 @@ def typical_sizes(model: SensorModel, unknowns: int) -> Array:
     return np.array([*sizes, *[np.inf] * (unknowns - len(sizes))])
 
 
-def gain_of_parameters(root_information: Array, sizes: Array, rows: Array) -> Array:
+def gain_of_parameters(information: Array, sizes: Array, rows: Array) -> Array:
     """Growth of the log-determinant of the information by each candidate.
 
     Parameters
     ----------
-    root_information : (R, u, u) array, R with Q⁻¹ = RᵀR; it may be singular
+    information : (R, u, u) array, Q⁻¹; it may be singular
     sizes : (u,) array, of the parameters in a cheap sensor
     rows : (k, c, u) array, of k candidates
 
@@ -126,18 +126,16 @@ def gain_of_parameters(root_information: Array, sizes: Array, rows: Array) -> Ar
     -------
     (R, k) array
     """
-    prior = np.broadcast_to(np.diag(1 / sizes), root_information.shape)
-    triangle = np.linalg.qr(np.concatenate([root_information, prior], axis=1), mode="r")
-    spread = _spread(np.linalg.inv(triangle), rows)
+    spread = _spread(_root_of_inverse(information + np.diag(sizes**-2.0)), rows)
     return np.asarray(np.linalg.slogdet(_with_noise(spread))[1])
 
 
-def gain_of_leveling(root_information: Array, weight: Array, rows: Array) -> Array:
+def gain_of_leveling(information: Array, weight: Array, rows: Array) -> Array:
     """Fall of the mean variance of roll and pitch by each candidate, at unit weight.
 
     Parameters
     ----------
-    root_information : (R, u', u') array, R with Q⁻¹ = RᵀR, of full rank
+    information : (R, u', u') array, Q⁻¹, of full rank
     weight : (R, u, u) array, W; without gravity, even where that is estimated
     rows : (k, c, u) array, of k candidates
 
@@ -145,7 +143,7 @@ def gain_of_leveling(root_information: Array, weight: Array, rows: Array) -> Arr
     -------
     (R, k) array, rad²
     """
-    root = np.linalg.inv(root_information)
+    root = _root_of_inverse(information)
     spread = _spread(root, rows)
     parameters = root[:, : weight.shape[-1]]  # without gravity
     weighted = np.swapaxes(parameters, 1, 2) @ weight @ parameters
@@ -158,8 +156,16 @@ def best(gains: Array) -> NDArray[np.int_]:
     return np.asarray(np.argmax(gains >= ALIKE * gains.max(axis=1, keepdims=True), axis=1))
 
 
-def _spread(root: NDArray[np.floating], rows: Array) -> Array:
-    """A R⁻¹, (R, k, c, u): A Q Aᵀ is its product with its transpose."""
+def _root_of_inverse(information: Array) -> Array:
+    """L⁻ᵀ with Q⁻¹ = L Lᵀ, (R, u, u): Q is its product with its transpose."""
+    size = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    scaled = information / (size[:, :, None] * size[:, None, :])
+    root: Array = np.swapaxes(np.linalg.inv(np.linalg.cholesky(scaled)), 1, 2)
+    return root / size[:, :, None]
+
+
+def _spread(root: Array, rows: Array) -> Array:
+    """A times the root of Q, (R, k, c, u): A Q Aᵀ is its product with its transpose."""
     k, c, u = rows.shape
     return (rows.reshape(k * c, u) @ root).reshape(len(root), k, c, u)
 
@@ -190,69 +196,58 @@ class Chooser:
     rule: str
     sizes: Array
 
-    def rms(self, root_information: Array, omega: Array, redundancy: int) -> Array:
+    def rms(self, cofactors: Array, omega: Array, redundancy: int) -> Array:
         """Rms of roll and of pitch so far, (R, 2), rad; infinite where it is not known."""
-        root = np.asarray(np.linalg.inv(root_information), dtype=float)
         variance = get_rule(self.rule)(omega, redundancy)
         finite = np.isfinite(variance)
-        rms = rms_of(self.error, root @ np.swapaxes(root, 1, 2), np.where(finite, variance, 1.0))
+        rms = rms_of(self.error, cofactors, np.where(finite, variance, 1.0))
         return np.where(finite[:, None], rms, np.inf)
 
     def choose(
-        self, root_information: Array, solved: NDArray[np.bool_], rms: Array, last: Array | None
+        self, information: Array, solved: NDArray[np.bool_], rms: Array, last: Array | None
     ) -> NDArray[np.int_]:
         """Choose the next position of each session, (R,), an index of `directions`.
 
         Parameters
         ----------
-        root_information : (R, u', u') array
+        information : (R, u', u') array
         solved : (R,) bool array, whether all parameters are determined
         rms : (R, 2) array, so far; ignored where they are not
         last : (R, 3) array, directions of the last positions; None before the first
         """
         gains = np.empty((len(solved), len(self.directions)))
         if not solved.all():
-            open_ = root_information[~solved]
-            gains[~solved] = gain_of_parameters(open_, self.sizes, self.rows)
+            gains[~solved] = gain_of_parameters(information[~solved], self.sizes, self.rows)
         if solved.any():
             weight = self.promise.weight(self.error, rms[solved])
-            gains[solved] = gain_of_leveling(root_information[solved], weight, self.rows)
+            gains[solved] = gain_of_leveling(information[solved], weight, self.rows)
         if last is not None and len(self.directions) > 1:
             gains = np.where(apart_from(self.directions, last), gains, 0.0)
         return best(gains)
 
     def positions_to_go(
-        self,
-        root_information: Array,
-        variance: float,
-        redundancy: int,
-        rms: Array,
-        last: Array | None,
+        self, so_far: Estimate, variance: float, rms: Array, last: Array | None
     ) -> int | None:
         """Positions, each the best next one, until the promise is kept; None beyond `MOST`.
 
         Parameters
         ----------
-        root_information : (u', u') array, of the positions so far
+        so_far : Estimate, of one session
         variance : float, of unit weight, assumed to stay as it is
-        redundancy : int, so far
         rms : (2,) array, so far, rad
         last : (3,) array, direction of the last position; None before the first
         """
-        root, rms = root_information[None], rms[None]
-        u, c = root.shape[-1], self.rows.shape[1]
+        information, solved, rms = so_far.information, so_far.solved, rms[None]
         last = None if last is None else last[None]
-        solved = np.array([rank_of(root[0])[0] == u])
         for n in range(1, MOST + 1):
-            chosen = self.choose(root, solved, rms, last)
-            last = self.directions[chosen]
-            more = np.concatenate([root, self.rows[chosen]], axis=1)
-            root = np.asarray(np.linalg.qr(more, mode="r"))
-            redundancy += c
-            if not solved[0]:
-                solved = np.array([rank_of(root[0])[0] == u])
+            chosen = self.choose(information, solved, rms, last)
+            last, rows = self.directions[chosen], self.rows[chosen]
+            information = information + np.swapaxes(rows, 1, 2) @ rows
+            redundancy = so_far.redundancy + n * self.rows.shape[1]
+            solved = solved | determined(information)
             if solved[0]:
-                rms = self.rms(root, np.array([variance * max(redundancy, 0)]), redundancy)
+                cofactors = np.asarray(np.linalg.inv(information), dtype=float)
+                rms = self.rms(cofactors, np.array([variance * max(redundancy, 0)]), redundancy)
                 if self.promise.reached(rms)[0]:
                     return n
         return None

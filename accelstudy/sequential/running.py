@@ -18,7 +18,7 @@ from accelstudy.campaign.format import (
     read_header,
     table_of,
 )
-from accelstudy.campaign.header import COLUMNS, HEADER, Header
+from accelstudy.campaign.header import HEADER, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
 
@@ -112,22 +112,6 @@ def _without_positions(header: Header) -> Campaign:
     return campaign_of(header, values)
 
 
-@dataclass(frozen=True)
-class News:
-    """News of a session.
-
-    Attributes
-    ----------
-    campaign : Campaign, so far
-    remark : str, what else happened to the table; empty if positions were only added
-    again : bool, whether earlier positions are gone or have changed
-    """
-
-    campaign: Campaign
-    remark: str
-    again: bool
-
-
 class Watch:
     """Looks at a campaign folder again and again.
 
@@ -138,47 +122,47 @@ class Watch:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._seen: Campaign | None = None
-        self.unfinished, self._rested, self._settled = "", 0, ""
-        self._complaint = ""
+        self._seen: Running | None = None
+        self._files = self._whole = b""
+        self._rested, self._complaint = 0, ""
 
-    def look(self) -> Iterator[News]:
-        """Yield what is new since the last look, position by position.
+    def look(self) -> Iterator[Campaign]:
+        """Yield the session if it has changed since the last look, position by position.
 
         Raises
         ------
         InputError
-            At the first look, if the campaign cannot be read. A table that cannot be read later
-            is probably just being written: the error is reported once, as a remark.
+            If the campaign cannot be read. After the first look the table is probably just being
+            written: the error is raised once, and again when it is another one.
         """
+        files = b"".join(path.read_bytes() for path in _files(self.folder))
+        self._rested = self._rested + 1 if files == self._files else 0
+        self._files, before = files, self._seen
+        unfinished = "" if before is None else before.unfinished
+        if before is not None and self._rested and not (unfinished and self._rested >= SETTLED):
+            return
         try:
-            running = read_running(self.folder, self._settled)
+            now = read_running(self.folder, unfinished if self._rested else "")
         except InputError as error:
-            if self._seen is None:
-                raise
-            if str(error) != self._complaint:
-                self._complaint = str(error)
-                yield News(self._seen, f"waiting for a whole table: {error}", False)
+            if before is not None and str(error) == self._complaint:
+                return
+            self._complaint = str(error)
+            raise
+        whole = files.removesuffix(now.unfinished.encode()).strip()
+        self._complaint, self._seen = "", now
+        count, changed = now.campaign.n_positions, whole != self._whole
+        self._whole = whole
+        if before is not None and not (changed and (count or before.campaign.n_positions)):
             return
-        self._complaint = ""
-        same = running.unfinished == self.unfinished
-        self._rested = self._rested + 1 if running.unfinished and same else 0
-        self.unfinished = running.unfinished
-        if self._rested >= SETTLED:  # from the next look on
-            self._settled = self.unfinished
-        yield from self._compare(running.campaign)
+        first = count if before is None else min(before.campaign.n_positions + 1, count)
+        for n in range(first, count + 1):
+            yield _first(now.campaign, n)
 
-    def _compare(self, now: Campaign) -> Iterator[News]:
-        before, self._seen = self._seen, now
-        if before is None:
-            yield News(now, "", False)
-            return
-        remark = _changes(before, now)
-        if remark:
-            yield News(now, f"{remark}; starting over", True)
-            return
-        for n in range(before.n_positions + 1, now.n_positions + 1):
-            yield News(_first(now, n), "", False)
+
+def _files(folder: Path) -> list[Path]:
+    """Files of a campaign that exist."""
+    found = [folder / HEADER, table_of(folder)] if folder.is_dir() else []
+    return [path for path in found if path is not None and path.is_file()]
 
 
 def _first(campaign: Campaign, n: int) -> Campaign:
@@ -186,41 +170,5 @@ def _first(campaign: Campaign, n: int) -> Campaign:
     if n == campaign.n_positions:
         return campaign
     later = {int(p): "later" for p in campaign.positions[n:]}
-    reasons, excluded = dict(campaign.reasons), campaign.excluded
     part = campaign.without(later)
-    return replace(part, excluded=excluded, reasons=reasons)
-
-
-def _changes(before: Campaign, now: Campaign) -> str:
-    """How earlier positions have changed; empty if they have not."""
-    if before.reasons != now.reasons:
-        return "campaign.yaml leaves out other positions"
-    gone = [str(p) for p in before.positions if p not in now.positions]
-    if gone:
-        return (
-            f"position {gone[0]} is gone"
-            if len(gone) == 1
-            else (f"positions {', '.join(gone)} are gone")
-        )
-    n = before.n_positions
-    if not np.array_equal(before.positions, now.positions[:n]):
-        return "a position came in before the last one"
-    for name in COLUMNS:
-        old, new = getattr(before, name), getattr(now, name)
-        if n and (old is None) != (new is None):
-            return f"the columns of {name} came or went"
-        if old is not None and new is not None and not np.array_equal(old, new[:n]):
-            changed = before.positions[np.any(np.reshape(old != new[:n], (n, -1)), axis=1)]
-            return f"position {changed[0]} was changed"
-    header = (
-        "unit",
-        "gravity",
-        "sigma_gravity",
-        "sigma_force",
-        "sigma_angle",
-        "reference",
-        "full_range",
-    )
-    if any(getattr(before, name) != getattr(now, name) for name in header):
-        return "campaign.yaml was changed"
-    return ""
+    return replace(part, excluded=campaign.excluded, reasons=dict(campaign.reasons))

@@ -26,14 +26,12 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.choice import DEFAULTS, Chooser, candidates, typical_sizes
 from accelstudy.sequential.config import SequentialConfig
+from accelstudy.sequential.estimate import Estimate, estimate
 from accelstudy.sequential.promise import Promise, rms_of
-from accelstudy.sequential.recursion import Recursion
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-3
-"""Tolerance of the estimates in standard deviations, negligible for the results here."""
 AT_ONCE = 500
 """Sessions that are simulated together; more would only take memory."""
 ROUNDING = 1e-9
@@ -174,7 +172,7 @@ def simulate(set_up: SetUp, seed: int) -> pd.DataFrame:
     DataFrame
         A row for each session, angles in rad: the number of positions; the rms of roll and pitch
         that it claims, the one by the true noise, and the actual error of its calibration; the
-        shares of intervals that contain the truth; how often all positions were linearised anew.
+        shares of intervals that contain the truth.
     """
     sizes = [AT_ONCE] * (set_up.config.sessions // AT_ONCE)
     sizes += [rest] if (rest := set_up.config.sessions % AT_ONCE) else []
@@ -187,14 +185,11 @@ def _simulate(set_up: SetUp, sessions: int, rng: np.random.Generator) -> pd.Data
     truth = _sensors(model, sessions, rng)
     nothing = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
     going, (forces, angles) = np.arange(sessions), nothing
-    recursion = Recursion(
-        model, set_up.equipment, _observed(set_up, forces, angles), tolerance=TOLERANCE
-    )
+    so_far = estimate(model, set_up.equipment, _observed(set_up, forces, angles))
     rms, last = np.full((sessions, 2), np.inf), None
-    passes = np.zeros((sessions, 2), dtype=int)
     ended: list[pd.DataFrame] = []
     for n in range(1, set_up.config.most_positions + 1):
-        chosen = chooser.choose(recursion.root_information, recursion.solved, rms, last)
+        chosen = chooser.choose(so_far.information, so_far.solved, rms, last)
         # Drawn for all sessions, so that none depends on which others have ended.
         off = set_up.config.placing_gon * GON * rng.standard_normal((sessions, 3))
         errors = rng.standard_normal((sessions, 3)), rng.standard_normal((sessions, 2))
@@ -205,29 +200,24 @@ def _simulate(set_up: SetUp, sessions: int, rng: np.random.Generator) -> pd.Data
             np.concatenate([before, new], axis=1)
             for before, new in zip((forces, angles), read, strict=True)
         )
-        before = recursion.solved.copy()
-        recursion.add(_observed(set_up, forces, angles))
-        passes[going, 0] += (recursion.passes > 0) & before
-        passes[going, 1] += before
+        observed = _observed(set_up, forces, angles)
+        so_far = estimate(model, set_up.equipment, observed, before=so_far)
 
         rms = np.full((len(going), 2), np.inf)
-        ok = np.flatnonzero(recursion.solved)
-        rms[ok] = chooser.rms(
-            recursion.root_information[ok], recursion.omega[ok], recursion.redundancy
-        )
+        ok = so_far.solved
+        rms[ok] = chooser.rms(so_far.cofactors[ok], so_far.omega[ok], so_far.redundancy)
         done = set_up.promise.reached(rms)
         if done.any() or n == set_up.config.most_positions:
             over = done | (n == set_up.config.most_positions)
-            row = _outcome(set_up, recursion.only(np.flatnonzero(over)), truth[going[over]])
+            row = _outcome(set_up, so_far.sessions(np.flatnonzero(over)), truth[going[over]])
             row.insert(0, "session", going[over])
             row["kept"] = done[over]
             row[["claimed_roll", "claimed_pitch"]] = rms[over]
-            row[["passes", "updates"]] = passes[going[over]]
             ended.append(row)
             left = np.flatnonzero(~over)
             if not len(left):
                 break
-            recursion, going = recursion.only(left), going[left]
+            so_far, going = so_far.sessions(left), going[left]
             forces, angles, rms, last = forces[left], angles[left], rms[left], last[left]
     return pd.concat(ended).sort_values("session", ignore_index=True).drop(columns="session")
 
@@ -255,16 +245,16 @@ def _observed(set_up: SetUp, forces: Array, angles: Array) -> Observations:
     return Observations(forces, noise.sigma_force, angles, noise.sigma_angle, STANDARD_GRAVITY)
 
 
-def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
+def _outcome(set_up: SetUp, so_far: Estimate, truth: Array) -> pd.DataFrame:
     """Results of sessions that have ended, one row each."""
-    error, cofactors = set_up.chooser.error, recursion.cofactors
-    delta = recursion.parameters - truth
+    error, cofactors = set_up.chooser.error, so_far.cofactors
+    delta = so_far.parameters - truth
     true_rms, actual = rms_of(error, cofactors), error.rms(delta)
-    r = recursion.redundancy
+    r = so_far.redundancy
     if set_up.rule == "known":
         width = np.full(len(truth), sigmas_95())
     else:
-        sigma0 = np.sqrt(recursion.omega / r) if r > 0 else np.full(len(truth), np.nan)
+        sigma0 = np.sqrt(so_far.omega / r) if r > 0 else np.full(len(truth), np.nan)
         width = sigmas_95(r) * sigma0
     sigma = np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
     inside = np.abs(delta) <= width[:, None] * sigma
@@ -272,9 +262,9 @@ def _outcome(set_up: SetUp, recursion: Recursion, truth: Array) -> pd.DataFrame:
     spread = np.stack([rms_of(each, cofactors) for each in set_up.attitudes], axis=1)
     return pd.DataFrame(
         {
-            "positions": recursion.n_positions,
+            "positions": so_far.n_positions,
             "redundancy": r,
-            "omega": recursion.omega,
+            "omega": so_far.omega,
             "true_roll": true_rms[:, 0],
             "true_pitch": true_rms[:, 1],
             "actual_roll": actual[:, 0],
@@ -326,7 +316,6 @@ def summarise(set_up: SetUp, sessions: pd.DataFrame) -> dict[str, Any]:
         mean, half = _mean(sessions[f"{what}_inside"].to_numpy())
         row |= {f"{what}_inside": mean, f"{what}_inside_low": mean - half}
         row[f"{what}_inside_high"] = mean + half
-    row["relinearised"] = sessions["passes"].sum() / max(1, sessions["updates"].sum())
     return row
 
 

@@ -15,7 +15,7 @@ from accelstudy.drawing.style import ANGLE_COLOURS, FULL, INK, STYLE, new_figure
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.frames import Frame
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.advisor import Advisor
+from accelstudy.sequential.advisor import advise
 from accelstudy.sequential.choice import DEFAULTS, candidates
 from accelstudy.sequential.promise import Promise
 
@@ -150,11 +150,10 @@ def session():
     campaign, _ = simulate_campaign(CampaignSettings(name="whole", **settings))
     promise = Promise(15 * MGON, 30 * GON)
     model, approach = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
-    advisor = Advisor(model, approach, promise, candidates(DEFAULTS.get("gravity", "grid")))
+    directions = candidates(DEFAULTS.get("gravity", "grid"))
     numbers = [int(p) for p in campaign.positions]
-    advice = [
-        advisor.advise(campaign.without(dict.fromkeys(numbers[n:], "later"))) for n in numbers
-    ]
+    sessions = [campaign.without(dict.fromkeys(numbers[n:], "later")) for n in numbers]
+    advice = [advise(each, model, approach, promise, directions) for each in sessions]
     known = [
         (n, *one.rms / MGON) for n, one in zip(numbers, advice, strict=True) if one.rms is not None
     ]

@@ -122,7 +122,7 @@ def with_settings(
             effects = tuple(changed if e.name == one.name else e for e in model.effects)
             trial = SensorModel(model.name, effects)
             problem = CalibrationProblem.of(trial, fit.approach, fit.observed)
-            psi.append(problem.linearised(fit.parameters, at).psi[:, 0].T)
+            psi.append(problem.linearised(fit.parameters[None], at[None]).psi[:, 0].T)
         slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
         columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
         tried = _values(examined, one)

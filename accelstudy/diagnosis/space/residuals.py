@@ -180,7 +180,7 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     if problem.with_gravity:
         x[-1] = g
     values = [forces, angles] if approach.uses_angles else [forces]
-    at = problem.linearised(x, np.concatenate(values, axis=1))
+    at = problem.linearised(x[None], np.concatenate(values, axis=1)[None])
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     # Weights that are taken from the residuals could hide an axis.
     variances = solution.variances.copy()
