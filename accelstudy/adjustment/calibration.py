@@ -54,24 +54,12 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     count, n = observed.forces.shape[:2]
     size = max(1, AT_ONCE // n)
     if count <= size:
-        return _calibrated(CalibrationProblem.of(model, approach, observed))
+        return CalibrationProblem.of(model, approach, observed).adjusted()
     parts = []
     for start in range(0, count, size):
         part = observed.sessions(slice(start, start + size))
-        parts.append(_calibrated(CalibrationProblem.of(model, approach, part)))
+        parts.append(CalibrationProblem.of(model, approach, part).adjusted())
     return Adjustment.joined(parts)
-
-
-def _calibrated(problem: CalibrationProblem) -> Adjustment:
-    return adjust(
-        problem.conditions,
-        problem.observations,
-        problem.cofactors,
-        problem.initial,
-        parameter_observations=problem.direct,
-        parameter_weights=problem.weights,
-        latent=np.moveaxis(problem.observations[..., :3], -1, 0),
-    )
 
 
 def whitened_jacobian(
@@ -102,7 +90,8 @@ class CalibrationProblem:
 
     `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
     `direct` holds what is known of the parameters directly, (R, u), and `weights` (u,) its weights:
-    gravity, what effects know of their parameters a priori, and errors that all angles share.
+    gravity, what effects know of their parameters a priori, and errors that all angles share. To
+    be adjusted, `weights` may be a matrix (u, u).
     """
 
     model: SensorModel
@@ -169,6 +158,18 @@ class CalibrationProblem:
     def observations(self) -> Array:
         """All observations, (R, n, o)."""
         return np.concatenate(self.observed, axis=-1)
+
+    def adjusted(self) -> Adjustment:
+        """Adjust all sessions."""
+        return adjust(
+            self.conditions,
+            self.observations,
+            self.cofactors,
+            self.initial,
+            parameter_observations=self.direct,
+            parameter_weights=self.weights,
+            latent=np.moveaxis(self.observations[..., :3], -1, 0),
+        )
 
     def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
         """Linearise all sessions at parameters (R, u') and observations (R, n, o)."""

@@ -136,7 +136,7 @@ def advise_command(
 
     def tell(now: Campaign) -> None:
         """Print the advice."""
-        advice = advise(now, sensor, equipment, promise, directions, *known)
+        advice = advise(now, sensor, equipment, promise, directions, known)
         show(heading(advice, now, sensor, name))
         for line in lines(advice, now, sensor, promise):
             show(f"  {line}")
@@ -166,22 +166,21 @@ def advise_command(
         say("\nended")
 
 
-def _prior(path: Path | None, model: str) -> tuple[Prior] | tuple[Prior, SensorType] | tuple[()]:
+def _prior(path: Path | None, model: str) -> Prior | SensorType:
     """What an earlier calibration, or a type, says; nothing without one."""
-    if path is None:
-        return ()
     import numpy as np
 
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.of_type import read_type
     from accelstudy.sensors.models import get_model
-    from accelstudy.sequential.estimate import Prior
+    from accelstudy.sequential.estimate import NOTHING_KNOWN, Prior
 
+    if path is None:
+        return NOTHING_KNOWN
     wanted = get_model(model)
     if path.suffix in TYPES:
-        of_type = read_type(path, wanted)
-        return Prior.of_known(of_type.known, wanted), of_type
+        return read_type(path, wanted)
     earlier = read_calibration(path)
     if earlier.model.parameter_names != wanted.parameter_names:
         raise InputError(
@@ -190,4 +189,4 @@ def _prior(path: Path | None, model: str) -> tuple[Prior] | tuple[Prior, SensorT
         )
     if not np.isfinite(earlier.covariance).all():
         raise InputError(f"{path}: does not say how well its parameters are known")
-    return (Prior.of_covariance(earlier.parameters, earlier.covariance),)
+    return Prior.of_covariance(earlier.parameters, earlier.covariance)

@@ -24,7 +24,7 @@ from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, Given, angles_in
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import Keyword, Names, Place, Share
+from accelstudy.verbs.kinds import FileOrFolder, Keyword, Names, Share
 
 Verb = Callable[..., Any]
 TERMINAL = ("out", "force", "angle_unit", "quiet")
@@ -60,7 +60,7 @@ def command(
     options : further options, which come first
     angles : bool, whether it shows angles
     """
-    places = [one for one in inspect.signature(verb).parameters.values() if _is_place(one)]
+    arguments = [p for p in inspect.signature(verb).parameters.values() if _is_argument(p)]
     keywords = kinds.keywords(verb)
 
     def act(*, quiet: bool, angle_unit: str | None = None, **given: Any) -> None:
@@ -68,34 +68,34 @@ def command(
             if run is not None:
                 run(**given)
             elif writes is None:
-                show(_call(verb, places, given))
+                show(_call(verb, arguments, given))
             else:
-                _save(verb, places, given, writes)
+                _save(verb, arguments, given, writes)
 
     own = [_option(one, verb) for one in keywords]
-    terminal = [_QUIET] if not angles else [_ANGLE_UNIT, _QUIET]
+    terminal = [_ANGLE_UNIT, _QUIET] if angles else [_QUIET]
     if writes is not None:
-        own, terminal = own, [_FORCE, *terminal]
         place = click.Option(["--out"], type=PATH, required=not optional, help=out)
-        own, terminal = ([*own], [place, *terminal]) if optional else ([place, *own], terminal)
+        own = [*own, place] if optional else [place, *own]
+        terminal = [_FORCE, *terminal]
     return Command(
         name or str(verb.__name__).replace("_", "-"),
         callback=act,
-        params=[*map(_argument, places), *options, *own, *terminal],
+        params=[*map(_argument, arguments), *options, *own, *terminal],
         help=_spelled(kinds.summary(verb), verb),
         epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in examples)]),
         sections=sections or {},
-        meanings={_metavar(one): kinds.meanings(verb)[one.name] for one in places},
+        meanings={_metavar(one): kinds.meanings(verb)[one.name] for one in arguments},
     )
 
 
-def _call(verb: Verb, places: Sequence[inspect.Parameter], given: dict[str, Any]) -> Any:
-    arguments = [given.pop(one.name) for one in places]
-    return verb(*arguments, **given)
+def _call(verb: Verb, arguments: Sequence[inspect.Parameter], given: dict[str, Any]) -> Any:
+    values = [given.pop(one.name) for one in arguments]
+    return verb(*values, **given)
 
 
 def _save(
-    verb: Verb, places: Sequence[inspect.Parameter], given: dict[str, Any], writes: Kind
+    verb: Verb, arguments: Sequence[inspect.Parameter], given: dict[str, Any], writes: Kind
 ) -> None:
     """Call a verb, write its result to --out, and print what it says."""
     out, force = given.pop("out"), given.pop("force")
@@ -104,7 +104,7 @@ def _save(
     inputs += [Path(given[name]) for name in named if isinstance(given[name], str)]
     place = nullcontext() if out is None else result_folder(out, writes, inputs, force)
     with place as folder, stage(writes.name):
-        result = _call(verb, places, given)
+        result = _call(verb, arguments, given)
         if result.exit_status:
             result.tell(None)
             raise click.exceptions.Exit(result.exit_status)
@@ -219,7 +219,7 @@ _ANGLE_UNIT = click.Option(
 )
 
 
-def _is_place(parameter: inspect.Parameter) -> bool:
+def _is_argument(parameter: inspect.Parameter) -> bool:
     return parameter.kind is parameter.POSITIONAL_OR_KEYWORD
 
 
@@ -265,7 +265,7 @@ def _type(kind: Any) -> Any:
             return Text(kind)
         case Range(least=least, most=most):
             return Whole(int(least), int(most) if most <= 1e6 else None)
-        case Place():
+        case FileOrFolder():
             return PATH
     return kind
 

@@ -34,11 +34,11 @@ def run_export(calibration: Path, form: str) -> None:
     """Print a calibration in a form that a device takes, and warn of what the form cannot hold."""
     from accelstudy.campaign.calibration.export import losses
 
-    text = calibrations.export(calibration, form=form)
-    content = calibrations.read_calibration(calibration).content
-    if mended := content.get("mended"):
+    read = calibrations.read_calibration(calibration)
+    text = calibrations.export(read, form=form)
+    if mended := read.content.get("mended"):
         warn(f"the calibration is of mended data: {mended['reason']}")
-    for loss in losses(content, form):
+    for loss in losses(read.content, form):
         warn(loss)
     click.echo(text, nl=False)
 

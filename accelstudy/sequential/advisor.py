@@ -128,8 +128,8 @@ class Advice:
     enough: bool
 
 
-def check_session(
-    campaign: Campaign, model: SensorModel, approach: Approach, prior: Prior = NOTHING_KNOWN
+def _check(
+    campaign: Campaign, model: SensorModel, approach: Approach, prior: Prior | SensorType
 ) -> None:
     """Raise `InputError` where no number of positions would be enough."""
     if campaign.n_positions:
@@ -153,8 +153,7 @@ def advise(
     approach: Approach,
     promise: Promise,
     directions: Array,
-    prior: Prior = NOTHING_KNOWN,
-    sensor_type: SensorType | None = None,
+    prior: Prior | SensorType = NOTHING_KNOWN,
 ) -> Advice:
     """Advise in a session that is being measured.
 
@@ -168,21 +167,22 @@ def advise(
     approach : Approach
     promise : Promise
     directions : (k, 3) array, attitudes to choose from
-    prior : Prior, optional, from an earlier calibration or from the type of the sensor
-    sensor_type : SensorType, optional, the type, if the prior is from it
+    prior : Prior or SensorType, optional, from an earlier calibration, or the type of the sensor
 
     Raises
     ------
     InputError
         If no number of positions would be enough.
     """
-    check_session(campaign, model, approach, prior)
+    _check(campaign, model, approach, prior)
     no_prior = prior is NOTHING_KNOWN
+    sensor_type = prior if isinstance(prior, SensorType) else None
+    known = prior if isinstance(prior, Prior) else Prior.of_known(prior.known, model)
     assessed = _assessed(replace(campaign, of_type=sensor_type), model, approach)
     initial = None
     if no_prior and campaign.n_positions:
         initial = initial_values(model, campaign.forces, campaign.gravity)
-    so_far = estimate(model, approach, campaign_observations(campaign), prior, initial)
+    so_far = estimate(model, approach, campaign_observations(campaign), known, initial)
     if no_prior and assessed is None:
         so_far = replace(so_far, solved=np.zeros(1, dtype=bool))
     solved = bool(so_far.solved[0])

@@ -37,7 +37,7 @@ from accelstudy.design.spaces import (
 )
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.estimate import Estimate, determined
+from accelstudy.sequential.estimate import Estimate, has_full_rank, to_unit_diagonal
 from accelstudy.sequential.promise import Promise, get_rule, rms_of
 
 Array = NDArray[np.float64]
@@ -158,8 +158,7 @@ def best(gains: Array) -> NDArray[np.int_]:
 
 def _root_of_inverse(information: Array) -> Array:
     """L⁻ᵀ with Q⁻¹ = L Lᵀ, (R, u, u): Q is its product with its transpose."""
-    size = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    scaled = information / (size[:, :, None] * size[:, None, :])
+    scaled, size = to_unit_diagonal(information)
     root: Array = np.swapaxes(np.linalg.inv(np.linalg.cholesky(scaled)), 1, 2)
     return root / size[:, :, None]
 
@@ -244,7 +243,7 @@ class Chooser:
             last, rows = self.directions[chosen], self.rows[chosen]
             information = information + np.swapaxes(rows, 1, 2) @ rows
             redundancy = so_far.redundancy + n * self.rows.shape[1]
-            solved = solved | determined(information)
+            solved = solved | has_full_rank(information)
             if solved[0]:
                 cofactors = np.asarray(np.linalg.inv(information), dtype=float)
                 rms = self.rms(cofactors, np.array([variance * max(redundancy, 0)]), redundancy)

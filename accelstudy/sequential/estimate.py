@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.gauss_helmert import PIVOT_TOLERANCE, adjust
+from accelstudy.adjustment.gauss_helmert import PIVOT_TOLERANCE
 from accelstudy.adjustment.observations import Known
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -137,22 +137,20 @@ def estimate(
     information = weights + np.swapaxes(rows, 1, 2) @ rows
     solved = np.zeros(sessions, dtype=bool) if before is None else before.solved.copy()
     if redundancy >= 0:
-        solved |= determined(information)
+        solved |= has_full_rank(information)
     parameters, omega = np.full((sessions, u), np.nan), np.full(sessions, np.nan)
     if n == 0:
         parameters[solved], omega[solved] = direct[solved], 0.0
     elif solved.any():
         if before is not None:
             start = np.where(before.solved[:, None], before.parameters, start)
-        result = adjust(
-            problem.conditions,
-            problem.observations[solved],
-            problem.cofactors,
-            start[solved],
-            parameter_observations=direct[solved],
-            parameter_weights=weights,
-            latent=np.moveaxis(problem.observations[solved, :, :3], -1, 0),
-        )
+        result = replace(
+            problem,
+            observed=tuple(each[solved] for each in problem.observed),
+            initial=start[solved],
+            direct=direct[solved],
+            weights=weights,
+        ).adjusted()
         chosen = np.flatnonzero(solved)
         solved[chosen] = result.converged
         parameters[chosen], omega[chosen] = result.parameters, result.omega
@@ -161,11 +159,16 @@ def estimate(
     return Estimate(n, solved, parameters, information, omega, redundancy)
 
 
-def determined(information: Array) -> NDArray[np.bool_]:
+def to_unit_diagonal(information: Array) -> tuple[Array, Array]:
+    """Scale matrices (R, u, u) to a diagonal of 1, or 0 where it was; roots of the diagonal."""
+    root = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    size = np.where(root > 0, root, 1.0)
+    return information / (size[:, :, None] * size[:, None, :]), size
+
+
+def has_full_rank(information: Array) -> NDArray[np.bool_]:
     """Whether information matrices (R, u, u) have full rank, as the adjustment judges it."""
-    size = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    scaled = information / np.where(size > 0, size, 1.0)[:, :, None]
-    scaled /= np.where(size > 0, size, 1.0)[:, None, :]
+    scaled, _ = to_unit_diagonal(information)
     known: NDArray[np.bool_] = np.all(np.isfinite(scaled), axis=(1, 2))
     values = np.linalg.eigvalsh(np.where(known[:, None, None], scaled, 0.0))
     return np.asarray(values[:, 0] > PIVOT_TOLERANCE)

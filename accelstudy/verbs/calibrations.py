@@ -6,7 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics.bounds import Range
-from accelstudy.verbs.kinds import Approach, File, Model, Seed, verb
+from accelstudy.verbs.kinds import ApproachName, File, ModelName, Seed, verb
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 def calibrate(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: Model = "bias-scale-nonorthogonality",
-    approach: Approach | None = None,
+    model: ModelName = "bias-scale-nonorthogonality",
+    approach: ApproachName | None = None,
     prior: File | None = None,
 ) -> Calibration:
     """Calibrate a campaign and report on it.
@@ -77,8 +77,8 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
 def check_sigmas(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: Model = "bias-scale-nonorthogonality",
-    approach: Approach | None = None,
+    model: ModelName = "bias-scale-nonorthogonality",
+    approach: ApproachName | None = None,
     replicates: Annotated[int, Range(2, 10**9)] = 2000,
     seed: Seed = 1,
 ) -> pd.DataFrame:
@@ -156,8 +156,8 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "json"
 def diagnose(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: Model = "bias-scale-nonorthogonality",
-    approach: Approach | None = None,
+    model: ModelName = "bias-scale-nonorthogonality",
+    approach: ApproachName | None = None,
     prior: File | None = None,
     seed: Seed = 1,
     replicates: Annotated[int, Range(100, 10**9)] = 1000,

@@ -23,7 +23,7 @@ Returned = TypeVar("Returned")
 
 @dataclass(frozen=True)
 class Names:
-    """The name of a thing; whether there is such a thing, its registry says.
+    """A name that a registry knows.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Place:
+class FileOrFolder:
     """The path of a file or of a folder."""
 
 
@@ -63,11 +63,11 @@ class Share:
 
 
 EFFECTS = Names("effect", "accelstudy.effects", "effect_names")
-Approach = Annotated[str, Names("approach", "accelstudy.approaches", "approach_names")]
-Model = Annotated[str, Names("model", "accelstudy.sensors.models", "MODELS", True, EFFECTS)]
-Scheme = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
-Sensor = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
-File = Annotated[str | PathLike[str], Place()]
+ApproachName = Annotated[str, Names("approach", "accelstudy.approaches", "approach_names")]
+ModelName = Annotated[str, Names("model", "accelstudy.sensors.models", "MODELS", True, EFFECTS)]
+SchemeName = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
+SensorName = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
+File = Annotated[str | PathLike[str], FileOrFolder()]
 Seed = Annotated[int, bounds.SEED]
 Quantity = float | str
 """A number in SI, or a text with a unit."""
@@ -82,7 +82,7 @@ class Keyword:
     Attributes
     ----------
     name : str
-    kind : what checks it: Given, Range, Names, Place, or a plain type
+    kind : what checks it: Given, Range, Share, Names, FileOrFolder, or a plain type
     many : bool, whether it takes several
     default : of the signature; `inspect.Parameter.empty` if it must be given
     help : str, from the docstring
@@ -116,7 +116,7 @@ class Keyword:
                 return whole(name, value, self.kind)
             case Share():
                 return self.kind.read(name, value)
-            case Place():
+            case FileOrFolder():
                 return path_of(name, value)
             case Names(what=what):
                 of_type(name, value, str, expected=f"the name of {_a(what)}")

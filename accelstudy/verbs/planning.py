@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.basics.bounds import Range
 from accelstudy.planning.quantities import EQUIPMENT, MOST_POSITIONS, QUANTITIES, REPLICATES
-from accelstudy.verbs.kinds import File, Quantity, Scheme, Seed, Sensor, Share, verb
+from accelstudy.verbs.kinds import File, Quantity, SchemeName, Seed, SensorName, Share, verb
 
 if TYPE_CHECKING:
     from accelstudy.api.plans import Plan
@@ -22,14 +22,14 @@ def plan(
     *,
     tilt_accuracy: Annotated[Quantity, QUANTITIES["tilt_accuracy"]],
     tilt_range: Annotated[Quantity, QUANTITIES["tilt_range"]] = "30gon",
-    sensor: Sensor | None = None,
+    sensor: SensorName | None = None,
     sigma: Annotated[Quantity, QUANTITIES["sigma"]] | None = None,
     history: File | None = None,
     equipment: str = "both",
     reference: File | None = None,
     confidence: Annotated[float | str, Share(rms=True)] = "rms",
     holds: Hold | Sequence[Hold] = (),
-    schemes: Scheme | Sequence[Scheme] = (),
+    schemes: SchemeName | Sequence[SchemeName] = (),
     max_time: Annotated[Quantity, QUANTITIES["max_time"]] | None = None,
     max_positions: Annotated[int, Range(*MOST_POSITIONS)] = 200,
     replicates: Annotated[int, Range(*REPLICATES)] = 200,

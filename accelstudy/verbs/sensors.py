@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.verbs.kinds import Accuracy, Approach, Model, Seed, Share, Tilt, in_si, paths, verb
+from accelstudy.verbs.kinds import (
+    Accuracy,
+    ApproachName,
+    ModelName,
+    Seed,
+    Share,
+    Tilt,
+    in_si,
+    paths,
+    verb,
+)
 
 if TYPE_CHECKING:
     from accelstudy.api.calibrations import Calibration
@@ -112,8 +122,8 @@ def history(
 def lot(
     campaigns: Sequence[Campaign | str | PathLike[str]],
     *,
-    model: Model = "bias-scale-nonorthogonality",
-    approach: Approach | None = None,
+    model: ModelName = "bias-scale-nonorthogonality",
+    approach: ApproachName | None = None,
     seed: Seed = 1,
     cores: Annotated[int, Range(1, 10_000)] = 1,
 ) -> Lot:

@@ -8,7 +8,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.estimate import Prior, determined, estimate
+from accelstudy.sequential.estimate import Prior, estimate, has_full_rank
 from accelstudy.simulation.sessions import Noise, session
 
 NINE = "bias-scale-nonorthogonality"
@@ -85,7 +85,7 @@ def test_information_of_two_sessions_adds():
         for each in (faces, edges, np.concatenate([faces, edges]))
     ]  # fmt: skip
     both = parts[0].information + parts[1].information
-    assert [determined(each)[0] for each in (parts[0].information, both)] == [False, True]
+    assert [has_full_rank(each)[0] for each in (parts[0].information, both)] == [False, True]
     np.testing.assert_allclose(both[0], parts[2].information[0], rtol=1e-5, atol=1e-6 * both.max())
 
 

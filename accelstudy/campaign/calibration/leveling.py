@@ -25,7 +25,7 @@ from accelstudy.basics.units import (
 from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch, noise_of_reading
 from accelstudy.campaign.calibration.readings import Readings, readings_of
-from accelstudy.campaign.calibration.tables import ROWS, is_parquet, typed, write_table
+from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
 from accelstudy.campaign.checks import likely_fault
 from accelstudy.campaign.importing.recording import AXES
 from accelstudy.campaign.importing.sources import LogFile
@@ -83,17 +83,12 @@ def level(
     if sigma is not None:
         bounds.SIGMA_READING.check_key("--sigma", sigma)
     noise = noise_of_reading(calibration) if sigma is None else sigma
-    starts = range(0, len(readings.forces), ROWS)
-    parts = [
-        _leveled(
-            calibration,
-            readings.frame,
-            readings.forces[first : first + ROWS],
-            readings.hold.take(np.arange(first, min(first + ROWS, len(readings.forces)))),
-            noise,
-        )
-        for first in track(starts, "leveling")
-    ] or [_leveled(calibration, readings.frame, readings.forces, readings.hold, noise)]
+    rows = np.arange(len(readings.forces))
+    parts = []
+    for first in track(range(0, max(1, len(rows)), ROWS), "leveling"):
+        some = rows[first : first + ROWS]
+        of_rows = readings.forces[some], readings.hold.take(some)
+        parts.append(_leveled(calibration, readings.frame, *of_rows, noise))
     corrected = np.concatenate([part[0] for part in parts])
     near = np.concatenate([part[1] for part in parts])
     added = {name: pa.chunked_array([part[2][name] for part in parts]) for name in parts[0][2]}
@@ -127,7 +122,7 @@ def level_frame(
     """
     readings, added, leveled = level(calibration, log, given, sigma, start)
     if frame is None:
-        frame = typed(readings.source, readings.table).to_pandas()
+        frame = infer_types(readings.source, readings.table).to_pandas()
     values = {name: column.to_numpy() for name, column in added.items()}
     return frame.assign(**values), leveled
 
@@ -165,7 +160,9 @@ def level_log(
     table = readings.table
     # The row labels that pandas writes as a column are not part of the log.
     table = table.drop_columns([n for n in table.column_names if n.startswith("__index_level_")])
-    write_table(out, _with(typed(readings.source, table) if is_parquet(out) else table, added))
+    if is_parquet(out):
+        table = infer_types(readings.source, table)
+    write_table(out, _with(table, added))
     return leveled
 
 

@@ -31,8 +31,8 @@ def column_names(source: Source) -> list[str]:
     return names
 
 
-def typed(source: Source, table: pa.Table) -> pa.Table:
-    """Table in which columns of a text that hold only numbers are numbers."""
+def infer_types(source: Source, table: pa.Table) -> pa.Table:
+    """Turn the columns of a text that hold only numbers into numbers."""
     if not isinstance(source, TextSource):
         return table
     columns = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.recording import Log, Recording
-from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation, saturated
+from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation, find_saturated
 from accelstudy.campaign.importing.windows import FACTOR, Threshold, Windows, threshold_of
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def segment_blocks(
     # Blocks of which most is left out are no positions, which the report says.
     blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
     windows = Windows(log, (least // 2) | 1)
-    full = saturated(windows, [*blocks.values()], full_range - windows.steps.max())
+    full = find_saturated(windows, [*blocks.values()], full_range)
     left_out = {n: "the sensor is saturated" for n, f in zip(blocks, full, strict=True) if f}
     scatter = {
         n: _scatter(log.samples.forces[each]) for n, each in blocks.items() if n not in left_out

@@ -88,8 +88,7 @@ def segment_logs(
     for each, threshold in zip(windows, thresholds, strict=True):
         samples = each.log.samples
         segments: list[Segment | None] = [Segment.of(samples, hold) for hold in holds]
-        # The largest reading of a converter is a step less than its range.
-        full = saturated(each, holds, full_range - each.steps.max())
+        full = find_saturated(each, holds, full_range)
         # A sensor that turns slowly is nearly still in each window, yet has no constant attitude:
         # its force changes over the run by more than within each of them.
         limit = (WANDERING * threshold.sd) ** 2
@@ -202,8 +201,8 @@ class Segment:
         )
 
 
-def saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[bool]:
-    """Whether samples of holds lie at the sensor's range or, if it is unknown, at the extreme.
+def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[bool]:
+    """Tell whether samples of holds lie at the sensor's range or, if it is unknown, at the extreme.
 
     In a hold of n samples of which none lies beyond the last step, the mean may be so high that
     `BEYOND` of them were expected there. Those above the last edge but one are as many as the
@@ -217,7 +216,8 @@ def saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> li
     """
     forces = [windows.log.samples.forces[hold] for hold in holds]
     if np.isfinite(full_range) or not forces:
-        return [at_range(each, full_range) for each in forces]
+        # The largest reading of a converter is a step less than its range.
+        return [at_range(each, full_range - windows.steps.max()) for each in forces]
     step, extremes = windows.steps, windows.extremes[:, :, None, :]
     noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):

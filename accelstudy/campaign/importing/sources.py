@@ -116,8 +116,6 @@ class Source:
         kind = column.type
         if place in self.dates:
             return nanoseconds(column.to_pandas())
-        if isinstance(self, TextSource) and pa.types.is_string(kind):
-            return _numbers_of_text(column)
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
             raise InputError(f"{self.path}: column {self.names[place]} is {kind}, not numbers")
         if column.null_count:
@@ -240,6 +238,13 @@ class TextSource(Source):
             if not ragged:
                 return [table[str(place)] for place in places]
         return self.columns(places)
+
+    def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
+        import pyarrow as pa
+
+        if place not in self.dates and pa.types.is_string(column.type):
+            return _numbers_of_text(column)
+        return super()._numbers(column, place)
 
     def _read(self, types: Mapping[int, pa.DataType]) -> tuple[pa.Table, list[tuple[int, str]]]:
         """Columns of these places and types, and the rows with fewer or more cells than others."""
