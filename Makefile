@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example plan-example hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -94,9 +94,8 @@ diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it,
 	snakemake --cores $(CORES) --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
 	snakemake --cores $(CORES) --configfile config/config.yaml results/diagnose-example/diagnosis/model.yaml
 
-plan-example: $(READY) ## plan calibrations for a tilt accuracy: schemes, positions, minutes
-	snakemake --cores $(CORES) --snakefile workflow/plan.smk --configfile config/plan-example.yaml
-	snakemake --cores $(CORES) --configfile results/plan-example/plan/cases/readme/study.yaml
+positions: $(READY) ## study how good schemes are, and sessions that stop by themselves
+	python -m studies.positions results/positions
 
 hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 	snakemake --cores $(CORES) --snakefile studies/hidden/hidden.smk --configfile $(HIDDEN)

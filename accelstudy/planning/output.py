@@ -11,13 +11,11 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
-from accelstudy.planning.answer import Answer, answer
+from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.config import PlanCase
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.reasons import limits
 from accelstudy.planning.wording import (
@@ -27,7 +25,6 @@ from accelstudy.planning.wording import (
     positions_command,
     reason_lines,
     table_lines,
-    unreachable,
 )
 from accelstudy.proposal.proposal import field_order, write_design
 
@@ -36,26 +33,6 @@ STUDY_HEAD = """\
 # numbers: {command}
 """
 ANGLES = ("roll", "pitch")
-
-
-def make_plan(
-    name: str,
-    case: Mapping[str, Any],
-    replicates: int,
-    folder: str | Path,
-    provenance: Mapping[str, Any],
-) -> None:
-    """Make one plan.
-
-    Raises
-    ------
-    InputError
-        If no calibration reaches the target; the message says what is reachable.
-    """
-    plan = answer(PlanCase(**case).question, int(provenance["seed"]), replicates)
-    if not plan.ranked:
-        raise InputError(f"plan.cases.{name}: {unreachable(plan)}")
-    plan_files(plan, Path(folder), provenance, Path(folder), f"plan-{name}")
 
 
 def plan_files(

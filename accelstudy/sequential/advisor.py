@@ -31,7 +31,7 @@ from accelstudy.leveling.angles import angles_of, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.choice import Chooser, typical_sizes
 from accelstudy.sequential.estimate import NOTHING_KNOWN, Estimate, Prior, estimate
-from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, get_rule
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -177,12 +177,12 @@ def advise(
     _check(campaign, model, approach, prior)
     no_prior = prior is NOTHING_KNOWN
     sensor_type = prior if isinstance(prior, SensorType) else None
-    known = prior if isinstance(prior, Prior) else Prior.of_known(prior.known, model)
+    beforehand = prior if isinstance(prior, Prior) else Prior.of_known(prior.known, model)
     assessed = _assessed(replace(campaign, of_type=sensor_type), model, approach)
     initial = None
     if no_prior and campaign.n_positions:
         initial = initial_values(model, campaign.forces, campaign.gravity)
-    so_far = estimate(model, approach, campaign_observations(campaign), known, initial)
+    so_far = estimate(model, approach, campaign_observations(campaign), beforehand, initial)
     if no_prior and assessed is None:
         so_far = replace(so_far, solved=np.zeros(1, dtype=bool))
     solved = bool(so_far.solved[0])
@@ -197,7 +197,7 @@ def advise(
         next_rows(campaign, model, approach, noise, directions),
         promise.tilt_error(model, at, campaign.gravity, hold),
         promise,
-        "known" if trusted else "bound",
+        known if trusted else bound,
         typical_sizes(model, so_far.information.shape[-1]),
     )
     rms = np.full((1, 2), np.inf)
@@ -296,8 +296,8 @@ def _noise_taken(so_far: Estimate, campaign: Campaign, trusted: bool, unit: floa
     if refuted:
         taken = seen
     elif stated is None:
-        bound = float(np.sqrt(get_rule("bound")(so_far.omega, r)[0]))
-        taken = unit * bound if np.isfinite(bound) else None
+        largest = float(np.sqrt(bound(so_far.omega, r)[0]))
+        taken = unit * largest if np.isfinite(largest) else None
     return NoiseTaken(stated, seen, taken, refuted, r)
 
 

@@ -17,6 +17,7 @@ chapter 4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +39,7 @@ from accelstudy.design.spaces import (
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.estimate import Estimate, has_full_rank, to_unit_diagonal
-from accelstudy.sequential.promise import Promise, get_rule, rms_of
+from accelstudy.sequential.promise import Promise, rms_of
 
 Array = NDArray[np.float64]
 
@@ -184,7 +185,7 @@ class Chooser:
     rows : (k, c, u') array, their rows of the design matrix, at unit weight
     error : TiltError
     promise : Promise
-    rule : str, what the variance of unit weight is taken for
+    variance : function of Ω (R,) and the redundancy: the variance of unit weight, (R,)
     sizes : (u',) array, of the parameters in a cheap sensor
     """
 
@@ -192,12 +193,12 @@ class Chooser:
     rows: Array
     error: TiltError
     promise: Promise
-    rule: str
+    variance: Callable[[Array, int], Array]
     sizes: Array
 
     def rms(self, cofactors: Array, omega: Array, redundancy: int) -> Array:
         """Rms of roll and of pitch so far, (R, 2), rad; infinite where it is not known."""
-        variance = get_rule(self.rule)(omega, redundancy)
+        variance = self.variance(omega, redundancy)
         finite = np.isfinite(variance)
         rms = rms_of(self.error, cofactors, np.where(finite, variance, 1.0))
         return np.where(finite[:, None], rms, np.inf)

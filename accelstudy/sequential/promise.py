@@ -15,14 +15,12 @@ the promise then holds in about 95 % of the sessions or more, whatever is promis
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from accelstudy.basics.errors import UnknownNameError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, holds_in_use, tilt_error
@@ -109,31 +107,3 @@ def bound(omega: ArrayLike, redundancy: int) -> Array:
     if redundancy < LEAST_REDUNDANCY:
         return np.full(np.shape(omega), np.inf)
     return np.asarray(omega) / special.chdtri(redundancy, LEVEL)
-
-
-def plain(omega: ArrayLike, redundancy: int) -> Array:
-    """Ω/r. Nobody should stop by it; it is here to show the consequences."""
-    if redundancy < 1:
-        return np.full(np.shape(omega), np.inf)
-    return np.asarray(omega) / redundancy
-
-
-RULES: dict[str, Callable[[ArrayLike, int], Array]] = {
-    "known": known,
-    "bound": bound,
-    "plain": plain,
-}
-"""What the variance of unit weight is taken for, by name."""
-
-
-def get_rule(name: str) -> Callable[[ArrayLike, int], Array]:
-    """Return a rule by its name.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such rule.
-    """
-    if name not in RULES:
-        raise UnknownNameError("rule", name, RULES)
-    return RULES[name]

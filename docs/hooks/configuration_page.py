@@ -5,19 +5,9 @@ from schemas import blocks
 
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
-from accelstudy.planning.config import Example, PlanConfig
-from accelstudy.proposal.config import DesignsConfig
-from accelstudy.sequential.config import SequentialConfig
 from accelstudy.study.config import config_schema
 from studies.hidden.config import HiddenConfig
 from studies.hidden.real_noise import RealNoiseConfig
-
-SECTIONS = {
-    "plan": PlanConfig,
-    "designs": DesignsConfig,
-    "sequential": SequentialConfig,
-}
-"""Sections of the example of plans."""
 
 
 def configuration():
@@ -33,9 +23,4 @@ def configuration():
         blocks(RoundTrip.model_json_schema(), "A hidden effect, found again", "round trip: "),
         blocks(HiddenConfig.model_json_schema(), "A study of hidden effects", "hidden: "),
         blocks(RealNoiseConfig.model_json_schema(), "A study with real noise", "real noise: "),
-        blocks(Example.model_json_schema(), "An example of plans"),
-        *(
-            blocks(config.model_json_schema(), f"Plans: `{name}`", f"{name}: ")
-            for name, config in SECTIONS.items()
-        ),
     )

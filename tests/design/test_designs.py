@@ -11,10 +11,6 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
 from accelstudy.design.task import Task, position_rows
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.planning.config import parse_example, parse_section
-from accelstudy.proposal.config import DesignsConfig
-from accelstudy.proposal.efficiency import efficiency_table
-from accelstudy.proposal.figure import efficiency_figure
 from accelstudy.proposal.proposal import _drift_shown, field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
@@ -244,41 +240,3 @@ def test_the_order_is_a_round_trip_of_small_turns():
     groups = np.arange(16) % 3
     apart = groups[field_order(task, directions, groups)]
     assert np.count_nonzero(np.diff(apart)) == 2
-
-
-# Schemes against the best there can be
-
-
-def test_efficiencies_of_schemes_as_a_table_and_a_figure():
-    config = DesignsConfig(
-        schemes=["faces-6", "mclaren-24"], approaches=["gravity"], positions=[16]
-    )
-    tasks = [config.task(approach) for approach in config.chosen_approaches]
-    table = efficiency_table(tasks, map(get_scheme, config.chosen_schemes), config.positions, 1)
-    by = table.set_index(["approach", "scheme", "criterion"])
-    assert by.loc[("gravity", "mclaren-24", "D"), "efficiency"] == pytest.approx(1, abs=1e-4)
-    assert by.loc[("gravity", "mclaren-24", "I"), "efficiency"] == pytest.approx(0.676, abs=2e-3)
-    assert by.loc[("gravity", "I-optimal 16", "I"), "efficiency"] > 0.97
-    faces = by.loc[("gravity", "faces-6", "A")]
-    assert faces["efficiency"] == 0
-    assert faces["reason"].startswith("rank 6 of 9")
-    rows = table[(table["criterion"] == "I") & (table["reason"] == "")]
-    rms = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
-    np.testing.assert_allclose(rms**2 * rows["efficiency"], rows["least_rms"] ** 2, rtol=1e-6)
-    figure = efficiency_figure(table)
-    above, below = figure.axes
-    assert above.get_title() == "gravity: share of the best there can be"
-    assert [text.get_text() for text in above.get_yticklabels()][-1] == "16 I-optimal"
-    assert below.get_xlabel() == "positions"
-
-
-@pytest.mark.parametrize(("section", "wrong"), [
-    ({"positions": [8]}, "designs.*positions: must be from 9 to 300, not 8"),
-    ({"schemes": "faces-7"}, "unknown scheme 'faces-7'"),
-    ({"model": "bias-scale+hysteresis"}, "depends on the order of the positions"),
-    ({"tilt_range_gon": 100}, "designs.tilt_range_gon"),
-])  # fmt: skip
-def test_a_section_that_cannot_be_done(section, wrong):
-    example = parse_example({"study": "x", "designs": section})
-    with pytest.raises(InputError, match=wrong):
-        parse_section(example, "designs", DesignsConfig)

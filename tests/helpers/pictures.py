@@ -47,9 +47,9 @@ OF_STUDIES = {
 }
 """Pictures of the pages of a study."""
 DRAWN = {
-    "plan": ("make plan-example", "accelstudy/planning/figure.py"),
-    "designs-efficiency": ("make plan-example", "accelstudy/proposal/figure.py"),
-    "sequential": ("make plan-example", "accelstudy/sequential/figure.py"),
+    "plan": ("the command in docs/guides/plan.md", "accelstudy/planning/figure.py"),
+    "designs-efficiency": ("make positions", "studies/positions/efficiency.py"),
+    "sequential": ("make positions", "studies/positions/stopping.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in

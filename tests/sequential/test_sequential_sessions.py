@@ -1,8 +1,6 @@
 """Sessions that choose their positions and stop when the promised accuracy is reached."""
 
-import matplotlib.figure
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
@@ -20,18 +18,13 @@ from accelstudy.sequential.choice import (
     gain_of_parameters,
     typical_sizes,
 )
-from accelstudy.sequential.config import SequentialConfig
-from accelstudy.sequential.figure import sequential_figure
 from accelstudy.sequential.promise import (
     LEAST_REDUNDANCY,
     LEVEL,
     Promise,
     bound,
-    get_rule,
-    plain,
     rms_of,
 )
-from accelstudy.sequential.simulation import SetUp, sessions_table, simulate, summary_table
 from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -123,84 +116,8 @@ def test_attitudes_to_choose_from(tmp_path):
 def test_bounds_of_the_variance():
     omega = stats.chi2(12).rvs(20_000, random_state=1)
     assert np.mean(bound(omega, 12) > 1) == pytest.approx(LEVEL, abs=4 * 0.0011)
-    assert np.mean(plain(omega, 12)) == pytest.approx(1, abs=0.02)
     assert np.isinf(bound(omega[:2], LEAST_REDUNDANCY - 1)).all()
     assert np.isfinite(bound(omega[:2], LEAST_REDUNDANCY)).all()
-    assert np.isinf(plain(omega[:2], 0)).all()
-    with pytest.raises(UnknownNameError, match="rule 'bounds'; did you mean 'bound'"):
-        get_rule("bounds")
-
-
-# --- sessions ------------------------------------------------------------------------------------
-
-CONFIG = SequentialConfig(sessions=250, accuracies=[1.0], approaches=["gravity", "robot"])
-
-
-@pytest.fixture(scope="module")
-def sessions():
-    return {approach: sessions_table(CONFIG, approach, 1) for approach in CONFIG.approaches}
-
-
-@pytest.fixture(scope="module")
-def summary(sessions):
-    return summary_table(CONFIG, pd.concat(sessions.values())).set_index(["approach", "rule"])
-
-
-def test_with_known_noise_the_promise_is_kept_with_fewer_positions(summary):
-    for approach, most in (("gravity", 21), ("robot", 14)):
-        row = summary.loc[approach, "known"]
-        assert row["kept"] == 1
-        assert row["broken"] == 0
-        assert row["positions_95"] <= most
-        assert row["fixed_positions"] == 24
-        assert row["saved_seconds"] == pytest.approx(60 * (24 - row["positions"]))
-        for angle in ("roll", "pitch"):  # over sessions and attitudes
-            assert row[f"rms_{angle}_low"] < 1
-        for what in ("parameters", "angles"):
-            assert row[f"{what}_inside_low"] - 0.01 < 0.95 < row[f"{what}_inside_high"] + 0.01
-
-
-def test_with_unknown_noise_only_the_bound_keeps_the_promise(summary):
-    for approach in CONFIG.approaches:
-        kept, naive = summary.loc[approach, "bound"], summary.loc[approach, "plain"]
-        assert kept["broken_low"] < 0.05
-        assert max(kept["rms_roll_high"], kept["rms_pitch_high"]) < 1
-        assert naive["broken_low"] > 0.4
-        assert naive["variance"] < kept["variance"] < 1.02
-        assert naive["positions"] < summary.loc[approach, "known"]["positions"]
-
-
-def test_stopping_does_not_bias_what_the_noise_is_not_part_of(sessions):
-    """The estimate at the end is as accurate as its covariance with the true noise says."""
-    for table in sessions.values():
-        for _, part in table.groupby("rule"):
-            for angle in ("roll", "pitch"):
-                ratio = (part[f"actual_{angle}"] / part[f"true_{angle}"]) ** 2
-                assert ratio.mean() == pytest.approx(1, abs=4 * ratio.std() / np.sqrt(len(part)))
-
-
-def test_sessions_depend_on_the_seed_and_on_nothing_else(sessions):
-    set_up = SetUp(CONFIG, "robot", "known", 1.0)
-    few = SetUp(CONFIG.model_copy(update={"rules": ["known"]}), "robot", "known", 1.0)
-    again, other = simulate(few, 1), simulate(set_up, 2)
-    first = sessions["robot"].query("rule == 'known'")
-    pd.testing.assert_frame_equal(again, first[again.columns].reset_index(drop=True))
-    assert not np.array_equal(again["omega"], other["omega"])
-
-
-def test_a_session_that_does_not_get_there_ends_and_says_so():
-    config = SequentialConfig(sessions=5, accuracies=[0.5], most_positions=12)
-    table = simulate(SetUp(config, "gravity", "known", 0.5), 1)
-    assert not table["kept"].any()
-    assert (table["positions"] == 12).all()
-
-
-def test_the_figure_shows_all_set_ups(summary):
-    figure = sequential_figure(summary.reset_index(), CONFIG.instead_of)
-    assert isinstance(figure, matplotlib.figure.Figure)
-    left, right = figure.axes
-    assert len(left.lines) == 3 * 2 + 2  # and the fixed scheme for each approach
-    assert len(right.containers) == 3 * 2
 
 
 def test_rms_of_many_is_that_of_each():

@@ -308,7 +308,6 @@ def test_truncated_estimates(finished):
     ("Snakefile", "config/config"),
     ("workflow/campaigns.smk", "config/campaigns"),
     ("workflow/diagnose.smk", "config/diagnose-example"),
-    ("workflow/plan.smk", "config/plan-example"),
     ("studies/hidden/hidden.smk", "studies/hidden/config/hidden-effects"),
     ("studies/hidden/real_noise.smk", "studies/hidden/config/real-noise"),
 ])  # fmt: skip

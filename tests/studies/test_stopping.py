@@ -1,0 +1,114 @@
+"""The studies of positions: sessions that stop when a promise seems kept, and efficient schemes."""
+
+from itertools import product
+
+import matplotlib.figure
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from accelstudy.schemes import get_scheme
+from studies.positions import efficiency
+from studies.positions.efficiency import efficiency_figure, efficiency_table
+from studies.positions.stopping import (
+    RULES,
+    Setting,
+    plain,
+    sessions_table,
+    simulate,
+    stopping_figure,
+    summary_table,
+)
+
+SETTINGS = [Setting(*each, 1.0, 250) for each in product(("gravity", "robot"), RULES)]
+
+
+@pytest.fixture(scope="module")
+def sessions():
+    return sessions_table(SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def summary(sessions):
+    return summary_table(sessions).set_index(["approach", "rule"])
+
+
+def test_with_known_noise_the_promise_is_kept_with_fewer_positions(summary):
+    for approach, most in (("gravity", 21), ("robot", 14)):
+        row = summary.loc[approach, "known"]
+        assert row["kept"] == 1
+        assert row["broken"] == 0
+        assert row["positions_95"] <= most
+        assert row["fixed_positions"] == 24
+        assert row["saved_seconds"] == pytest.approx(60 * (24 - row["positions"]))
+        for angle in ("roll", "pitch"):  # over sessions and attitudes
+            assert row[f"rms_{angle}_low"] < 1
+        for what in ("parameters", "angles"):
+            assert row[f"{what}_inside_low"] - 0.01 < 0.95 < row[f"{what}_inside_high"] + 0.01
+
+
+def test_with_unknown_noise_only_the_bound_keeps_the_promise(summary):
+    for approach in ("gravity", "robot"):
+        kept, naive = summary.loc[approach, "bound"], summary.loc[approach, "plain"]
+        assert kept["broken_low"] < 0.05
+        assert max(kept["rms_roll_high"], kept["rms_pitch_high"]) < 1
+        assert naive["broken_low"] > 0.4
+        assert naive["variance"] < kept["variance"] < 1.02
+        assert naive["positions"] < summary.loc[approach, "known"]["positions"]
+
+
+def test_stopping_does_not_bias_what_the_noise_is_not_part_of(sessions):
+    """The estimate at the end is as accurate as its covariance with the true noise says."""
+    for _, part in sessions.groupby(["approach", "rule"]):
+        for angle in ("roll", "pitch"):
+            ratio = (part[f"actual_{angle}"] / part[f"true_{angle}"]) ** 2
+            assert ratio.mean() == pytest.approx(1, abs=4 * ratio.std() / np.sqrt(len(part)))
+
+
+def test_sessions_depend_on_the_seed_and_on_nothing_else(sessions):
+    setting = Setting("robot", "known", 1.0, 250)
+    again, other = simulate(setting, 1), simulate(setting, 2)
+    first = sessions.query("approach == 'robot' and rule == 'known'")
+    pd.testing.assert_frame_equal(again, first[again.columns].reset_index(drop=True))
+    assert not np.array_equal(again["omega"], other["omega"])
+
+
+def test_a_session_that_does_not_get_there_ends_and_says_so():
+    table = simulate(Setting("gravity", "known", 0.5, 5, most_positions=12), 1)
+    assert not table["kept"].any()
+    assert (table["positions"] == 12).all()
+
+
+def test_the_figure_shows_all_settings(summary):
+    figure = stopping_figure(summary.reset_index())
+    assert isinstance(figure, matplotlib.figure.Figure)
+    left, right = figure.axes
+    assert len(left.lines) == 3 * 2 + 2  # and the fixed scheme for each approach
+    assert len(right.containers) == 3 * 2
+
+
+def test_what_the_residuals_seem_to_say_is_right_on_average():
+    omega = stats.chi2(12).rvs(20_000, random_state=1)
+    assert np.mean(plain(omega, 12)) == pytest.approx(1, abs=0.02)
+    assert np.isinf(plain(omega[:2], 0)).all()
+
+
+def test_efficiencies_of_schemes_as_a_table_and_a_figure():
+    schemes = map(get_scheme, ["faces-6", "mclaren-24"])
+    table = efficiency_table(efficiency.TASKS[:1], schemes, [16])
+    by = table.set_index(["approach", "scheme", "criterion"])
+    assert by.loc[("gravity", "mclaren-24", "D"), "efficiency"] == pytest.approx(1, abs=1e-4)
+    assert by.loc[("gravity", "mclaren-24", "I"), "efficiency"] == pytest.approx(0.676, abs=2e-3)
+    assert by.loc[("gravity", "I-optimal 16", "I"), "efficiency"] > 0.97
+    faces = by.loc[("gravity", "faces-6", "A")]
+    assert faces["efficiency"] == 0
+    assert faces["reason"].startswith("rank 6 of 9")
+    rows = table[(table["criterion"] == "I") & (table["reason"] == "")]
+    rms = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
+    np.testing.assert_allclose(rms**2 * rows["efficiency"], rows["least_rms"] ** 2, rtol=1e-6)
+    figure = efficiency_figure(table)
+    above, below = figure.axes
+    assert above.get_title() == "gravity: share of the best there can be"
+    assert [text.get_text() for text in above.get_yticklabels()][-1] == "16 I-optimal"
+    assert below.get_xlabel() == "positions"
