@@ -9,9 +9,9 @@ are convex, so they have a lower bound (`continuous`); that one takes its bound 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,10 @@ RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""
 INVISIBLE = 1e-8
 """Scaled information below which an effect does not show."""
+POWER = 16
+"""Exponent of the power mean that stands for the larger of several mean squares."""
+MINIMAX, ROBUST = "minimax", "robust"
+CRITERIA = ("I", "D", "A", MINIMAX)
 
 
 class Criterion(ABC):
@@ -37,8 +41,8 @@ class Criterion(ABC):
     estimated : (u,) array of bool, which parameters the model has
     """
 
-    name: ClassVar[str]
-    text: ClassVar[str]
+    name: str
+    text: str
     estimated: NDArray[np.bool_]
 
     @abstractmethod
@@ -83,8 +87,8 @@ class Determinant(Criterion):
 
     estimated: NDArray[np.bool_]
 
-    name = "D"
-    text = "determinant of the covariance matrix of the parameters"
+    name: ClassVar[str] = "D"
+    text: ClassVar[str] = "determinant of the covariance matrix of the parameters"
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
@@ -100,108 +104,102 @@ class Determinant(Criterion):
 
 
 @dataclass(frozen=True)
-class WeightedVariance(Criterion):
-    """A quadratic form of the errors of the estimated parameters: tr(W N⁻¹).
+class MeanSquare(Criterion):
+    """A mean square of errors, or the larger one of several, as their power mean.
+
+    The positions determine the estimated parameters, of normal matrix N₁₁. Neglected parameters p
+    of variances P shift these by N₁₁⁻¹ N₁₂ p, and are missing themselves. With Z = (N₁₁⁻¹ N₁₂; −I)
+    and a form W the mean square is tr(W₁₁ N₁₁⁻¹) + tr(W Z P Zᵀ).
+
+    A power mean has a derivative also where two mean squares are equal; where one is larger, it is
+    below that one by ln 2 / 16, 4 %, at most. A power mean of log-convex functions is log-convex,
+    and never above the larger one, so its lower bound holds for that one, too.
 
     Attributes
     ----------
-    estimated : (u,) array of bool
-    weight : (u, u) array W
+    name, text, estimated : see `Criterion`
+    forms : (a, u, u) array, W of each mean square
+    variance : (q,) array, diagonal of P; empty if nothing is neglected
     """
 
+    name: str
+    text: str
     estimated: NDArray[np.bool_]
-    weight: Array
+    forms: Array
+    variance: Array = field(default_factory=lambda: np.zeros(0))
 
     def value(self, normal: Array) -> Array:
-        """Logarithm of the mean square."""
-        cofactors = np.linalg.inv(_kept(normal, self.estimated))
-        weight = self.weight[np.ix_(self.estimated, self.estimated)]
-        return np.asarray(np.log(np.sum(weight * cofactors, axis=(-2, -1))))
-
-    def gradient(self, normal: Array) -> Array:
-        """− N⁻¹ W N⁻¹ / tr(W N⁻¹)."""
-        cofactors = np.linalg.inv(_kept(normal, self.estimated))
-        weight = self.weight[np.ix_(self.estimated, self.estimated)]
-        slope = -cofactors @ weight @ cofactors / np.sum(weight * cofactors)
-        return _placed(slope, self.estimated)
-
-
-class MeanVariance(WeightedVariance):
-    """A: the mean variance of the scaled parameters."""
-
-    name = "A"
-    text = "mean variance of the scaled parameters"
-
-
-class Leveling(WeightedVariance):
-    """I: the mean variance of roll and pitch over the tilt range."""
-
-    name = "I"
-    text = "mean variance of roll and pitch over the tilt range"
-
-
-@dataclass(frozen=True)
-class NeglectedEffect(Criterion):
-    """The mean square of roll and pitch where effects of a given size are neglected.
-
-    Neglected parameters p of variances P shift the estimates by N₁₁⁻¹ N₁₂ p, and are missing
-    themselves. With Z = (N₁₁⁻¹ N₁₂; −I) the mean square is tr(W₁₁ N₁₁⁻¹) + tr(W Z P Zᵀ).
-
-    Attributes
-    ----------
-    estimated : (u,) array of bool
-    weight : (u, u) array W, of all parameters
-    variance : (q,) array, diagonal of P
-    """
-
-    estimated: NDArray[np.bool_]
-    weight: Array
-    variance: Array
-
-    name = "robust"
-    text = "mean square of roll and pitch, the neglected effects included"
-
-    def value(self, normal: Array) -> Array:
-        """Logarithm of the mean square."""
-        kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
-        cofactors = np.linalg.inv(_kept(normal, self.estimated))
-        shift = cofactors @ normal[..., kept[:, None], left]
-        w, w12, w22 = (
-            self.weight[np.ix_(i, j)] for i, j in ((kept, kept), (kept, left), (left,) * 2)
-        )
-        square = np.sum(w * cofactors, axis=(-2, -1)) + np.sum(np.diag(w22) * self.variance)
-        square_of_shift = np.einsum("...ik,ij,...jk->...k", shift, w, shift, optimize=True)
-        cross = np.einsum("...ik,ik->...k", shift, w12)
-        return np.asarray(
-            np.log(square + np.sum((square_of_shift - 2 * cross) * self.variance, axis=-1))
-        )
-
-    @property
-    def convex(self) -> Criterion:
-        """The variance alone."""
-        return Leveling(self.estimated, self.weight)
-
-    def bound(self, convex: float) -> float:
-        """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
-        kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
-        w, w12 = self.weight[np.ix_(kept, kept)], self.weight[np.ix_(kept, left)]
-        imitated = np.sum(w12 * (np.linalg.pinv(w, rcond=1e-9, hermitian=True) @ w12), axis=0)
-        remains = np.maximum(np.diag(self.weight)[left] - imitated, 0.0)
-        return float(np.log(np.exp(convex) + np.sum(remains * self.variance)))
+        """Logarithm of the mean square, or of the power mean."""
+        logs = POWER * np.log(self._squares(*self._solved(normal)))
+        return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / POWER)
 
     def gradient(self, normal: Array) -> Array:
         """Derivative by the blocks N₁₁ and N₁₂; the criterion does not depend on N₂₂."""
-        kept, left = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
-        cofactors = np.linalg.inv(_kept(normal, self.estimated))
-        shift = cofactors @ normal[np.ix_(kept, left)]
-        w, w12 = self.weight[np.ix_(kept, kept)], self.weight[np.ix_(kept, left)]
+        cofactors, shift = self._solved(normal)
+        squares = self._squares(cofactors, shift)
+        relative = squares / squares.max()
+        shares = relative ** (POWER - 1) / np.sum(relative**POWER) / squares.max()
+        w = (shares @ self._w.reshape(len(shares), -1)).reshape(cofactors.shape)
+        slope = -cofactors @ w @ cofactors
+        if not len(self.variance):
+            return _placed(slope, self.estimated)
+        kept, left = self._places
+        w12 = np.tensordot(shares, self.forms, 1)[np.ix_(kept, left)]
         by_shift = cofactors @ ((w @ shift - w12) * self.variance)
         part = by_shift @ shift.T
-        result = np.zeros_like(normal)
-        result[np.ix_(kept, kept)] = -cofactors @ w @ cofactors - part - part.T
+        result = _placed(slope - part - part.T, self.estimated)
         result[np.ix_(kept, left)] = by_shift
         result[np.ix_(left, kept)] = by_shift.T
-        return np.asarray(result / np.exp(self.value(normal)))
+        return result
+
+    @property
+    def convex(self) -> Criterion:
+        """The part of the estimated parameters."""
+        return replace(self, variance=np.zeros(0))
+
+    def bound(self, convex: float) -> float:
+        """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
+        if not len(self.variance):
+            return convex
+        kept, left = self._places
+        (form,) = self.forms
+        w12 = form[np.ix_(kept, left)]
+        inverse = np.linalg.pinv(form[np.ix_(kept, kept)], rcond=1e-9, hermitian=True)
+        remains = np.maximum(np.diag(form)[left] - np.sum(w12 * (inverse @ w12), axis=0), 0.0)
+        return float(np.log(np.exp(convex) + np.sum(remains * self.variance)))
+
+    @cached_property
+    def _places(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        """Places of the estimated and of the neglected parameters in a normal matrix."""
+        return np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
+
+    @cached_property
+    def _w(self) -> Array:
+        """W₁₁ of each mean square."""
+        kept = self._places[0]
+        return self.forms[:, kept[:, None], kept]
+
+    def _solved(self, normal: Array) -> tuple[Array, Array]:
+        """N₁₁⁻¹, and the shifts N₁₁⁻¹ N₁₂ that neglected parameters cause."""
+        kept, left = self._places
+        cofactors = np.linalg.inv(_kept(normal, self.estimated))
+        if not len(self.variance):
+            return cofactors, np.zeros((len(kept), 0))
+        return cofactors, cofactors @ normal[..., kept[:, None], left]
+
+    def _squares(self, cofactors: Array, shift: Array) -> Array:
+        """Mean squares, (a, ...)."""
+        flat = cofactors.reshape(*cofactors.shape[:-2], -1)
+        squares = np.asarray(self._w.reshape(len(self._w), -1) @ flat.T)
+        if not len(self.variance):
+            return squares
+        kept, left = self._places
+        for i, form in enumerate(self.forms):
+            by_shift = np.einsum("...ik,ij,...jk->...k", shift, self._w[i], shift, optimize=True)
+            cross = np.einsum("...ik,ik->...k", shift, form[np.ix_(kept, left)])
+            missing = by_shift - 2 * cross + np.diag(form)[left]
+            squares[i] += np.sum(missing * self.variance, axis=-1)
+        return squares
 
 
 @dataclass(frozen=True)
@@ -221,8 +219,10 @@ class Rivals(Criterion):
     first: NDArray[np.bool_]
     second: NDArray[np.bool_]
 
-    name = "discriminate"
-    text = "mean square of the sizes at which the two effects can be told from each other"
+    name: ClassVar[str] = "discriminate"
+    text: ClassVar[str] = (
+        "mean square of the sizes at which the two effects can be told from each other"
+    )
 
     def left(self, normal: Array) -> Array:
         """Part l of each parameter of the first effect, then of the second, (..., q)."""
@@ -268,14 +268,29 @@ class Rivals(Criterion):
 
 
 def get_criterion(name: str, task: Task) -> Criterion:
-    """Return a criterion by its name, D, A, I or robust, for a task."""
-    estimated = task.estimated
-    weight = task.tilt_weights.mean(axis=0)
+    """Return a criterion by its name, of `CRITERIA` or robust, for a task."""
+    estimated, forms = task.estimated, task.tilt_weights
+    mean = forms.mean(axis=0)[None]
+    use = "roll and pitch over the tilt range"
     criteria: dict[str, Criterion] = {
+        "I": MeanSquare("I", f"mean variance of {use}", estimated, mean),
         "D": Determinant(estimated),
-        "A": MeanVariance(estimated, np.diag(estimated * 1.0)),
-        "I": Leveling(estimated, weight),
-        "robust": NeglectedEffect(estimated, weight, task.neglected_variance),
+        "A": MeanSquare(
+            "A", "mean variance of the scaled parameters", estimated, np.diag(estimated * 1.0)[None]
+        ),
+        MINIMAX: MeanSquare(
+            MINIMAX,
+            "variance of roll or of pitch over the tilt range, whichever is larger",
+            estimated,
+            forms,
+        ),
+        ROBUST: MeanSquare(
+            ROBUST,
+            "mean square of roll and pitch, the neglected effects included",
+            estimated,
+            mean,
+            task.neglected_variance,
+        ),
     }
     if name not in criteria:
         raise UnknownNameError("criterion", name, criteria)
@@ -305,68 +320,3 @@ def _placed(block: Array, chosen: NDArray[np.bool_]) -> Array:
     whole = np.zeros((len(chosen), len(chosen)))
     whole[np.ix_(chosen, chosen)] = block
     return whole
-
-
-POWER = 16
-"""Exponent of the power mean that stands for the larger of the two. The mean has a derivative also
-where both are equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most."""
-
-
-@dataclass(frozen=True)
-class WorseAngle(Criterion):
-    """The larger of the mean variances of roll and of pitch, as a power mean of both.
-
-    A power mean of log-convex functions is log-convex, and never above the larger one. So its lower
-    bound holds for the worse angle, too.
-
-    Attributes
-    ----------
-    estimated : (u,) array of bool
-    weights : (2, u', u') array, quadratic forms of roll and of pitch, of the u' estimated ones
-    """
-
-    estimated: NDArray[np.bool_]
-    weights: Array
-
-    name = "minimax"
-    text = "variance of roll or of pitch over the tilt range, whichever is larger"
-
-    def value(self, normal: Array) -> Array:
-        """Logarithm of the power mean of the two mean squares."""
-        roll, pitch = POWER * np.log(self._squares(self._cofactors(normal)))
-        return np.asarray((np.logaddexp(roll, pitch) - np.log(2)) / POWER)
-
-    def gradient(self, normal: Array) -> Array:
-        """− N⁻¹ W N⁻¹, where the form W is nearly that of the worse angle."""
-        cofactors = self._cofactors(normal)
-        squares = self._squares(cofactors)
-        shares = squares ** (POWER - 1) / np.sum(squares**POWER)
-        weight = (shares @ self._flat).reshape(cofactors.shape)
-        return _placed(-cofactors @ weight @ cofactors, self.estimated)
-
-    @cached_property
-    def _kept(self) -> Any:
-        """Places of the estimated parameters in a normal matrix."""
-        kept = np.flatnonzero(self.estimated)
-        return ... if self.estimated.all() else (..., kept[:, None], kept)
-
-    @cached_property
-    def _flat(self) -> Array:
-        return self.weights.reshape(2, -1)
-
-    @cached_property
-    def _ridge(self) -> Array:
-        return RIDGE * np.eye(self.weights.shape[-1])
-
-    def _cofactors(self, normal: Array) -> Array:
-        return np.asarray(np.linalg.inv(normal[self._kept] + self._ridge))
-
-    def _squares(self, cofactors: Array) -> Array:
-        """Mean squares of roll and of pitch, (2, ...)."""
-        return np.asarray(self._flat @ cofactors.reshape(*cofactors.shape[:-2], -1).T)
-
-
-def worse_angle(task: Task) -> WorseAngle:
-    """Return the criterion for a task."""
-    kept = np.flatnonzero(task.estimated)
-    return WorseAngle(task.estimated, task.tilt_weights[:, kept[:, None], kept])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.criteria import WorseAngle
+from accelstudy.design.criteria import MINIMAX
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
@@ -23,7 +23,6 @@ from accelstudy.schemes.files import remember
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-CRITERION = WorseAngle.name
 STARTS = 1
 """Random sets from which a search starts; more find designs that are better by 0.1 % at most."""
 USUALLY, AT_LEAST = 0.6, 0.4
@@ -76,7 +75,7 @@ class Sought:
             noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), sigma_angle)
         tilt_range = float(f"{self.question.tilt_range / GON:.6g}") * GON
         return Request(
-            n, self.model, self.equipment.approach, CRITERION, tilt_range, noise, starts=STARTS
+            n, self.model, self.equipment.approach, MINIMAX, tilt_range, noise, starts=STARTS
         )
 
     def candidate(self, n: int, rough: bool = False) -> Candidate | None:
@@ -157,7 +156,7 @@ def cheapest(question: Question, good: Sequence[Candidate], confidence: float | 
 
 def is_best(scheme: Scheme) -> bool:
     """Whether a scheme is one of `best_positions`."""
-    return scheme.name.startswith(f"{CRITERION}-")
+    return scheme.name.startswith(f"{MINIMAX}-")
 
 
 def request_of(question: Question, candidate: Candidate) -> Request:
@@ -173,5 +172,5 @@ def best_positions(request: Request, rough: bool = False) -> Scheme:
     source = "accelstudy design"
     return remember(
         {"title": "minimax", "source": source, "directions": directions},
-        f"{CRITERION}-{request.positions}",
+        f"{MINIMAX}-{request.positions}",
     )

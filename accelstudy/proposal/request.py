@@ -12,7 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
-from accelstudy.design.criteria import Criterion, WorseAngle, get_criterion, rivals, worse_angle
+from accelstudy.design.criteria import CRITERIA, ROBUST, Criterion, get_criterion, rivals
 from accelstudy.design.search import STARTS, Design, optimal_design
 from accelstudy.design.spaces import (
     Constraint,
@@ -35,7 +35,6 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-CRITERIA = ("I", "D", "A", WorseAngle.name)
 SPACES = ("all", "cube", "hand")
 HAND_STEP = np.pi / 6
 """rad, step in which a person judges roll and pitch by eye."""
@@ -147,9 +146,7 @@ class Request:
         """The criterion."""
         if self.discriminate:
             return rivals(self.task, *self._rivals)
-        if self.criterion == WorseAngle.name:
-            return worse_angle(self.task)
-        return get_criterion("robust" if self.neglect else self.criterion, self.task)
+        return get_criterion(ROBUST if self.neglect else self.criterion, self.task)
 
     @cached_property
     def space(self) -> Space:
