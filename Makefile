@@ -27,7 +27,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-faults test-breaks smoke reproduce anew unlock report campaigns diagnose-example positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report campaigns diagnose-example positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -44,7 +44,7 @@ test: lint ## check and test the package
 golden: $(READY) ## compare what commands and studies tell with what is kept of them
 	CORES=$(CORES) python tests/helpers/golden.py $(PART)
 
-golden-renew: $(READY) ## keep what they tell now, of one part: make golden-renew PART=first
+golden-renew: $(READY) ## keep what they tell now, of one part: make golden-renew PART=readme
 	CORES=$(CORES) python tests/helpers/golden.py --renew $(PART)
 
 # Apart from `make test`, as measuring takes as long as all tests.
@@ -63,9 +63,6 @@ test-processors-part: $(READY) ## run a few tests with the instructions of an ol
 
 test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
 	python tests/helpers/cluster.py
-
-test-faults: $(READY) ## kill jobs and runs, fill a disk, and compare what comes out in the end
-	pytest tests/study/faults.py
 
 test-breaks: $(READY) ## break a copy of the package on purpose, and see that tests notice
 	python tests/helpers/breaking.py

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import comma_list
@@ -137,11 +138,21 @@ def _brought_to(
     session = session_like(like, evenly_spread(POSITIONS))
     approach = get_approach(str(like.content["approach"] or "gravity"))
 
-    def again(parameters: Array) -> Array:
-        readings = part.sense(-session.gravity * evenly_spread(POSITIONS), parameters,
-                              session.gravity, session.hold)  # fmt: skip
-        return fit_campaign(replace(session, forces=readings), model, approach).parameters
+    def readings(parameters: Array) -> Array:
+        forces = -session.gravity * evenly_spread(POSITIONS)
+        return part.sense(forces, parameters, session.gravity, session.hold)
 
-    steps = STEP * np.diag(np.sqrt(np.diag(covariance)))
-    slopes = np.array([(again(given + h) - again(given - h)) / (2 * h.sum()) for h in steps]).T
-    return again(given), slopes @ covariance @ slopes.T
+    fit = fit_campaign(replace(session, forces=readings(given)), model, approach)
+    steps = STEP * np.sqrt(np.diag(covariance))
+    stepped = np.concatenate([given + np.diag(steps), given - np.diag(steps)])
+    angles = fit.observed.angles
+    observed = replace(
+        fit.observed,
+        forces=np.array([readings(parameters) for parameters in stepped]),
+        angles=None if angles is None else np.repeat(angles, len(stepped), axis=0),
+        initial=fit.parameters,
+    )
+    found = calibrate(model, approach, observed).parameters[:, : model.n_parameters]
+    above, below = np.split(found, 2)
+    slopes = ((above - below) / (2 * steps[:, None])).T
+    return fit.parameters, slopes @ covariance @ slopes.T

@@ -13,8 +13,7 @@ import pytest
 from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
-from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, one
-from scheme_helpers import gravity_scale_correlation
+from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
 from study_helpers import PAPER_TRUTH
@@ -24,11 +23,9 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.design.closed_forms import (
-    gravity_sigma,
     perfect_robot_ratio,
 )
-from accelstudy.effects import Effect, HoldConditions, Parameter
-from accelstudy.effects.base import per_axis
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
@@ -258,23 +255,16 @@ def test_the_paper_miscounts_the_degree_of_freedom():
 # --- Monte Carlo ---------------------------------------------------------------------------------
 
 REPLICATES = 2000
+COMBINED = [("gravity", "mclaren-24"), ("robot", "faces-edges-18")]
 
 
 @pytest.fixture(scope="module")
 def monte_carlo():
     """Results of 2000 sessions with the paper's numbers by (approach, scheme)."""
-    return {
-        (approach.name, scheme): simulate(approach, REPLICATES, 2018, scheme)
-        for approach in (GRAVITY, ROBOT)
-        for scheme in ("mclaren-24", "faces-edges-18")
-    }
+    return {case: simulate(get_approach(case[0]), REPLICATES, 2018, case[1]) for case in COMBINED}
 
 
-CASES = pytest.mark.parametrize(
-    "case",
-    [(a, s) for a in ("gravity", "robot") for s in ("mclaren-24", "faces-edges-18")],
-    ids="-".join,
-)
+CASES = pytest.mark.parametrize("case", COMBINED, ids="-".join)
 
 
 @CASES
@@ -294,32 +284,6 @@ def test_spread_of_the_estimates_is_the_sigma_of_the_adjustment(monte_carlo, cas
     np.testing.assert_allclose(
         errors.std(axis=0), 1, rtol=0, atol=STANDARD_ERRORS / math.sqrt(2 * REPLICATES)
     )
-
-
-@pytest.mark.parametrize("scheme", ["mclaren-24", "faces-edges-18"])
-def test_spread_of_gravity_estimates_is_the_closed_form(monte_carlo, scheme):
-    result, _ = monte_carlo["gravity", scheme]
-    directions = get_scheme(scheme).directions
-    expected = gravity_sigma(directions, 0.002)
-    sigma = [expected[effect] for effect in ("bias", "scale", "nonorthogonality")]
-    np.testing.assert_allclose(
-        result.parameters.std(axis=0),
-        np.repeat(sigma, 3),
-        rtol=STANDARD_ERRORS / math.sqrt(2 * REPLICATES),
-    )
-    correlation = gravity_scale_correlation(directions)
-    observed = np.corrcoef(result.parameters[:, 3:6].T)[np.triu_indices(3, 1)]
-    limit = STANDARD_ERRORS * (1 - correlation**2) / math.sqrt(REPLICATES)
-    np.testing.assert_allclose(observed, correlation, rtol=0, atol=limit)
-
-
-def test_closed_forms_of_an_isotropic_scheme_are_the_published_numbers():
-    directions = get_scheme("mclaren-24").directions
-    sigma = gravity_sigma(directions, 0.002, 9.81)
-    assert sigma["bias"] == pytest.approx(0.707e-3, abs=0.0005e-3)
-    assert sigma["nonorthogonality"] / MGON == pytest.approx(10.26, abs=0.005)
-    assert sigma["scale"] == pytest.approx(101.9e-6, abs=0.05e-6)
-    assert gravity_scale_correlation(directions) == pytest.approx(-0.25, abs=1e-9)
 
 
 def test_a_perfect_robot_improves_the_spread_by_the_closed_form():
@@ -421,114 +385,24 @@ def test_gravity_that_is_held_fixed_is_one_number():
 # --- effects that see more than the force --------------------------------------------------------
 
 
-class ThermalBias(Effect):
-    """A bias that follows the temperature."""
-
-    name = "thermal_bias_of_the_test"
-    parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
-
-    def output(self, f, p, g, hold, xp):
-        return tuple(b_t * hold.temperature for b_t in p)
-
-
-class Hysteresis(Effect):
-    """An offset with the sign of the last change of the force."""
-
-    name = "hysteresis_of_the_test"
-    parameters = per_axis("h", "m/s^2", "h_%")
-
-    def output(self, f, p, g, hold, xp):
-        step = (hold.step_x, hold.step_y, hold.step_z)
-        return tuple(h * xp.sign(d) for h, d in zip(p, step, strict=True))
-
-
-class EncoderOffset(Effect):
-    """A zero offset of the robot's two angles."""
-
-    name = "encoder_offset_of_the_test"
-    parameters = (Parameter("c_roll", "rad", "$c_1$"), Parameter("c_pitch", "rad", "$c_2$"))
-
-    def reading(self, angles, p, hold, xp):
-        return p
-
-
-class EncoderScale(Effect):
-    """A scale error of the robot's two angles."""
-
-    name = "encoder_scale_of_the_test"
-    parameters = (Parameter("k_roll", "1", "$k_1$"), Parameter("k_pitch", "1", "$k_2$"))
-
-    def reading(self, angles, p, hold, xp):
-        return tuple(k * a for k, a in zip(p, angles, strict=True))
-
-
-TEMPERATURE = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
-EXTENDED = {
-    "temperature": (ThermalBias(), {"b_T_x": 2e-3, "b_T_y": -1e-3, "b_T_z": 3e-3}, TEMPERATURE),
-    "previous position": (Hysteresis(), {"h_x": 3e-3, "h_y": -2e-3, "h_z": 4e-3}, None),
-    "offset of the robot": (EncoderOffset(), {"c_roll": 15 * MGON, "c_pitch": -9 * MGON}, None),
-    "scale of the robot": (EncoderScale(), {"k_roll": 1e-4, "k_pitch": -2e-4}, None),
-}
-
-
-def extended_session(case):
-    effect, sizes, hold = EXTENDED[case]
-    model = SensorModel(f"nine + {effect.name}", (*NINE.effects, effect))
-    return model, *true_session(model=model, hold=hold, **sizes)
-
-
-@pytest.mark.parametrize("case", EXTENDED)
-def test_exact_data_with_an_extended_model_return_the_truth(case):
-    model, ideal, truth = extended_session(case)
-    result = calibrate(model, ROBOT, ideal.observations(Noise()))
-    assert result.converged.all()
-    np.testing.assert_allclose(result.parameters[0], truth, rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("case", EXTENDED)
-def test_an_extended_model_recovers_the_truth_within_its_sigma(case):
-    model, ideal, truth = extended_session(case)
-    observed = ideal.draw(Noise(), 400, np.random.default_rng(12))
-    result = calibrate(model, ROBOT, observed)
-    assert result.converged.all()
-    errors = (result.parameters - truth) / result.sigma_priori
-    assert np.abs(errors.mean(axis=0)).max() < STANDARD_ERRORS / math.sqrt(400)
-    assert np.abs(errors.std(axis=0) - 1).max() < STANDARD_ERRORS / math.sqrt(2 * 400)
-    r = result.redundancy
-    assert abs(result.omega.mean() - r) < STANDARD_ERRORS * math.sqrt(2 * r / 400)
-
-
-@pytest.mark.parametrize("case", EXTENDED)
-def test_what_is_missing_in_the_model_shows_in_omega(case):
-    _, ideal, _ = extended_session(case)
-    observed = ideal.draw(Noise(), 100, np.random.default_rng(12))
-    result = calibrate(NINE, ROBOT, observed)
-    assert result.omega.mean() > result.redundancy + 10 * math.sqrt(2 * result.redundancy / 100)
-
-
-def test_hysteresis_has_no_sign_in_the_first_position():
-    """Before it there is none: f_prev = f, and sign(0) = 0."""
-    _, ideal, _ = extended_session("previous position")
-    without, _ = true_session()
-    np.testing.assert_allclose(ideal.forces[0], without.forces[0], rtol=0, atol=1e-12)
+def test_what_is_missing_in_the_model_shows_in_omega():
+    """Of readings with an effect that follows the temperature, or the last change of the force."""
+    hold = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
+    for effect, sizes in (("thermal_bias", {"b_T_y": -1e-3}), ("hysteresis", {"h_x": 3e-3})):
+        ideal, _ = true_session(model=get_model(f"{NINE.name}+{effect}"), hold=hold, **sizes)
+        observed = ideal.draw(Noise(), 100, np.random.default_rng(12))
+        result = calibrate(NINE, ROBOT, observed)
+        assert result.omega.mean() > result.redundancy + 10 * math.sqrt(2 * result.redundancy / 100)
 
 
 @BOTH
 @pytest.mark.parametrize(
-    ("case", "column"), [("temperature", "temperature"), ("previous position", "step_x")]
+    ("effect", "column"), [("thermal_bias", "temperature"), ("hysteresis", "step_x")]
 )
-def test_a_missing_column_is_named(case, column, approach):
-    model, ideal, _ = extended_session(case)
-    observed = replace(ideal.observations(Noise()), hold=None)
+def test_a_missing_column_is_named(effect, column, approach):
+    observed = replace(true_session()[0].observations(Noise()), hold=None)
     with pytest.raises(InputError, match=f"column '{column}'"):
-        calibrate(model, approach, observed)
-
-
-def test_a_missing_column_is_named_before_the_simulation():
-    effect, sizes, _ = EXTENDED["temperature"]
-    model = SensorModel("nine + temperature", (*NINE.effects, effect))
-    with pytest.raises(InputError, match="column 'temperature'"):
-        true_session(model=model, **sizes)
+        calibrate(get_model(f"{NINE.name}+{effect}"), approach, observed)
 
 
 # --- invariances ---------------------------------------------------------------------------------
@@ -620,30 +494,6 @@ def test_a_common_factor_of_the_noise_changes_only_the_variances(seed, factor):
     np.testing.assert_allclose(result.parameters, expected.parameters, rtol=0, atol=1e-9)
     np.testing.assert_allclose(result.omega, expected.omega / factor**2, rtol=1e-6)
     np.testing.assert_allclose(result.sigma_posteriori, expected.sigma_posteriori, rtol=1e-6)
-
-
-def test_a_replicate_does_not_depend_on_its_batch():
-    ideal, _ = true_session()
-    observed = ideal.draw(Noise(), 60, np.random.default_rng(9))
-    together = calibrate(NINE, ROBOT, observed)
-    again = calibrate(NINE, ROBOT, observed)
-    assert np.array_equal(together.parameters, again.parameters)
-    for i in (0, 31, 59):
-        alone = calibrate(NINE, ROBOT, one(observed, i))
-        np.testing.assert_allclose(alone.parameters[0], together.parameters[i], rtol=1e-9)
-        np.testing.assert_allclose(alone.omega[0], together.omega[i], rtol=1e-10)
-
-
-def test_a_broken_replicate_is_flagged_and_harms_no_other():
-    ideal, _ = true_session()
-    observed = ideal.draw(Noise(), 3, np.random.default_rng(9))
-    forces = observed.forces.copy()
-    forces[1, 4] = np.nan
-    result = calibrate(NINE, GRAVITY, replace(observed, forces=forces))
-    expected = calibrate(NINE, GRAVITY, observed)
-    assert result.converged.tolist() == [True, False, True]
-    assert np.isnan(result.parameters[1]).all()
-    np.testing.assert_allclose(result.parameters[::2], expected.parameters[::2], rtol=1e-9)
 
 
 def test_forces_of_the_robot_are_those_of_its_attitude():

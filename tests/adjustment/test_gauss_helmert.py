@@ -232,13 +232,6 @@ def noisy_lines(replicates, seed=0):
     return PEARSON + 0.3 * noise
 
 
-def test_a_repeated_run_is_identical():
-    one, other = york(noisy_lines(50)), york(noisy_lines(50))
-    assert np.array_equal(one.parameters, other.parameters)
-    assert np.array_equal(one.cofactors, other.cofactors)
-    assert np.array_equal(one.omega, other.omega)
-
-
 def test_replicates_do_not_depend_on_their_batch():
     lines = noisy_lines(50)
     together = york(lines)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
@@ -80,3 +81,33 @@ def test_what_a_newer_version_wrote_is_said_to_be_newer(read, tmp_path):
         path.write_text(json.dumps({"new_key": 1, "schema_version": version}), encoding="utf-8")
         with pytest.raises(InputError, match=rf"^{path}: schema_version: {said}\S* is of a newer"):
             read(path)
+
+
+BAD_FILES = {
+    "syntax": ("study: [tiny\nseed: 1\n", "not valid YAML", "line 2"),
+    "tab": ("study:\n\tseed: 1\n", "not valid YAML", "line 2"),
+    "a list": ("- study\n- seed\n", "not a mapping"),
+    "a word": ("study", "not a mapping"),
+    "empty": ("", "not a mapping"),
+    "a key twice": ("study: a\nseed: 1\nstudy: b\n", "'study' stands twice", "line 3"),
+    "a key twice below": ("grids:\n  - models: all\n    models: bias-scale\n",
+                          "'models' stands twice", "line 3"),
+    "impossible date": ("study: 2018-13-45\n", "not valid YAML"),
+    "endless number": (f"seed: {'9' * 5000}\n", "not valid YAML"),
+    "deep": ("study: " + "[" * 5000, "not valid YAML: nested too deeply"),
+    "code": ("study: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
+    "unknown anchor": ("study: *nothing\n", "not valid YAML"),
+    "alias": ("a: &a {b: 1}\nc: *a\n", "line 2, column 4: an alias (*) is not read"),
+    "tag": ("seed: !!int ''\n", "line 1, column 7: a tag (!) is not read"),
+    "large": (f"models: [{'bias,' * 200_000}]\n", "larger than 1 MB; is it the right file?"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [(t, e) for t, *e in BAD_FILES.values()], ids=[*BAD_FILES]
+)
+def test_what_is_no_mapping_in_yaml_is_one_line(text, expected, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(text)
+    with refused(*expected, start=f"{path}: "):
+        read_layer(path)

@@ -6,12 +6,10 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
 from hypothesis import given
 from hypothesis import strategies as st
-from places import DATA, needs_data
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
@@ -127,57 +125,6 @@ def test_the_device_matrix_takes_raw_readings(unit, nominal):
     assert json.loads(export(calibration, "json"))["matrix_3x4"] == matrix.tolist()
 
 
-# Public data: the numbers are those that other implementations found for the same files.
-
-
-def public_means(file, columns=("ax", "ay", "az")):
-    return pd.read_csv(DATA / file)[list(columns)].to_numpy()
-
-
-def campaign_of(forces, gravity, sigma=None):
-    return Campaign("public", np.arange(len(forces)) + 1, forces, gravity, sigma_force=sigma)
-
-
-@needs_data
-@pytest.mark.parametrize(("imu", "scale", "bias", "myz_deg", "mxz", "mxy"), [
-    (0, (0.363, 0.315, 0.647), (0.103, 0.097, 0.344), 0.123, 0.317, 0.02),
-    (1, (0.471, 0.482, 0.932), (0.09, 0.07, 0.338), -0.284, 0.145, -0.01),
-    (2, (0.382, 0.355, 0.780), (0.096, 0.008, -0.045), 0.26, 0.282, -0.012),
-])  # fmt: skip
-def test_mpu9150_agrees_with_its_authors(imu, scale, bias, myz_deg, mxz, mxy):
-    forces = public_means(f"mpu9150/derived_static_means_imu{imu}.csv")
-    fit = fit_campaign(campaign_of(forces, 9.81), NINE, GRAVITY)
-    k, b = affine_form(NINE, fit.parameters)
-    m = np.linalg.inv(k)
-    np.testing.assert_allclose(100 * (np.diag(m) - 1), scale, rtol=0, atol=0.027 + 0.0005)
-    np.testing.assert_allclose(b, bias, rtol=0, atol=1.8e-3 + 0.0005)
-    off = np.degrees([m[1, 2], m[0, 2], m[0, 1]])
-    np.testing.assert_allclose(off, [myz_deg, mxz, mxy], rtol=0, atol=0.018 + 0.001)
-    assert 1e3 * fit.rms_norm_residual == pytest.approx(2.1, abs=0.05)
-
-
-@needs_data
-def test_xsens_agrees_with_the_recomputation_of_imu_tk():
-    nominal = np.array([0.0024, 0.0024, 0.0024])
-    offset = np.array([33123.0, 33275.0, 32364.0])
-    counts = public_means("imu_tk_xsens/derived_static_means.csv")
-    fit = fit_campaign(campaign_of((counts - offset) * nominal, 9.81744), NINE, GRAVITY)
-    k, b = affine_form(NINE, fit.parameters)
-    np.testing.assert_allclose(
-        1 / (np.diag(k) * nominal), [414.4143, 412.0467, 414.6139], rtol=0, atol=0.03
-    )
-    np.testing.assert_allclose(
-        b / nominal + offset, [33123.885, 33275.159, 32364.571], rtol=0, atol=0.1
-    )
-    t = k / np.diag(k)
-    np.testing.assert_allclose(
-        [-t[0, 1], t[0, 2], -t[1, 2]], [0.003413, -0.009415, 0.021277], rtol=0, atol=5e-4
-    )
-    assert 1e3 * fit.rms_norm_residual == pytest.approx(1.02, abs=0.01)
-    # The unknown sigma stands at 1 mm/s², so this is sigma a posteriori in mm/s².
-    assert math.sqrt(float(fit.adjustment.variance_posteriori[0])) == pytest.approx(1.16, abs=0.01)
-
-
 @pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 def test_the_claimed_sigmas_hold_in_simulation(approach):
     fit = fit_campaign(simulated_campaign({"b_x": 0.1, "s_y": 0.01}), NINE, approach)
@@ -185,14 +132,6 @@ def test_the_claimed_sigmas_hold_in_simulation(approach):
     # Nine ratios, each with a standard error of 1/√(2·2000) = 1.6 %.
     assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 2000)
     assert (table["n_converged"] == 2000).all()
-
-
-@needs_data
-def test_the_sigmas_of_a_real_campaign_hold_in_simulation():
-    forces = public_means("mpu9150/derived_static_means_imu0.csv")
-    fit = fit_campaign(campaign_of(forces, 9.8189), NINE, GRAVITY)
-    table = check_sigmas(fit, replicates=2000, seed=3)
-    assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 2000)
 
 
 def test_positions_in_conflict_are_not_blamed_alone():
@@ -233,13 +172,13 @@ DODECAHEDRON = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
 
 
 @pytest.mark.parametrize("stated", [True, False])
-@pytest.mark.parametrize(("sigma", "repeats"), [(2e-5, 1), (2e-3, 1), (2e-2, 1), (2e-3, 4)])
+@pytest.mark.parametrize(("sigma", "repeats"), [(2e-5, 1), (2e-2, 1), (2e-3, 4)])
 def test_the_noise_of_readings_gives_no_rank(sigma, repeats, stated):
     """Neither the noise nor the scales and angles of a sensor make eight parameters nine."""
     sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
     ideal = -9.80665 * np.repeat(DODECAHEDRON, repeats, axis=0) @ sensor.T + [0.12, -0.08, 0.2]
     rng, numbers = np.random.default_rng(36), np.arange(len(ideal))
-    for _ in range(50):
+    for _ in range(15):
         forces = ideal + sigma * rng.standard_normal(ideal.shape)
         read = Campaign("read", numbers, forces, 9.80665, sigma_force=sigma if stated else None)
         with pytest.raises(InputError, match=r"rank 8 of 9: .*s_x, s_y, s_z"):

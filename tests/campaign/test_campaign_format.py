@@ -324,22 +324,14 @@ BAD = {
     "no header": (remove("campaign.yaml"), "campaign.yaml", "no such file"),
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
     "two tables": (both(text("positions.parquet", "")), "two tables", "either positions.csv or"),
-    "no YAML": (text("campaign.yaml", "a: [1"), "not valid YAML", "line 1"),
-    "odd tag": (text("campaign.yaml", "a: !!int ''"), "a tag (!) is not read"),
-    "empty YAML": (text("campaign.yaml", ""), "not a mapping"),
     "unknown key": (header(sensr="x"), "sensr: unknown key", "did you mean 'sensor'"),
     "unknown key below": (header(gravity={"value_mps2": 9.8, "sigma": 0}),
                           "gravity.sigma: unknown key", "did you mean 'sigma_mps2'"),
     "version": (header(schema_version=2), "schema_version", "2 is of a newer version"),
-    "version true": (header(schema_version=True), "schema_version", "not true"),
-    "no version": (header(schema_version=None), "schema_version", "must be given"),
     "no name": (header(name=None), "name", "must be given"),
-    "number for a name": (header(name=2014), "name", "not 2014"),
     "unit": (header(unit="ug"), "unit", "'m/s^2', 'g', 'mg' or 'counts'", "not 'ug'"),
     "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
-    "infinite gravity": (header(gravity={"value_mps2": float("inf")}),
-                         "from 0.001 to 1000 m/s², not inf"),
     "gravity in g": (header(gravity={"value_mps2": 1}), "gravity.value_mps2: 1", "some 9.8"),
     "negative sigma of gravity": (header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
                                   "gravity.sigma_mps2"),
@@ -372,6 +364,7 @@ BAD = {
     "same position": (columns(position=at(3, 2)), "position: position 2: 2 follows"),
     "unordered": (columns(position=lambda old: old[::-1]), "position 7", "acquisition"),
     "position zero": (columns(position=at(1, 0)), "position 0: must be from 1 to", "not 0"),
+    "no position": (columns(position=at(6, "")), "position: row 6: empty"),
     "half a position": (columns(position=at(3, 2.5)), "2.5 is no whole number"),
     "no samples": (columns(n_samples=at(2, 0)), "n_samples: position 2: must be from 1 to"),
     "many samples": (columns(n_samples=at(2, 1e300)), "n_samples: position 2", "not 1e+300"),
@@ -386,6 +379,8 @@ BAD = {
                   "pitch_robot_gon: the column is missing (it goes with roll_robot_gon)"),
     "yaw only": (both(header(robot=None), columns(pitch_robot_gon=None, roll_robot_gon=None)),
                  "positions.csv: yaw_robot_gon: goes with roll_robot_gon and pitch_robot_gon"),
+    "endless angles": (columns(roll_robot_gon=times(1e300)), "roll_robot_gon: position ",
+                       "must be from -400 to 400 gon"),
     "robot without sigma": (header(robot=None), "robot.angle_sigma_mgon: missing"),
     "sigma without robot": (
         both(columns(**dict.fromkeys(ROBOT_COLUMNS))),
@@ -415,6 +410,8 @@ BAD = {
     ),
     "no unit fits": (columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
                      "nowhere near gravity, 9.81 m/s^2"),
+    "no force": (columns(**{f: lambda old: [1e-300 * k for k in range(8)]
+                            for f in ("fx", "fy", "fz")}), "their norm is about 0 m/s^2"),
     "one huge cell": (columns(fy=at(3, 1e11)), "fx, fy, fz: position 3: more than 1000 times"),
     "huge": (columns(fx=times(1e300), fy=times(1e300), fz=times(1e300)),
              "fx: position 1: must be from -1e+12 to"),
@@ -574,20 +571,20 @@ def fuzz(name, table, damage, **changes):
 
 
 @pytest.mark.parametrize("changes", [{}, WITHOUT_ROBOT | COUNTS], ids=["robot", "counts"])
-@settings(max_examples=200)
+@settings(max_examples=70)
 @given(damage=damages() | edits())
 @example(damage=lambda content: content + b"a: !!bool x")
 def test_fuzzed_header(damage, changes):
     fuzz("campaign.yaml", "csv", damage, **changes)
 
 
-@settings(max_examples=200)
+@settings(max_examples=70)
 @given(damage=damages() | edits())
 def test_fuzzed_csv(damage):
     fuzz("positions.csv", "csv", damage)
 
 
-@settings(max_examples=200)
+@settings(max_examples=70)
 @given(damage=damages())
 def test_fuzzed_parquet(damage):
     fuzz("positions.parquet", "parquet", damage)

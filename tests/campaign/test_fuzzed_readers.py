@@ -163,7 +163,7 @@ def test_a_name_is_no_line_of_an_export(calibration, form):
 forms = st.sampled_from(["json", "yaml", "c", "matrix", "px4"])
 
 
-@settings(max_examples=150)
+@settings(max_examples=50)
 @given(changes=changes, form=forms)
 @example(changes=[([0.0], "x", True)], form="json")
 def test_calibration_of_another_shape(calibration, changes, form):
@@ -174,7 +174,7 @@ def test_calibration_of_another_shape(calibration, changes, form):
         use(json.dumps(content).encode(), Path(folder), form, calibration)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(damage=damages(), form=forms)
 @example(damage=lambda content: b"[" * 100000, form="json")
 def test_damaged_calibration(calibration, damage, form):
@@ -182,7 +182,7 @@ def test_damaged_calibration(calibration, damage, form):
         use(damage(json.dumps(calibration).encode()), Path(folder), form)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(changes=changes, damage=damages() | edits() | st.none())
 def test_fuzzed_settings_of_an_import(changes, damage):
     content = SETTINGS
@@ -212,7 +212,7 @@ def written(folder, name):
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.txt", "log.mat", "packed.mat", "log.parquet"])
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(damage=damages(), means=st.booleans())
 def test_damaged_log(name, damage, means):
     columns = "fx=0,fy=1,fz=2"
@@ -228,7 +228,7 @@ def test_damaged_log(name, damage, means):
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(damage=damages() | edits(), wanted=st.sampled_from(["out.csv", "out.parquet"]))
 def test_damaged_log_to_be_leveled(calibration, name, damage, wanted):
     with TemporaryDirectory() as temporary:
@@ -257,7 +257,7 @@ OPTIONS = [
 ]
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.sampled_from(OPTIONS), st.sampled_from(HOSTILE)), max_size=2))
 def test_hostile_options(pairs):
     """What can be simulated can be read; click says in its own way what is no number."""
@@ -282,7 +282,7 @@ KEYS = [
 NUMBERS = [0, 1e-300, 1e-12, 1e-9, 1, -1, 100, 400, 500, 1e3, 1e10, 1e12, 1e160, 1e300]
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from(NUMBERS)), min_size=1, max_size=2),
     st.sampled_from(["gravity", "robot"]),

@@ -203,7 +203,8 @@ def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
 @pytest.mark.parametrize("design", DESIGNS)
 def test_all_axes_and_units_are_recognised_and_undone(design, designs):
     right = designs[design]
-    wrong = [f"axis_error(x={x}, y={y}, z={z})" for x, y, z in SIGNED_PERMUTATIONS[1:]]
+    some = SIGNED_PERMUTATIONS[1 :: 1 if design == "plain" else 5]
+    wrong = [f"axis_error(x={x}, y={y}, z={z})" for x, y, z in some]
     wrong += [
         f"unit_error(force={factor})" for factor in (0.1019716212978, 101.9716212978, 9.80665)
     ]

@@ -138,7 +138,7 @@ def drawn_accuracies(n, duration, walk, count):
 @pytest.mark.parametrize("walk", [0.0, 0.1])
 def test_degrees_of_freedom_are_those_of_the_scatter(walk):
     """Within the averaging times of the data ν = 2 / var(log σ²)."""
-    accuracies = list(drawn_accuracies(80, 0.5, walk, 300))
+    accuracies = list(drawn_accuracies(80, 0.5, walk, 200))
     seen = 2 / np.var([2 * np.log(accuracy.allan) for accuracy in accuracies])
     # For white noise it is 1.3 times as much, by Greenhall & Riley (2003); twice is no harm.
     assert 0.45 < accuracies[0].dof / seen < 1.3
@@ -151,10 +151,10 @@ def test_right_calibrations_from_a_short_log_are_rejected_as_often_as_the_level_
     The sum of squares of r = 17 residuals is independent of the noise within the holds. The sigma
     of a random walk is taken for right on average, so that only its scatter counts.
     """
-    accuracies = list(drawn_accuracies(40, 2.0, walk, 400))
+    accuracies = list(drawn_accuracies(40, 2.0, walk, 250))
     estimated = np.array([accuracy.allan for accuracy in accuracies])
     right = np.sqrt(np.mean(estimated**2)) if walk else 1 / np.sqrt(40)
-    omegas = np.random.default_rng(8).chisquare(17, (50, 400)) * (right / estimated) ** 2
+    omegas = np.random.default_rng(8).chisquare(17, (50, 250)) * (right / estimated) ** 2
 
     def rejected(dofs):
         tests = (
@@ -164,5 +164,5 @@ def test_right_calibrations_from_a_short_log_are_rejected_as_often_as_the_level_
         )
         return 1 - np.mean(list(tests))
 
-    assert rejected(np.full(400, np.inf)) > 0.018
+    assert rejected(np.full(250, np.inf)) > 0.018
     assert 0.005 < rejected([accuracy.dof for accuracy in accuracies]) < highest

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from calling import refusal, succeed
 from scipy.io import savemat
-from test_import_holds import G, session, shared, write
+from test_import_holds import G, session, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
@@ -201,40 +201,3 @@ def test_command_says_what_is_wrong(log, tmp_path, options, message):
     line = refusal("import", log, "--out", tmp_path / "out", *options)
     assert message in line
     assert not (tmp_path / "out" / "campaign.yaml").exists()
-
-
-# --- Public data ---------------------------------------------------------------------------------
-
-
-def test_xsens(tmp_path):
-    path = shared("imu_tk_xsens/xsens_acc.mat")
-    campaign, report = import_log(path, parse_settings(XSENS))
-    assert report.sigma_white == pytest.approx(0.29e-3, rel=0.05)
-    assert 0.5e-3 < report.accuracy.allan < 1.6e-3
-    assert 2 < report.accuracy.ratio < 6
-    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.817, atol=0.3)
-
-
-@pytest.mark.parametrize("i", range(3))
-def test_mpu9150_is_as_noisy_as_its_residuals(i):
-    settings = {"columns": {"fx": 0, "fy": 1, "fz": 2}, "rate_hz": 100}
-    campaign, report = import_log(shared(f"mpu9150/imu{i}.log"), parse_settings(settings))
-    assert campaign.sigma_force == pytest.approx(2.7e-3, rel=0.15)
-    assert any("the sensor turns" in text for text in report.warnings)
-
-
-def test_ctu_means(tmp_path):
-    path = shared("ctu_innalabs/CalibrationOfLowCostTriaxialInertialSensors.mat")
-    result = succeed("import", path, "--out", tmp_path, "--means", "--unit", "g")
-    assert result.stdout.startswith("24 positions; sigma of a mean: unknown")
-    campaign = read_campaign(tmp_path)
-    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), STANDARD_GRAVITY, rtol=0.08)
-
-
-def test_derived_means_of_xsens(tmp_path):
-    settings = {key: value for key, value in XSENS.items() if key not in ("columns", "time")}
-    path = shared("imu_tk_xsens/derived_static_means.csv")
-    campaign, report = import_means(path, parse_settings(settings))
-    assert report.n_holds == 38
-    assert report.sigma_white == pytest.approx(0.3e-3, rel=0.1)
-    assert campaign.n_samples[0] == 5101

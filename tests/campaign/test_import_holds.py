@@ -224,12 +224,6 @@ def test_mpu9150(i):
     assert worst < 0.1
 
 
-def test_mpu6050():
-    path = shared("mpu6050/example_data_calibration.csv")
-    holds = find_holds(open_log(path, rate=100, unit="counts", scale=G / 16384))
-    assert len(holds) == 10
-
-
 @pytest.mark.parametrize(("sigma", "factor"), [(0.0003, 6), (0.002, 6), (0.01, 2), (0.1, 2)])
 def test_holds_that_are_noisier_than_the_others(tmp_path, sigma, factor):
     """A quiet sensor feels a pump that runs now and then, and its holds are holds all the same."""

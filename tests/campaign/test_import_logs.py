@@ -353,7 +353,7 @@ cells = st.one_of(
 )
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(cells, max_size=6), max_size=40),
     st.sampled_from([",", ";", " ", "\t", ", "]),
@@ -375,7 +375,7 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         find_joint_holds([log], shortest=0.1, window=0.5)
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=300), st.sampled_from(["log.txt", "log.mat", "log.parquet"]))
 @example(b"\x00\x00\x00\x00" + bytes(100), "log.mat")
 def test_whatever_the_bytes(tmp_path, content, name):

@@ -26,7 +26,7 @@ from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
 TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
-SESSIONS = 200
+SESSIONS = 120
 ROBOT, GRAVITY = get_approach("robot"), get_approach("gravity")
 NOISE, NOISE_OF_REFERENCE = 1e-3, 0.5e-3
 
@@ -87,8 +87,8 @@ def test_sigmas_contain_the_calibration_of_the_reference(known):
             hits.append(np.abs(result.parameters[0, :12] - truth) < 1.96 * sigma)
             if common is not None:
                 omega.append(result.omega[0] / result.redundancy)
-    # A share of 0.95 of 200 sessions scatters by 0.015.
-    assert np.all(np.abs(np.mean(inside, axis=0) - 0.95) < 0.045)
+    # A share of 0.95 of 120 sessions scatters by 0.02.
+    assert np.all(np.abs(np.mean(inside, axis=0) - 0.95) < 0.06)
     assert np.min(np.mean(alone, axis=0)) < 0.85
     assert np.mean(omega) == pytest.approx(1, abs=4 * np.sqrt(2 / result.redundancy / SESSIONS))
 

@@ -26,22 +26,13 @@ CASES = {
     "nothing": (),
     "nothing-unknown-sigma": ("--sigma-unknown",),
     "sigma-too-small": ("--noise-effect", "noise_level(kappa=6)"),
-    "sigma-too-large": ("--noise-effect", "noise_level(kappa=0.1)"),
-    "axes-negated": ("--gross", "axis_error(x=1, y=-2, z=-3)"),
     "fx-fy": ("--scheme", "fibonacci-30", "--gross", "axis_error(x=2, y=1, z=3)"),
     **{name: (option, name) for option, name in ADDED},
-    "thermal-lag": ("--effect", "thermal_bias(tau=300)"),
     "slip-without-time": ("--no-time", "--effect", "mounting_slip(t=12.5)"),
-    "gravity-saturation": ("--approach", "gravity", "--effect", "saturation"),
     "gravity-outlier": ("--approach", "gravity", "--gross", "outlier_position"),
     "gravity-few": ("--approach", "gravity", "--scheme", "fibonacci-10"),
-    "gravity-few-loud": ("--approach", "gravity", "--scheme", "fibonacci-10",
-                         "--noise-effect", "noise_level(kappa=10)"),
 }  # fmt: skip
-SAID = {
-    "axes-negated": "axes have the wrong sign: y is read as −y, z is read as −z",
-    "fx-fy": "axes are swapped: x is read as y, y is read as x",
-}
+SAID = {"fx-fy": "axes are swapped: x is read as y, y is read as x"}
 FIGURES = {
     **dict.fromkeys(CASES.keys() - {name for _, name in ADDED}, "composed"),
     "gravity-outlier": "drawn",

@@ -87,11 +87,8 @@ def test_commands_take_the_file_for_a_scheme(made, tmp_path):
     ("asked", "said", "held"),
     [
         (("--attitudes", "hand"), "if a hand misses them by 5°", "steps of 30°"),
-        (("--mountings", 2), "turned about", "2 mountings"),
         (("--discriminate", "quadratic_scale", "cubic_scale", "--attitudes", "cube"),
          "Size from which a parameter is found, and told from the other effect:", "discriminate"),
-        (("--neglect", "quadratic_scale=500ppm", "--attitudes", "cube"),
-         "the neglected effects included", "neglected"),
     ],
 )  # fmt: skip
 def test_what_a_design_is_for_is_said(asked, said, held, tmp_path):

@@ -1,20 +1,16 @@
 """The diagnosis: what is hidden is named, what is not there is not, and the gap shrinks."""
 
 import math
-from dataclasses import replace
 from functools import partial
 
 import diagnosis_helpers
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROTATIONS, most
+from diagnosis_helpers import NINE, ROTATIONS
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.basics.levels import ACCEPTED, REJECTED
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.diagnosis import prediction
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import HoldConditions
@@ -32,29 +28,6 @@ def names(diagnosis):
 
 
 # --- statistics ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("approach", ["robot", "gravity"])
-def test_calibration_and_diagnosis_do_not_contradict_each_other(approach):
-    """On campaigns without any effect; each of them has an assessment and a verdict."""
-    for k in range(8):
-        measured, _ = campaign(k, approach=approach)
-        found = diagnose(measured, NINE)
-        assessment = assess(fit_campaign(measured, NINE, get_approach(approach)))
-        judged = assessment.state
-        assert judged in (ACCEPTED, REJECTED)
-        assert not (judged == REJECTED and found.verdict == "no_effect")
-        assert not (judged == ACCEPTED and "noise_level" in names(found))
-        marked = {int(measured.positions[s.position]) for s in assessment.suspects}
-        said = {label for label, _ in found.suspects} | {named.position for named in found.found}
-        assert marked <= said
-
-
-def test_a_wrong_sigma_is_no_effect():
-    runs = 8
-    found = [diagnose(replace(campaign(k)[0], sigma_force=0.002 / 1.5), NINE) for k in range(runs)]
-    assert sum(d.verdict in ("named", "narrowed") for d in found) <= most(runs, 0.05, 0.01)
-    assert sum(names(d) == ["noise_level"] for d in found) > runs / 2
 
 
 @pytest.mark.parametrize(
@@ -79,13 +52,11 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
 # --- hidden effects ------------------------------------------------------------------------------
 
 HIDDEN = {
-    "axis_nonperpendicularity": 3.0, "base_tilt": 1.0, "bias_drift": 60.0, "bias_jump(t=750)": 1.0,
-    "cross_axis_misalignment": 1.0, "cross_coupling": 6.0, "cubic_scale": 30.0,
-    "encoder_eccentricity": 15.0, "encoder_offset": 6.0, "encoder_scale": 40.0, "hysteresis": 3.0,
+    "axis_nonperpendicularity": 3.0, "bias_jump(t=750)": 1.0, "cross_coupling": 6.0,
     "mounting_rotation": 1.0, "quadratic_scale": 4.0, "saturation(knee=8)": 0.1,
-    "scale_asymmetry": 20.0, "settling": 2.0, "thermal_bias": 2.0, "thermal_scale": 3.0,
-    "vibration_rectification": 60.0, "warm_up(tau=300)": 4.0,
+    "vibration_rectification": 60.0,
 }  # fmt: skip
+"""Of kinds that `test_where.py` has not; the golden set has all effects of the catalogue."""
 
 
 @pytest.mark.parametrize("spec", HIDDEN)
@@ -113,10 +84,9 @@ def test_a_warm_up_far_above_the_noise_needs_no_second_effect(tau, seed):
     assert value == pytest.approx(tau, rel=0.1)
 
 
-@pytest.mark.parametrize("knee", [9.2, 9.6])
-def test_hard_clipping_is_named(knee):
-    """An output that does not change has no inverse; at the highest knee one axis never clips."""
-    measured, _ = campaign(1, effects=(f"saturation(knee={knee}): 1, 1, 1",))
+def test_hard_clipping_is_named():
+    """An output that does not change has no inverse; at this knee one axis never clips."""
+    measured, _ = campaign(1, effects=("saturation(knee=9.6): 1, 1, 1",))
     found = diagnose(measured, NINE)
     assert found.verdict == "named"
     assert names(found) == ["saturation"]
@@ -181,11 +151,3 @@ def test_gross_errors_are_recognised(error):
     found = diagnose(campaign(6, gross_errors=(error,))[0], NINE)
     assert found.verdict == "gross_error"
     assert names(found)[0] == error
-
-
-def test_the_same_seed_gives_the_same_diagnosis():
-    measured, _ = campaign(11, effects=("hysteresis",))
-    first, again = (diagnose(measured, NINE, seed=4) for _ in range(2))
-    assert first.gap == again.gap
-    assert first.found == again.found
-    assert first.probabilities == again.probabilities

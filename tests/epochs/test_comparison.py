@@ -77,7 +77,7 @@ def test_what_cannot_be_compared_is_said():
         compare(calibration_of(one), other)
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("composed")
 @pytest.mark.parametrize("changed", [True, False])
 def test_the_command_writes_what_it_says(changed, tmp_path):
     effects = ("bias: 0.1, 0.07, -0.1", *SENSOR[1:]) if changed else SENSOR

@@ -30,8 +30,7 @@ def tolerance(share, n=N):
 
 
 @pytest.mark.parametrize(("dof", "noise"), [
-    ((np.inf, np.inf), (1.0, 1.0)), ((15, 15), (1.0, 1.0)), ((9, 30), (3.0, 1.0)),
-    ((30, 9), (0.3, 1.0)), ((15, np.inf), (5.0, 1.0)),
+    ((np.inf, np.inf), (1.0, 1.0)), ((9, 30), (3.0, 1.0)), ((15, np.inf), (5.0, 1.0)),
 ])  # fmt: skip
 def test_the_level_is_kept_with_noise_of_any_kind(dof, noise):
     rng = np.random.default_rng(1)
@@ -59,7 +58,7 @@ def design(n, each):
 
 
 @pytest.mark.parametrize(("n", "ratio"), [
-    (10, 1.0), (10, 3.0), (10, 0.3), (11, 1.0), (12, 1.0), (12, 10.0), (14, 1.0), (24, 1.0)
+    (10, 1.0), (10, 3.0), (12, 0.3), (24, 1.0)
 ])  # fmt: skip
 def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, ratio):
     """Their noise is estimated by n − 9 and by 63 degrees of freedom, and may differ by a ratio.

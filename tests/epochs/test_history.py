@@ -49,13 +49,13 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
 
 
 @pytest.mark.parametrize(("sigmas", "dof"), [
-    (UNEQUAL, STATED), (EQUAL, STATED), (UNEQUAL, np.full(6, 15.0)), (EQUAL, np.full(6, 9.0)),
+    (UNEQUAL, STATED), (EQUAL, np.full(6, 9.0)),
     (EQUAL, np.array([1.0, 63, 63, 63, 63, 63])), (UNEQUAL, np.array([63.0, 1, 63, 3, np.inf, 2])),
 ])  # fmt: skip
 def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     """A change where there is none, and a scatter beside a drift."""
     sure = np.isinf(dof).all()
-    n = N if sure else 200
+    n = N if sure else 150
     still = [c.p_values()[0] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
     drifting = [c.p_values()[2] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
@@ -64,8 +64,7 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
             assert np.mean(found) >= LEVEL - tolerance(LEVEL, n)
 
 
-@pytest.mark.parametrize("scatter", [0.0, 0.5, 5.0])
-@pytest.mark.parametrize("sigmas", [EQUAL, UNEQUAL])
+@pytest.mark.parametrize(("sigmas", "scatter"), [(EQUAL, 0.0), (UNEQUAL, 0.5), (UNEQUAL, 5.0)])
 def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     """Without scatter the interval of the rate is wider than it need be: nobody knows."""
     rates, scatters = zip(
@@ -112,7 +111,7 @@ def test_all_tests_have_one_level(true):
     rng = np.random.default_rng(3)
     root = np.linalg.cholesky(np.linalg.inv(np.cov(rng.standard_normal((9, 30)))))
     variances = np.outer(UNEQUAL**2, np.sum(root**2, axis=1))
-    n, many = 200, 0 if true is None else 3
+    n, many = 120, 0 if true is None else 3
     right = {"changed"} if true is None else {"changed", true}
     wrong = 0
     for _ in range(n):
@@ -125,16 +124,15 @@ def test_all_tests_have_one_level(true):
     assert wrong / n <= LEVEL + tolerance(LEVEL, n)
 
 
-@pytest.mark.parametrize("sigmas", [EQUAL, UNEQUAL])
-@pytest.mark.parametrize("dof", [STATED, np.full(6, 15.0)])
+@pytest.mark.parametrize(("sigmas", "dof"), [(UNEQUAL, STATED), (EQUAL, np.full(6, 15.0))])
 def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
     known = Course(DATES, DATES, sigmas**2, dof)
     for size in (
         {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
     ):  # fmt: skip
-        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, dof=dof, **size)]
+        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, n=300, dof=dof, **size)]
         # With estimated sigmas, and of the scatter with unequal ones, the distribution is near it.
-        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER) + 0.03)
+        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 300) + 0.03)
 
 
 YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")
@@ -154,7 +152,7 @@ def arguments(paths, dates=YEARS):
     return [*paths, *(f"--date={date}" for date in dates)]
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("composed")
 @pytest.mark.parametrize("per_year", [0.0, 0.02])
 def test_the_command_writes_what_it_says(per_year, tmp_path):
     """Calibrations come in any order."""

@@ -56,7 +56,7 @@ def test_each_command_with_quiet_is_kept():
 
 def test_the_first_example_of_a_log_needs_no_columns():
     """Those by number come second; both are the same log, so nothing else differs."""
-    steps = kept_of("first")["README"].split("\n=== ")
+    steps = kept_of("readme")["README"].split("\n=== ")
     first, second = (step for step in steps if step.startswith("accelstudy import "))
     assert first.startswith("accelstudy import calibration.csv --out my-campaign\n")
     assert "--columns fx=0" in second

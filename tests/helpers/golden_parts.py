@@ -19,8 +19,9 @@ GOLDEN = ROOT / "tests/golden"
 # --- commands of pages ---------------------------------------------------------------------------
 
 PAGES = {
-    "first": ["README.md", "docs/index.md", "docs/start/index.md", "docs/guides/your-sensor.md",
-              "docs/guides/missing.md", "docs/reference/api/first_steps.py"],
+    "readme": ["README.md", "docs/index.md", "docs/start/index.md"],
+    "first": ["README.md", "docs/guides/your-sensor.md", "docs/guides/missing.md",
+              "docs/reference/api/first_steps.py"],
     "measuring": ["docs/start/geodesist.md", "docs/guides/device.md",
                   "docs/guides/python_example.py"],
     "sensors": ["docs/guides/compare.md", "docs/guides/history.md"],
@@ -42,6 +43,10 @@ SKIPPED = {
     r".*(zsh|fish)_source": "is for another shell",
 }
 """Beginnings of commands that are not run -> why."""
+ELSEWHERE = dict.fromkeys(
+    ("accelstudy compare", "accelstudy lot"), "stands in the part `first`, with those of --help"
+)
+"""The same, of the README, which is to be compared in seconds."""
 
 
 def log_table(seed, noise=0.005):
@@ -90,9 +95,9 @@ def write_inputs(shell, texts):
             shell.run(f"{simulate} {seed} --out sensor-{seed} --scheme fibonacci-18")
 
 
-def walk(folder, commands, **options) -> Texts:
+def walk(folder, commands, skipped=SKIPPED, **options) -> Texts:
     """Transcripts of lists of commands, {name: commands}, one after the other in one folder."""
-    shell = Shell(folder, SKIPPED, **options)
+    shell = Shell(folder, skipped, **options)
     write_inputs(shell, "\n".join(line for each in commands.values() for line in each))
     for name, lines in commands.items():
         yield name, shell.transcript(lines)
@@ -114,7 +119,10 @@ def pages(folder, part) -> Texts:
     if part == "first":
         examples = (text.partition("Example:\n")[2] for _, text in helps(folder))
         commands["help-examples"] = commands_of_script("".join(examples))
-    yield from walk(folder, commands)
+        commands["README"] = [x for x in commands["README"] if not x.startswith((*ELSEWHERE,))]
+    for name, text in walk(folder, commands, SKIPPED | (ELSEWHERE if part == "readme" else {})):
+        if (part, name) != ("first", "README"):  # the others take files from it
+            yield name, text
 
 
 def script(folder, name, **options) -> Texts:
@@ -211,7 +219,14 @@ LOGS = {
 
 
 def logs(folder) -> Texts:
-    """Public logs, with the first and the last sample of each hold that was found."""
+    """Public logs, with the first and the last sample of each hold that was found.
+
+    And what the page about them says of the one whose diagnosis takes longest.
+    """
+    from real_data import LONGEST
+    from real_data import told as told_of
+
+    yield f"{LONGEST}-diagnosed", "".join(f"{line}\n" for line in told_of(LONGEST))
     shell = Shell(folder)
     (folder / "resources").mkdir()
     (folder / "resources/public").symlink_to(DATA)
@@ -298,5 +313,5 @@ PARTS: dict[str, Callable[[Path], Texts]] = {
     "help": helps,
 }
 """Those that take longest first."""
-QUICK = ("first", "quiet", "help")
+QUICK = ("readme", "help")
 """Parts that `make test` compares, too."""

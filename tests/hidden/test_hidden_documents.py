@@ -79,8 +79,8 @@ def test_the_score_is_that_of_the_study():
 
 
 def test_the_score_is_that_of_the_code(tmp_path):
-    """A sample of its campaigns gets the answers that it had."""
-    told = SCORE.tables.get("A sample")
+    """Of a sample of its campaigns a third, as the golden set has 400 more, gets the answers."""
+    told = SCORE.tables.get("A sample", [])[::3]
     assert told, f"the score has no sample; {RENEWED}"
     outputs = {name: tmp_path / f"{name}.parquet" for name in ("truths", "outcomes", "seconds")}
     campaigns = [(cell_of(row["cell"]), int(row["campaign"])) for row in told]

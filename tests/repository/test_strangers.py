@@ -1,8 +1,7 @@
-"""Strangers, with the installed package and nothing else, go from nothing to their last result.
+"""Strangers go from nothing to their last result, by the commands of the pages that they read.
 
-Each types commands into a folder of its own: a geodesist with a table and a CSV, a robotics
-engineer with a bag and a controller, and a maintainer with an effect in a package of its own.
-Commands come from the pages that strangers read.
+A geodesist with a table and a CSV, a robotics engineer with a bag and a controller; and, with the
+installed package and nothing else, a maintainer with an effect in a package of its own.
 """
 
 import os
@@ -18,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from calling import succeed
 from places import ROOT
 from recorded import write_bag
 from transcript import commands_of_page
@@ -78,6 +78,13 @@ def shell(environment, tmp_path):
     return Shell(environment, tmp_path)
 
 
+@pytest.fixture
+def typed_in(tmp_path, monkeypatch):
+    """Function that runs a command in a folder of its own, and returns what it prints."""
+    monkeypatch.chdir(tmp_path)
+    return lambda line: succeed(*shlex.split(line)[1:]).stdout
+
+
 def test_it_is_the_installed_package(shell, environment):
     where = 'python -c "import accelstudy; print(accelstudy.__file__)"'
     assert Path(shell(where).strip()).is_relative_to(environment)
@@ -116,20 +123,20 @@ def write_log(path, directions):
     return true
 
 
-def test_a_geodesist_levels_a_log(shell):
+def test_a_geodesist_levels_a_log(typed_in):
     """By the commands of the page, with the best positions and gravity as it tells to give it."""
     typed = commands_of_page((ROOT / "docs/start/geodesist.md").read_text(encoding="utf-8"))
     commands = [line for line in typed if line.startswith("accelstudy ")]
     design, imported, calibrate, apply, advise = commands
-    shell(design)
-    positions = yaml.safe_load((shell.folder / "my-positions.yaml").read_text(encoding="utf-8"))
-    true = write_log(shell.folder / "calibration.csv", np.array(positions["directions"]))
-    assert "campaign: my-campaign (18 positions)" in shell(f"{imported} --gravity 9.80795")
-    said = shell(calibrate)
+    typed_in(design)
+    positions = yaml.safe_load(Path("my-positions.yaml").read_text(encoding="utf-8"))
+    true = write_log("calibration.csv", np.array(positions["directions"]))
+    assert "campaign: my-campaign (18 positions)" in typed_in(f"{imported} --gravity 9.80795")
+    said = typed_in(calibrate)
     assert "ACCEPTED" in said
     promised = [float(x) for x in re.findall(r"([\d.]+) mgon in (?:roll|pitch)", said)]
-    shell(apply)
-    leveled = pd.read_csv(shell.folder / "leveled.csv")
+    typed_in(apply)
+    leveled = pd.read_csv("leveled.csv")
     rested = (np.arange(len(true)) % 700 >= 100) & (leveled["near_pole"] == 0)
     angles = np.stack(roll_pitch(tuple(true[rested].T)), axis=1) / GON
     errors = leveled.loc[rested, ["roll_gon", "pitch_gon"]].to_numpy() - angles
@@ -138,8 +145,8 @@ def test_a_geodesist_levels_a_log(shell):
     flat = np.abs(angles).max(axis=1) < 50.01
     means = pd.DataFrame(errors[flat]).groupby(positioned[flat]).mean()
     assert 1e3 * np.sqrt((means**2).mean()).max() < 3 * max(promised) < 10
-    assert "YOU CAN STOP" in shell(advise)
-    assert (shell.folder / "calibrated" / "report.html").is_file()
+    assert "YOU CAN STOP" in typed_in(advise)
+    assert Path("calibrated/report.html").is_file()
 
 
 # --- a robotics engineer with a bag and a controller ----------------------------------------------
@@ -163,7 +170,7 @@ int main(void)
 """
 
 
-def test_a_robotics_engineer_takes_a_bag_to_a_controller(shell):
+def test_a_robotics_engineer_takes_a_bag_to_a_controller(typed_in, tmp_path):
     """A bag of rests in ROS axes, and C that is compiled and gets the readings of the sensor."""
     rng, rate = np.random.default_rng(2), 50
     forces = -9.80795 * get_scheme("fibonacci-24").directions
@@ -176,17 +183,18 @@ def test_a_robotics_engineer_takes_a_bag_to_a_controller(shell):
 
     flu = np.array([1, -1, -1])  # x forward, y left, z up, as in ROS
     logged = (read(true) + rng.normal(0, NOISE, true.shape)) * flu
-    write_bag(shell.folder / "session.bag", np.arange(len(true)) / rate, {"/imu/data": logged})
-    said = shell("accelstudy import session.bag --gravity 9.80795 --out arm")
+    write_bag(tmp_path / "session.bag", np.arange(len(true)) / rate, {"/imu/data": logged})
+    said = typed_in("accelstudy import session.bag --gravity 9.80795 --out arm")
     assert "campaign: arm (24 positions)" in said
-    assert "ACCEPTED" in shell("accelstudy calibrate arm --out calibrated")
-    header = shell("accelstudy export calibrated/calibration.json --form c")
-    (shell.folder / "calibration.h").write_text(header, encoding="utf-8")
-    (shell.folder / "controller.c").write_text(CONTROLLER, encoding="utf-8")
-    shell("cc -std=c99 -Wall -Wextra -Werror controller.c -o controller -lm")
+    assert "ACCEPTED" in typed_in("accelstudy calibrate arm --out calibrated")
+    header = typed_in("accelstudy export calibrated/calibration.json --form c")
+    Path("calibration.h").write_text(header, encoding="utf-8")
+    Path("controller.c").write_text(CONTROLLER, encoding="utf-8")
+    compile_it = "cc -std=c99 -Wall -Wextra -Werror controller.c -o controller -lm"
+    subprocess.run(shlex.split(compile_it), check=True)
     tilted = -9.80795 * get_scheme("mclaren-24").directions
     lines = "\n".join(" ".join(map(repr, row)) for row in (read(tilted) * flu).tolist())
-    done = subprocess.run([shell.folder / "controller"], input=lines, capture_output=True,
+    done = subprocess.run(["./controller"], input=lines, capture_output=True,
                           text=True, check=True)  # fmt: skip
     given = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
     np.testing.assert_allclose(given[:, :3] * flu, tilted, atol=0.005)

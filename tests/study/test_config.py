@@ -156,28 +156,17 @@ def test_every_key_of_config_yaml_is_commented():
         assert undocumented(bare)[0] == 3
 
 
-# --- bad input -----------------------------------------------------------------------------------
+# --- bad input: what any file may have, tests/basics have -----------------------------------------
 
 NOISE = {"effects": ["heavy_tails( nu=5 )"]}
 SENSITIVITY = {"roll_gon": [0, 50], "pitch_gon": [0, 50], "base_samples": 16, "resamples": 5}
 
 BAD = {
     "unknown key": ({"seeed": 1}, "seeed: unknown key; did you mean 'seed'? (known: plugins, st"),
-    "unknown key below": ({"noise": {"sensor": {"sigma": 1}}}, "noise.sensor.sigma: unknown key",
-                          "sigma_mps2"),
     "unknown key in a grid": ({"grids": [grid(replicate=3)]},
                               "grids.0.replicate: unknown key; did you mean 'replicates'?"),
-    "unknown key of a quantity": ({"sensor": {"bias": {"value": [1, 2, 3], "units": "g"}}},
-                                  "sensor.bias.unit"),
-    "not a number": ({"seed": "many"}, "seed", "whole number", "'many'"),
-    "not whole": ({"grids": [grid(replicates=1.5)]}, "grids.0.replicates", "1.5"),
     "truth value": ({"grids": [grid(replicates=True)]}, "grids.0.replicates: must be a number"),
-    "truth value in a list": ({"sensor": {"bias": {"value": [True, 0, 0], "unit": "g"}}},
-                              "sensor.bias.value.0: must be a number, not true"),
-    "no truth value": ({"paper": "perhaps"}, "paper", "'perhaps'"),
-    "a list for a mapping": ({"noise": [1]}, "noise", "[1]"),
     "a mapping for a list": ({"grids": grid()}, "grids", "must be a list"),
-    "nothing": ({"study": None}, "study", "must be a text"),
     "name": ({"study": "../elsewhere"}, "study", "'../elsewhere'"),
     "name with a newline": ({"study": "a\nb"}, "study"),
     "unknown model": ({"grids": [grid(models="bias-scales")]},
@@ -206,23 +195,11 @@ BAD = {
                                  "sensor.scale", "ppm"),
     "too few values": ({"sensor": {"scale": {"value": [1, 2], "unit": "ppm"}}},
                        "sensor.scale: value: 2 numbers", "s_x, s_y, s_z"),
-    "negative sigma": ({"noise": {"sensor": {"sigma_mps2": -1}}}, "noise.sensor.sigma_mps2", "-1"),
     "sensor without noise": ({"noise": {"sensor": {"sigma_mps2": 0}}}, "noise.sensor.sigma_mps2"),
-    "negative sigma in a grid": ({"grids": [grid(robot_sigma_mgon=[1, -2])]},
-                                 "grids.0.robot_sigma_mgon.1"),
-    "infinite": ({"gravity_mps2": math.inf}, "gravity_mps2", "finite"),
-    "not a number, NaN": ({"noise": {"gravity": {"error_mps2": math.nan}}}, "noise.gravity.error"),
-    "NaN in a list": ({"grids": [grid(gravity_error_mps2=[0, math.nan])]}, "gravity_error_mps2.1"),
     "no replicates": ({"grids": [grid(replicates=0)]}, "grids.0.replicates",
                       "from 1 to 1000000"),
     "a key of an earlier version": ({"keep": "summary"}, "keep: no longer a key", "leave it out"),
     "no models": ({"grids": [grid(models=[])]}, "grids.0.models", "must not be empty"),
-    "no schemes": ({"grids": [grid(schemes=[])]}, "grids.0.schemes", "must not be empty"),
-    "no approaches": ({"grids": [grid(approaches=[])]}, "grids.0.approaches", "must not be empty"),
-    "no sigmas": ({"grids": [grid(sensor_sigma_mps2=[])]}, "grids.0.sensor_sigma_mps2"),
-    "no simulated effects": ({"simulated_effects": []}, "simulated_effects", "must not be empty"),
-    "no effects": ({"models": {"mine": []}}, "models.mine", "must not be empty"),
-    "no rolls": ({"sensitivity": {**SENSITIVITY, "roll_gon": []}}, "sensitivity.roll_gon"),
     "no cells": ({"grids": []}, "neither grids nor presets"),
     "no attitudes": ({"leveling": {"attitudes": 0}}, "leveling.attitudes"),
     "tilt beyond the horizon": ({"leveling": {"max_tilt_gon": 100}}, "leveling.max_tilt_gon"),
@@ -273,35 +250,6 @@ def test_bad_content(changes, expected, tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(yaml.safe_dump(content(**changes)))
     assert len(fails(path, *expected)) < len(str(path)) + 700
-
-
-BAD_FILES = {
-    "syntax": ("study: [tiny\nseed: 1\n", "not valid YAML", "line 2"),
-    "tab": ("study:\n\tseed: 1\n", "not valid YAML", "line 2"),
-    "a list": ("- study\n- seed\n", "not a mapping"),
-    "a word": ("study", "not a mapping"),
-    "empty": ("", "not a mapping"),
-    "a key twice": ("study: a\nseed: 1\nstudy: b\n", "'study' stands twice", "line 3"),
-    "a key twice below": ("grids:\n  - models: all\n    models: bias-scale\n",
-                          "'models' stands twice", "line 3"),
-    "impossible date": ("study: 2018-13-45\n", "not valid YAML"),
-    "endless number": (f"seed: {'9' * 5000}\n", "not valid YAML"),
-    "deep": ("study: " + "[" * 5000, "not valid YAML: nested too deeply"),
-    "code": ("study: !!python/object/apply:os.getcwd []\n", "not valid YAML"),
-    "unknown anchor": ("study: *nothing\n", "not valid YAML"),
-    "alias": ("a: &a {b: 1}\nc: *a\n", "line 2, column 4: an alias (*) is not read"),
-    "tag": ("seed: !!int ''\n", "line 1, column 7: a tag (!) is not read"),
-    "large": (f"models: [{'bias,' * 200_000}]\n", "larger than 1 MB; is it the right file?"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"), [(t, e) for t, *e in BAD_FILES.values()], ids=[*BAD_FILES]
-)
-def test_bad_file(text, expected, tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(text)
-    fails(path, *expected)
 
 
 def test_missing_file_folder_and_binary(tmp_path):
@@ -459,14 +407,14 @@ def accept_or_refuse(given_content):
     return message
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(junk=st.dictionaries(st.sampled_from(KEYS) | st.text(max_size=3), JUNK, max_size=5))
 def test_junk_is_refused_in_one_line(junk):
     accept_or_refuse(junk)
     accept_or_refuse(content(**junk))
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_one_junk_value_is_refused_in_one_line(data):
     """Any one value of a whole configuration replaced by something else."""
@@ -531,7 +479,7 @@ VALID = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(keys=VALID)
 def test_cells_of_any_valid_study(keys):
     study = make_study(**keys)

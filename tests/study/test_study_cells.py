@@ -205,7 +205,7 @@ def test_other_cells_and_another_order_change_no_number(base, tmp_path):
     )
 
 
-@pytest.mark.parametrize("pattern", ["{scheme}", "{approach}", "{model}/{scheme}/{approach}"])
+@pytest.mark.parametrize("pattern", ["{scheme}", "{model}/{scheme}/{approach}"])
 def test_how_cells_fan_out_changes_nothing(base, pattern, tmp_path):
     other = run_study(tmp_path, pattern, **BASE)
     for name, table in base.items():
