@@ -82,7 +82,7 @@ rule calibrate:
     conda:
         "envs/accelstudy.yaml"
     params:
-        task=lambda wildcards: TASKS[wildcards.campaign].model_dump(mode="json"),
+        task=lambda wildcards: TASKS[wildcards.campaign].as_params(),
         braced=lambda wildcards: BRACED[wildcards.campaign],
         angle_unit=angle_unit(),
         version=VERSION,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import permutations, product
@@ -14,13 +15,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import Calibration, read_calibration
 from accelstudy.campaign.calibration.export import mending
-from accelstudy.campaign.checks import likely_fault
+from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.holds import DetectedHolds, hold_noise
-from accelstudy.campaign.importing.logs import open_layout
 from accelstudy.campaign.importing.making import ImportReport, shown
-from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.recording import AXES, Log, locate
+from accelstudy.campaign.importing.recording import AXES, Recording, locate, read_log
 from accelstudy.campaign.importing.segments import WANDERING, Segment, at_range
 from accelstudy.campaign.importing.windows import (
     Windows,
@@ -30,7 +29,7 @@ from accelstudy.campaign.importing.windows import (
 )
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
-from accelstudy.files.reading import overlay
+from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.sensors.frames import FRD, Frame
 
@@ -52,6 +51,8 @@ QUARTER_TURNS = tuple(
 )
 LEAST = 8
 """Holds from which on it is checked that both sensors turn together."""
+
+REMEDIES = Remedies(*["it is read in the unit of the log of which --reference was made"] * 3)
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Beside:
 
     given: ReferenceLog
     calibration: Calibration
-    log: Log
+    log: Recording
 
     @classmethod
     def of(cls, given: ReferenceLog) -> Beside:
@@ -93,7 +94,7 @@ class Beside:
         return cls(given, calibration, _opened(given, calibration))
 
     def averaged(
-        self, log: Log, holds: DetectedHolds, gravity: float
+        self, log: Recording, holds: DetectedHolds, gravity: float
     ) -> tuple[DetectedHolds, list[Segment]]:
         """Average the reference in the holds of a log.
 
@@ -109,7 +110,15 @@ class Beside:
         """
         segments, lost = self._segments(log, holds)
         means = np.array([segment.mean for segment in segments.values()])
-        self._check_size(means, gravity)
+        raw = means / self.log.first.conversion.scale[0]
+        check_norm(
+            f"--reference-log {self.given.log}",
+            raw,
+            means,
+            self.log.first.layout.unit,
+            gravity,
+            REMEDIES,
+        )
         windows = Windows(self.log, samples_in(self.log, usual_window(self.log)))
         rest = choose_threshold(windows)
         moving = [n for n, s in segments.items() if s.variance > (WANDERING * rest.sd) ** 2]
@@ -126,7 +135,7 @@ class Beside:
         return replace(others, warnings=(*holds.warnings, *said)), list(segments.values())
 
     def _segments(
-        self, log: Log, holds: DetectedHolds
+        self, log: Recording, holds: DetectedHolds
     ) -> tuple[dict[int, Segment], dict[int, str]]:
         """Samples of the reference in the holds of a log, and why there are none in others."""
         content, read = self.calibration.content, self.log.samples
@@ -153,28 +162,19 @@ class Beside:
             )
         return segments, lost
 
-    def _check_size(self, means: Array, gravity: float) -> None:
-        fault = likely_fault(means / self.log.conversion.scale[0], means, "m/s^2", gravity)
-        if fault.cause is not None:
-            raise InputError(
-                f"--reference-log {self.given.log}: at rest the forces are about {fault.given:.3g} "
-                f"{self.calibration.content['unit']}, which is no gravity; it is read in the unit "
-                "of the log of which --reference was made"
-            )
-
-    def _shift(self, log: Log) -> float:
+    def _shift(self, log: Recording) -> float:
         """Time from the first sample of a log to that of the reference, s."""
-        apart = self.log.start - log.start
+        apart = self.log.first.start - log.first.start
         return float(np.nan_to_num(apart)) + (self.given.offset or 0.0)
 
-    def _clock(self, log: Log) -> str:
+    def _clock(self, log: Recording) -> str:
         """Say by what the times of both belong together."""
-        by_clock = np.isfinite(self.log.start - log.start)
+        by_clock = np.isfinite(self.log.first.start - log.first.start)
         offset = "" if self.given.offset is None else f", {self.given.offset:+g} s"
         return ("of the same clock" if by_clock else "begun together with the log") + offset
 
     def beside(
-        self, campaign: Campaign, report: ImportReport, segments: list[Segment], log: Log
+        self, campaign: Campaign, report: ImportReport, segments: list[Segment], log: Recording
     ) -> tuple[Campaign, ImportReport]:
         """Give a campaign roll and pitch of its holds by the means of the reference.
 
@@ -197,7 +197,7 @@ class Beside:
         why = "the x axis of the reference is too near to the vertical for a roll"
         reasons = {int(n): why for n in whole.positions[poles]}
         warnings = [f"hold {n} left out: {why}" for n in reasons]
-        if angles_in_log := locate(log.source, {}, ("roll", "pitch"), needed=False):
+        if angles_in_log := locate(log.first.source, {}, ("roll", "pitch"), needed=False):
             warnings.append(
                 f"{log.path}: columns {', '.join(angles_in_log)} are left out: roll and pitch are "
                 "those of --reference-log"
@@ -288,27 +288,21 @@ def usable_reference(path: Path) -> Calibration:
     return calibration
 
 
-def _opened(given: ReferenceLog, calibration: Calibration) -> Log:
+def _opened(given: ReferenceLog, calibration: Calibration) -> Recording:
     """Open the log of a reference; it is read like that of its calibration."""
-    content, columns = calibration.content, dict(given.columns)
+    columns = dict(given.columns)
     if unknown := [key for key in columns if key not in (*AXES, "time")]:
         raise InputError(
             f"--reference-columns: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
         )
-    known = {"unit": content["unit"], **(content["nominal"] or {})}
-    if calibration.log is not None:
-        known = calibration.log.model_dump(exclude_none=True)
-    if "time" in columns:
-        known = {**known, "time": columns.pop("time")}
-        known.pop("rate_hz", None)
-    source = open_source(given.log, known.get("variable"))
-    layout = LogLayout.model_validate(overlay({**source.layout}, known))
-    own = {key: place for key, place in layout.columns.items() if key in AXES}
+    time = {"time": columns.pop("time")} if "time" in columns else {}
+    layout = checked(LogLayout, {**time, "columns": columns}, "--reference-columns")
     try:
-        return open_layout(given.log, layout.model_copy(update={"columns": columns or own}), source)
+        log = read_log(given.log, layout, like=calibration.usual_layout, conditions=("time",))
     except InputError as error:
-        said = str(error).split("; give the column of time")[0]
+        said = re.split("; give the column of time|; the columns are those", str(error))[0]
         raise InputError(
             f"--reference-log {said}; it is read like the log of --reference, and "
             "--reference-columns fx=…,fy=…,fz=…,time=… names other columns"
         ) from None
+    return Recording([log])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
-from accelstudy.campaign.header import ANY, COLUMNS, COUNTING, HEADER, MOST, RANGES, Header
+from accelstudy.campaign.header import COLUMNS, HEADER, MOST, Header
 from accelstudy.leveling.angles import specific_force, usual_norm
 
 Array = NDArray[np.float64]
@@ -39,12 +39,13 @@ def check_column(
             i = int(np.argmax(wrong))
             raise InputError(f"{path}: {name}: {labels[i]}: {values[i]:.15g} {text}")
 
-    if attribute in COUNTING:
+    column = COLUMNS[attribute]
+    if column.whole:
         complain_of(values % 1 != 0, "is no whole number")
-    range_ = ANY if attribute == "forces" else RANGES.get(attribute, ANY)
-    for i in np.flatnonzero((values < range_.least) | (values > range_.most))[:1]:
+    within = column.within
+    for i in np.flatnonzero((values < within.least) | (values > within.most))[:1]:
         try:
-            range_.check(values[i])
+            within.check(values[i])
         except InputError as error:
             raise InputError(f"{path}: {name}: {labels[i]}: {error}") from None
     behind = np.diff(values, prepend=-np.inf)
@@ -61,7 +62,7 @@ def check_column(
 
 def check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
     """Check that angles and their sigma come together."""
-    roll, pitch = COLUMNS["angles"]
+    roll, pitch = COLUMNS["angles"].names
     key = f"{path.with_name(HEADER)}: robot.angle_sigma_mgon"
     if "yaw" in given and "angles" not in given:
         raise InputError(f"{path}: yaw_robot_gon: goes with {roll} and {pitch}, which are missing")
@@ -83,33 +84,41 @@ def check_size(raw: Array, forces: Array, header: Header, path: Path) -> None:
         )
 
 
-class Fault(NamedTuple):
-    """What is wrong with forces, if they are not as large as gravity.
+class Remedies(NamedTuple):
+    """What a person does about forces that are not as large as gravity.
 
     Attributes
     ----------
-    cause : str, "gravity" if its value is wrong, the unit that would be right, or "unknown"; None
-        if nothing is wrong
-    given : float, usual norm in the unit of the file
-    norm : float, m/s², usual norm
+    unit : str, if they are in another unit, which stands for {unit}
+    gravity : str, if the value of gravity is wrong
+    other : str, if nothing is known to be the cause
     """
 
-    cause: str | None
-    given: float
-    norm: float
+    unit: str
+    gravity: str
+    other: str
 
 
-def likely_fault(raw: Array, forces: Array, unit: str, gravity: float) -> Fault:
-    """Say why forces are not those of a sensor at rest.
+def check_norm(
+    where: str, raw: Array, forces: Array, unit: str, gravity: float, remedies: Remedies
+) -> None:
+    """Check that forces, most of them at rest, are roughly as large as gravity.
 
     Even bad sensors are wrong by some tenths only, so a factor of two has another cause.
 
     Parameters
     ----------
+    where : str, begins the message
     raw : (n, 3) array, in the unit of the file
     forces : (n, 3) array, m/s²
     unit : str, of the file
     gravity : float, m/s²
+    remedies : Remedies
+
+    Raises
+    ------
+    InputError
+        If they are not; it says what would be right.
     """
     norm, given = usual_norm(forces), usual_norm(raw)
 
@@ -117,37 +126,21 @@ def likely_fault(raw: Array, forces: Array, unit: str, gravity: float) -> Fault:
         return gravity / 2 < size < gravity * 2
 
     if near(norm, gravity):
-        return Fault(None, given, norm)
+        return
+    what = f"{where}: the forces are about {given:.3g} {unit}"
+    if unit == "counts":
+        what += f", by scale and offset {norm:.3g} m/s²"
     if near(norm, STANDARD_GRAVITY):
-        return Fault("gravity", given, norm)
+        fits = f"which does not fit a gravity of {gravity:g} m/s²"
+        raise InputError(f"{what}, {fits}; {remedies.gravity}")
     sizes = UNITS["m/s^2"]
     better = [u for u in SENSOR_UNITS if u != unit and near(given * sizes[u], gravity)]
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
-    return Fault(better[0] if better else "unknown", given, norm)
-
-
-def check_norm(raw: Array, forces: Array, header: Header, path: Path) -> None:
-    """Check that forces are roughly as large as gravity; the error names the unit that fits."""
-    gravity, unit = header.gravity.value_mps2, header.unit
-    cause, given, norm = likely_fault(raw, forces, unit, gravity)
-    if cause is None:
-        return
-    what = f"fx, fy, fz: their norm is about {given:.3g} {unit}"
-    if unit == "counts":
-        what = f"{what}, by `nominal` {norm:.3g} m/s^2"
-    if cause == "gravity":
-        raise InputError(
-            f"{path.with_name(HEADER)}: gravity.value_mps2: {gravity:g} does not fit the forces, "
-            f"whose norm is about {norm:.3g} m/s^2; expected some 9.8"
-        )
-    if cause != "unknown":
-        advice = f"looks like {cause}, not {unit}; correct `unit` in {HEADER}"
-    else:
-        advice = f"nowhere near gravity, {gravity:g} m/s^2; correct the unit" + (
-            " or `nominal`" if unit == "counts" else " or the columns"
-        )
-    raise InputError(f"{path}: {what}: {advice}")
+    if better:
+        advice = remedies.unit.format(unit=better[0])
+        raise InputError(f"{what}: these look like {better[0]}, not {unit}; {advice}")
+    raise InputError(f"{what}, nowhere near gravity, {gravity:g} m/s²; {remedies.other}")
 
 
 def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: Path) -> None:
@@ -159,34 +152,22 @@ def check_outliers(forces: Array, labels: Sequence[str], gravity: float, path: P
         )
 
 
-def misfit_of_angles(angles: Array, forces: Array, gravity: float) -> float:
-    """Rms difference of forces (n, 3), m/s², from those at angles (n, 2), rad, over gravity."""
-    roll, pitch = angles.T
-    expected = np.column_stack(specific_force(roll, pitch, gravity))
-    return float(np.sqrt(np.mean(np.sum((forces - expected) ** 2, axis=1))) / gravity)
+OPPOSITE = "opposite"
+"""What `better_angles` says of forces with the wrong sign."""
 
 
-def clearly_worse(misfit: float, other: float) -> bool:
-    """Whether another reading of the angles fits so much better that this is no accident.
+def better_angles(angles: Array, unit: str, forces: Array, gravity: float) -> str | None:
+    """Unit of angles (n, 2), or `OPPOSITE`, that fits forces (n, 3), m/s², clearly better.
 
     A real sensor agrees with its robot within some hundredths of g.
     """
-    return misfit > max(0.05, 4 * other)
-
-
-def check_angles(angles: Array, forces: Array, gravity: float, path: Path) -> None:
-    """Check that no other unit or sign fits the forces clearly better than angles in gon."""
 
     def misfit(unit: str, sign: int = 1) -> float:
-        return misfit_of_angles(angles * UNITS["rad"][unit], sign * forces, gravity)
+        roll, pitch = angles.T * UNITS["rad"][unit]
+        error = sign * forces - np.column_stack(specific_force(roll, pitch, gravity))
+        return float(np.sqrt(np.mean(np.sum(error**2, axis=1))) / gravity)
 
-    readings = {
-        f"the angles look like {word}, not gon": misfit(unit)
-        for unit, word in ROBOT_UNITS.items()
-        if unit != "gon"
-    }
-    opposite = "the forces have the opposite sign; at level specific force is (0, 0, -g)"
-    readings[opposite] = misfit("gon", -1)
-    best = min(readings, key=lambda text: readings[text])
-    if clearly_worse(misfit("gon"), readings[best]):
-        raise InputError(f"{path}: {', '.join(COLUMNS['angles'])}: {best}")
+    others = {other: misfit(other) for other in ROBOT_UNITS if other != unit}
+    others[OPPOSITE] = misfit(unit, -1)
+    best = min(others, key=lambda other: others[other])
+    return best if misfit(unit) > max(0.05, 4 * others[best]) else None

@@ -16,10 +16,12 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON
+from accelstudy.basics.units import MGON, ROBOT_UNITS
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.checks import (
-    check_angles,
+    OPPOSITE,
+    Remedies,
+    better_angles,
     check_column,
     check_names,
     check_norm,
@@ -27,7 +29,7 @@ from accelstudy.campaign.checks import (
     check_robot,
     check_size,
 )
-from accelstudy.campaign.header import COLUMNS, COUNTING, FORMER, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, TABLES, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
@@ -38,6 +40,12 @@ Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[Any]]
 """The table of positions as it is in its file, by name: text from CSV, values from Parquet."""
 
+REMEDIES = Remedies(
+    unit=f"correct `unit` in {HEADER}",
+    gravity=f"correct {HEADER}: gravity.value_mps2",
+    other="correct the unit, `nominal` or the columns",
+)
+"""What to do about forces that are not as large as gravity."""
 MOST_NAMED = 5
 """Unknown columns of which each has a line."""
 
@@ -237,8 +245,9 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
     """Check the columns of the table `path`, and make a campaign of them and the header."""
     given: dict[str, Array] = {}
     labels: list[str] = []
-    for attribute, names in COLUMNS.items():
-        if attribute not in ("positions", "forces") and not {*names} & {*columns}:
+    for attribute, column in COLUMNS.items():
+        names = column.names
+        if not (column.needed or {*names} & {*columns}):
             continue
         parts = [_numbers(columns, name, labels, path) for name in names]
         if attribute == "positions":
@@ -251,23 +260,35 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
     with np.errstate(all="ignore"):  # the checks below find what overflows
         for attribute, array in given.items():
             values[attribute] = header.conversion(attribute).to_si(array)
-        check = check_norm if plausible else check_size
-        check(given["forces"], values["forces"], header, path)
+        check_size(given["forces"], values["forces"], header, path)
         if plausible:
+            _check_plausible(given, values["forces"], header, path)
             check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
-        if plausible and "angles" in values:
-            check_angles(given["angles"], values["forces"], header.gravity.value_mps2, path)
         if header.robot is not None:
             values.setdefault("yaw", np.zeros(len(labels)))
-    for attribute in COUNTING:
-        if attribute in values:
-            values[attribute] = values[attribute].astype(np.int64)
+    for attribute, array in values.items():
+        if COLUMNS[attribute].whole:
+            values[attribute] = array.astype(np.int64)
     campaign = campaign_of(header, values)
     reasons = {entry.position: entry.reason for entry in header.excluded or ()}
     try:
         return campaign.without(reasons)
     except InputError as error:
         raise InputError(f"{path.with_name(HEADER)}: {error}") from None
+
+
+def _check_plausible(given: Mapping[str, Array], forces: Array, header: Header, path: Path) -> None:
+    """Check that the columns `given` fit gravity and each other in the units of the file."""
+    gravity, where = header.gravity.value_mps2, f"{path}: fx, fy, fz"
+    check_norm(where, given["forces"], forces, header.unit, gravity, REMEDIES)
+    better = None
+    if "angles" in given:
+        better = better_angles(given["angles"], "gon", forces, gravity)
+    if better == OPPOSITE:
+        raise InputError(f"{where}: have the opposite sign; at level specific force is (0, 0, -g)")
+    if better is not None:
+        names = ", ".join(COLUMNS["angles"].names)
+        raise InputError(f"{path}: {names}: the angles look like {ROBOT_UNITS[better]}, not gon")
 
 
 def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
@@ -302,7 +323,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
         lower = {other.lower(): other for other in columns if other not in KNOWN}
         near = get_close_matches(name.lower(), lower, n=1)
         hint = f"; is {lower[near[0]]!r} meant?" if near else ""
-        beside = next((names for names in COLUMNS.values() if name in names), ())
+        beside = next((c.names for c in COLUMNS.values() if name in c.names), ())
         group = f" (it goes with {', '.join(n for n in beside if n != name)})" if beside[1:] else ""
         raise InputError(f"{path}: {name}: the column is missing{group}{hint}")
     values = columns[name]
@@ -360,14 +381,14 @@ def _content_of(campaign: Campaign) -> dict[str, Any]:
 def _columns_of(campaign: Campaign, header: Header) -> dict[str, list[Any]]:
     """Columns of a campaign in the units of the files."""
     columns: dict[str, list[Any]] = {}
-    for attribute, names in COLUMNS.items():
-        values = getattr(campaign, attribute)
+    for attribute, column in COLUMNS.items():
+        values, names = getattr(campaign, attribute), column.names
         if values is None:
             continue
         shape = (campaign.n_positions, len(names)) if len(names) > 1 else (campaign.n_positions,)
         if np.shape(values) != shape:
             raise InputError(f"{campaign.name}: {attribute}: shape {np.shape(values)}, not {shape}")
-        if attribute not in COUNTING:
+        if not column.whole:
             values = header.conversion(attribute).from_si(np.asarray(values, dtype=float))
         columns.update(zip(names, np.reshape(values, (-1, len(names))).T.tolist(), strict=True))
     return columns

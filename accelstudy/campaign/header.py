@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from datetime import date as calendar_date
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,36 +45,74 @@ Array = NDArray[np.float64]
 HEADER = "campaign.yaml"
 TABLES = ("positions.csv", "positions.parquet")
 
-COLUMNS = {
-    "positions": ("position",),
-    "time": ("time_s",),
-    "forces": ("fx", "fy", "fz"),
-    "n_samples": ("n_samples",),
-    "sd": ("sd_fx", "sd_fy", "sd_fz"),
-    "temperature": ("temperature_degC",),
-    "angles": ("roll_robot_gon", "pitch_robot_gon"),
-    "yaw": ("yaw_robot_gon",),
-    "vibration": ("vibration_mps2",),
-}
-"""Attributes of a campaign and the columns that make them up, all of them or none."""
-KNOWN = tuple(name for names in COLUMNS.values() for name in names)
-FORMER = tuple(f"{what}_f{axis}" for what in ("slope", "sd_slope") for axis in "xyz")
-"""Columns of files that earlier versions wrote, and that are left out without a word."""
-COUNTING = ("positions", "n_samples")
 MOST = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
 ANY = Range(-MOST, MOST)
-RANGES = {
-    "positions": Range(1, 2**53),  # beyond which not every integer is a float
-    "n_samples": Range(1, 2**53),
-    "sd": Range(0.0, MOST),
-    "time": bounds.TIME,
-    "temperature": bounds.TEMPERATURE,
-    "vibration": bounds.VIBRATION,
-    "angles": bounds.ANGLE,
-    "yaw": bounds.ANGLE,
+
+
+class Columns(NamedTuple):
+    """Columns of the table that belong together: all of them are there, or none.
+
+    Attributes
+    ----------
+    names : tuple of str
+    meaning : str
+    unit : str, in the file; "unit" is the unit of the header
+    within : Range, in that unit
+    whole : bool, whether they are whole numbers
+    needed : bool
+    """
+
+    names: tuple[str, ...]
+    meaning: str
+    unit: str = ""
+    within: Range = ANY
+    whole: bool = False
+    needed: bool = False
+
+
+_NUMBER = Range(1, 2**53)  # beyond which not every integer is a float
+COLUMNS = {
+    "positions": Columns(
+        ("position",),
+        "number of the hold, from 1 on, in the order of acquisition",
+        within=_NUMBER,
+        whole=True,
+        needed=True,
+    ),
+    "time": Columns(
+        ("time_s",), "middle of the hold since the start of the session", "s", bounds.TIME
+    ),
+    "forces": Columns(
+        ("fx", "fy", "fz"),
+        "mean specific force of the hold, in sensor axes",
+        "unit",
+        needed=True,
+    ),
+    "n_samples": Columns(("n_samples",), "samples in the hold", within=_NUMBER, whole=True),
+    "sd": Columns(
+        ("sd_fx", "sd_fy", "sd_fz"),
+        "standard deviations of the samples within the hold",
+        "unit",
+        Range(0.0, MOST),
+    ),
+    "temperature": Columns(("temperature_degC",), "mean temperature", "°C", bounds.TEMPERATURE),
+    "angles": Columns(
+        ("roll_robot_gon", "pitch_robot_gon"),
+        "attitude that the robot tells, or a reference",
+        "gon",
+        bounds.ANGLE,
+    ),
+    "yaw": Columns(
+        ("yaw_robot_gon",), "yaw that the robot tells; 0 if absent", "gon", bounds.ANGLE
+    ),
+    "vibration": Columns(("vibration_mps2",), "rms of the vibration", "m/s²", bounds.VIBRATION),
 }
-"""Ranges of the columns in the unit of the file; others have `ANY`."""
+"""Columns by the attribute of a campaign that they make up: what is read, checked, written and
+documented."""
+KNOWN = tuple(name for column in COLUMNS.values() for name in column.names)
+FORMER = tuple(f"{what}_f{axis}" for what in ("slope", "sd_slope") for axis in "xyz")
+"""Columns of files that earlier versions wrote, and that are left out without a word."""
 
 
 Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
@@ -231,10 +269,9 @@ class Header(Block):
 
     def conversion(self, attribute: str) -> Conversion:
         """Conversion of the columns of an attribute to SI."""
-        if attribute in ("angles", "yaw"):
-            return Conversion(np.array([GON]), np.zeros(1))
-        if attribute not in ("forces", "sd"):
-            return Conversion(np.ones(1), np.zeros(1))
+        unit = COLUMNS[attribute].unit
+        if unit != "unit":
+            return Conversion(np.array([GON if unit == "gon" else 1.0]), np.zeros(1))
         if self.nominal is None:
             forces = conversion_of(self.unit)
         else:

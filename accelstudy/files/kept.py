@@ -9,11 +9,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import secrets
 import shutil
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import TypeVar
 
 _DIGEST = hashlib.sha256().digest_size
@@ -36,66 +36,52 @@ def kept_or_made(
     What is damaged, or could have been written by somebody else, counts as not there.
     """
     with contextlib.suppress(Exception):
-        return load(_kept(kind, key))
+        return load(_read(kept_in(kind) / key))
     content = make()
     with contextlib.suppress(OSError, RuntimeError):  # no right, no room, or no home folder
-        _keep(kind, key, content)
+        _write(kept_in(kind) / key, content)
     return load(content)
 
 
-def _kept(kind: str, key: str) -> bytes:
+def _read(file: Path) -> bytes:
     """Read what was stored; raise an error if it is not there, not whole, or not the user's own."""
-    with _own_folder(kind) as folder:
-        # Opened without waiting, as it may be a FIFO.
-        file = os.open(key, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
-        with open(file, "rb") as opened:
-            _check_own(file, stat.S_ISREG)
-            stored = opened.read()
+    _check_own(file.parent, stat.S_ISDIR)
+    _check_own(file, stat.S_ISREG)
+    stored = file.read_bytes()
     digest, content = stored[:_DIGEST], stored[_DIGEST:]
     if hashlib.sha256(content).digest() != digest:
-        raise ValueError(f"{key} is damaged")
+        raise ValueError(f"{file} is damaged")
     return content
 
 
-def _keep(kind: str, key: str, content: bytes) -> None:
+def _write(file: Path, content: bytes) -> None:
     """Store it for the next process.
 
     It appears whole or not at all: processes that start together each write their own file and
     give it the name.
     """
-    place = kept_in(kind)
+    folder = file.parent
     with contextlib.suppress(OSError):  # an earlier version left it open to the group of the user
-        if place.lstat().st_mode & _OTHERS:
-            shutil.rmtree(place)
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.mkdir(mode=0o700, exist_ok=True)
-    with _own_folder(kind) as folder:
-        part = f".{secrets.token_hex(8)}"
-        new = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600, dir_fd=folder)
+        if folder.lstat().st_mode & _OTHERS:
+            shutil.rmtree(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    _check_own(folder, stat.S_ISDIR)
+    with NamedTemporaryFile(dir=folder, prefix=".", delete=False) as part:
         try:
-            with open(new, "wb") as file:
-                file.write(hashlib.sha256(content).digest() + content)
-            os.replace(part, key, src_dir_fd=folder, dst_dir_fd=folder)
+            part.write(hashlib.sha256(content).digest() + content)
+            part.close()
+            os.replace(part.name, file)
         except OSError:
-            os.unlink(part, dir_fd=folder)
+            os.unlink(part.name)
             raise
 
 
-@contextlib.contextmanager
-def _own_folder(kind: str) -> Iterator[int]:
-    """Open the folder of a kind, so that nobody can put another in its place after the check."""
-    if not hasattr(os, "geteuid"):
-        raise OSError("this system does not say whose a file is")
-    folder = os.open(kept_in(kind), os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        _check_own(folder, stat.S_ISDIR)
-        yield folder
-    finally:
-        os.close(folder)
+def _check_own(path: Path, is_kind: Callable[[int], bool]) -> None:
+    """Raise an error unless it is of a kind, owned by the user, and writable by nobody else.
 
-
-def _check_own(descriptor: int, is_kind: Callable[[int], bool]) -> None:
-    """Raise an error unless it is of a kind, owned by the user, and writable by nobody else."""
-    status = os.fstat(descriptor)
+    In a folder of which this is so, nobody can put something else in a place after the check.
+    """
+    status = path.lstat()
     if not is_kind(status.st_mode) or status.st_uid != os.geteuid() or status.st_mode & _OTHERS:
         raise PermissionError("others may have written here")

@@ -8,21 +8,13 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
-from stat import S_ISDIR
 from tempfile import mkdtemp
-from types import ModuleType
 
 from accelstudy.basics.errors import InputError
-
-fcntl: ModuleType | None
-try:
-    import fcntl
-except ImportError:  # without locks, the leftovers of a killed run stay until somebody removes them
-    fcntl = None
 
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
 
@@ -125,7 +117,7 @@ def result_folder(
             stages.append(new)
             new.mkdir()
             yield new
-            _publish(stage, out.resolve(), kind, is_earlier_result)
+            _publish(new, out.resolve(), kind, is_earlier_result)
 
 
 @contextmanager
@@ -158,8 +150,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     with _staging(path.parent) as stage:
         yield stage / path.name
-        with _parents(path):
-            (stage / path.name).replace(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        (stage / path.name).replace(path)
 
 
 def check_writable(folder: str | Path) -> None:
@@ -199,42 +191,16 @@ def is_temporary(path: Path) -> bool:
 def _staging(near: Path) -> Iterator[Path]:
     """A private folder in `near` or, if that does not exist, in the nearest folder above it.
 
-    Its name cannot be predicted, so nobody can place a link there. It is locked while it is in use,
-    so the next run recognises the leftovers of a killed run and removes them.
+    Its name cannot be predicted, so nobody can place a link there.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
         raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
-    for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
-        if (lock := _locked(left)) is not None:
-            shutil.rmtree(left, ignore_errors=True)
-            os.close(lock)
     stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
-    lock = _locked(stage)
     try:
         yield stage
     finally:
         shutil.rmtree(stage, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
-
-
-def _locked(folder: Path) -> int | None:
-    """Descriptor that locks a temporary folder; None if it is in use, or cannot be locked."""
-    if fcntl is None:
-        return None
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:
-        return None
-    try:
-        if os.fstat(descriptor).st_uid == os.geteuid():
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return descriptor
-    except OSError:
-        pass
-    os.close(descriptor)
-    return None
 
 
 @contextmanager
@@ -257,35 +223,17 @@ def _reported(out: Path) -> Iterator[list[Path]]:
 
 
 def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
-    above_out = _identities(out)
-    for given in inputs:
-        source = Path(given)
-        if not source.exists():
-            continue  # the reader reports it
-        above = _identities(source)
-        if above[0] is None:
-            continue  # a pipe is nowhere on the disk
-        if above[0] == above_out[0]:
+    place = out.resolve()
+    for source in map(Path, inputs):
+        if not (source.is_file() or source.is_dir()):
+            continue  # the reader reports what is not there, and a pipe is nowhere on the disk
+        read = source.resolve()
+        if place == read or (place.exists() and place.samefile(read)):
             raise InputError(f"{out}: is the input; give another name for the results")
-        if above[0] in above_out and S_ISDIR(source.stat().st_mode):
+        if read in place.parents and source.is_dir():
             raise InputError(f"{out}: lies in the input {source}; give another place")
-        if out.is_dir() and above_out[0] in above:
+        if place in read.parents and out.is_dir():
             raise InputError(f"{out}: holds the input {source}; give another folder")
-
-
-def _identities(path: Path) -> list[tuple[int, int] | None]:
-    """Identity of a path and of the folders above it on the disk; None where one does not exist."""
-    resolved = path.resolve()
-    identities: list[tuple[int, int] | None] = []
-    for each in (resolved, *resolved.parents):
-        try:
-            status = each.stat()
-        except (FileNotFoundError, NotADirectoryError):
-            # A path that does not exist equals no other; only the first place of the list counts.
-            identities.append(None)
-        else:
-            identities.append((status.st_dev, status.st_ino))
-    return identities
 
 
 def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
@@ -314,35 +262,22 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
     return earlier is kind
 
 
-def _publish(stage: Path, out: Path, kind: Kind, is_earlier_result: bool) -> None:
-    """Move new files to `out` and the replaced ones away; on an error, move all of them back."""
-    new, old = stage / "new", stage / "old"
+def _publish(new: Path, out: Path, kind: Kind, is_earlier_result: bool) -> None:
+    """Move new files to `out`, in place of those of an earlier run."""
     if not out.is_dir():
-        with _parents(out):
-            new.rename(out)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        new.rename(out)
         return
     files = {path.relative_to(new) for path in new.rglob("*") if not path.is_dir()}
     folders = {parent for file in files for parent in file.parents} - {Path()}
     _check_free(out, files, folders)
-    made = [folder for folder in folders if not (out / folder).exists()]
     stale = kind.of_earlier_run(out) if is_earlier_result else set()
-    moves = [(out / file, old / file) for file in stale | files if (out / file).is_file()]
-    # The marker is removed first and put back last: with it, the results are complete.
-    moves.sort(key=lambda move: move[0] != out / kind.marker)
-    moves += [(new / f, out / f) for f in sorted(files, key=lambda f: f == Path(kind.marker))]
-    done: list[tuple[Path, Path]] = []
-    try:
-        for source, target in moves:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            source.rename(target)
-            done.append((source, target))
-    except BaseException:
-        for source, target in reversed(done):
-            target.rename(source)
-        for folder in sorted(made, reverse=True):
-            with suppress(OSError):
-                (out / folder).rmdir()
-        raise
+    # The marker goes first and comes last: with it, the results are complete.
+    for file in (Path(kind.marker), *(stale - files)):
+        (out / file).unlink(missing_ok=True)
+    for file in sorted(files, key=lambda file: file == Path(kind.marker)):
+        (out / file).parent.mkdir(parents=True, exist_ok=True)
+        (new / file).replace(out / file)
 
 
 def _check_free(out: Path, files: Iterable[Path], folders: Iterable[Path]) -> None:
@@ -351,17 +286,3 @@ def _check_free(out: Path, files: Iterable[Path], folders: Iterable[Path]) -> No
         for path in (out / path for path in paths):
             if path.is_symlink() or (path.exists() and not fits(path)):
                 raise InputError(f"{path}: is in the way; move it elsewhere")
-
-
-@contextmanager
-def _parents(path: Path) -> Iterator[None]:
-    """Make the folders above a path; on an error, those that were made are removed."""
-    made = [folder for folder in path.absolute().parents if not folder.exists()]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield
-    except BaseException:
-        for folder in made:
-            with suppress(OSError):
-                folder.rmdir()
-        raise

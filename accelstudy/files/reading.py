@@ -5,7 +5,6 @@ Errors name the file that was read, and no file is read without end.
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 import os
@@ -25,8 +24,6 @@ LARGEST = 100_000_000
 """Bytes of the largest text that is read as a whole, more than a campaign of 100 000 positions."""
 LARGEST_YAML = 1_000_000
 """Bytes of the largest YAML file: what people write, and what is slow to read."""
-LONGEST_LINE = 10_000_000
-"""Bytes of the longest line of a packed text, which may be much longer than the file."""
 _DEVICES = ("/dev/", "/proc/")
 """Where a pipe is one that a shell has opened, and not one that waits for somebody to write."""
 
@@ -70,23 +67,6 @@ def read_text(path: str | Path, largest: int | None = None) -> str:
     if len(content) > largest:
         raise InputError(f"{path}: larger than {largest // 10**6} MB; is it the right file?")
     return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-
-
-class Unpacked(gzip.GzipFile):
-    """A packed text whose lines are not longer than `LONGEST_LINE`."""
-
-    _since_the_end_of_a_line = 0
-
-    def read1(self, size: int = -1) -> bytes:
-        """Read some bytes; raise `InputError` if a line is too long."""
-        content = super().read1(size)
-        end = max(content.rfind(b"\n"), content.rfind(b"\r")) + 1
-        before = 0 if end else self._since_the_end_of_a_line
-        self._since_the_end_of_a_line = before + len(content) - end
-        if self._since_the_end_of_a_line > LONGEST_LINE:
-            most = LONGEST_LINE // 10**6
-            raise InputError(f"{self.name}: a line of more than {most} MB; is it a log?")
-        return content
 
 
 def read_json(path: str | Path, kind: str) -> Mapping[str, Any]:

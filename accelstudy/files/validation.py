@@ -96,19 +96,11 @@ class _OneOrMore:
         return [value] if isinstance(value, str | int | float) else value
 
 
-class _Plugins(_OneOrMore):
-    """Take a name, a list of names, or names with their digests, which a file of ours has."""
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: JsonHandler
-    ) -> dict[str, Any]:
-        one_or_more = super().__get_pydantic_json_schema__(schema, handler)
-        digests = {"type": "object", "additionalProperties": {"type": "string"}}
-        return {"anyOf": [*one_or_more["anyOf"], digests]}
-
-    @staticmethod
-    def _as_list(value: Any) -> Any:
-        return list(value) if isinstance(value, Mapping) else _OneOrMore._as_list(value)
+def _plugin_names(value: Any) -> Any:
+    """Names of plug-ins: one, a list, or names with their digests, as a file of ours has."""
+    if isinstance(value, Mapping):
+        return list(value)
+    return [value] if isinstance(value, str) else value
 
 
 T = TypeVar("T")
@@ -163,7 +155,10 @@ class Block(BaseModel):
 class Configuration(Block):
     """A whole configuration, whose plug-ins are loaded before its other keys are read."""
 
-    plugins: Annotated[list[str], _Plugins()] = Field(
+    plugins: Annotated[
+        list[str],
+        BeforeValidator(_plugin_names, json_schema_input_type=str | list[str] | dict[str, str]),
+    ] = Field(
         default=[],
         description="Python files with effects, schemes and the like of your own, from the folder "
         "in which the workflow runs",

@@ -6,31 +6,9 @@ import yaml
 from markdown_text import code, page, table
 from schemas import blocks
 
-from accelstudy.campaign.header import COLUMNS, COUNTING, HEADER, RANGES, Header
+from accelstudy.campaign.header import ANY, COLUMNS, HEADER, Header
 
 HERE = Path(__file__).parent
-UNITS = {
-    "forces": "unit",
-    "sd": "unit",
-    "time": "s",
-    "temperature": "°C",
-    "angles": "gon",
-    "yaw": "gon",
-    "vibration": "m/s²",
-}
-"""Of the columns of a campaign; `unit` is that of the header."""
-MEANINGS = {
-    "positions": "number of the hold, from 1 on, in the order of acquisition",
-    "time": "middle of the hold since the start of the session",
-    "forces": "mean specific force of the hold, in sensor axes",
-    "n_samples": "samples in the hold",
-    "sd": "standard deviations of the samples within the hold",
-    "temperature": "mean temperature",
-    "angles": "attitude that the robot tells, or a reference",
-    "yaw": "yaw that the robot tells; 0 if absent",
-    "vibration": "rms of the vibration",
-}
-REQUIRED = ("positions", "forces")
 
 
 def study_tables():
@@ -77,20 +55,16 @@ def tables():
 def formats():
     """The page of all other files."""
     rows = []
-    for attribute, names in COLUMNS.items():
-        if attribute not in MEANINGS:
-            raise ValueError(f"column {attribute}: its meaning is missing in {__name__}")
-        unit = UNITS.get(attribute, "")
-        within = RANGES.get(attribute)
-        kind = "whole number" if attribute in COUNTING else "number"
+    for column in COLUMNS.values():
+        within = column.within
         rows.append(
             (
-                ", ".join(map(code, names)),
-                kind,
-                f"*{unit}*" if unit.startswith("unit") else unit,
-                "" if within is None else f"{within.least:g} … {within.most:g}",
-                "*required*" if attribute in REQUIRED else "",
-                MEANINGS[attribute],
+                ", ".join(map(code, column.names)),
+                "whole number" if column.whole else "number",
+                "*unit*" if column.unit == "unit" else column.unit,
+                "" if within is ANY else f"{within.least:g} … {within.most:g}",
+                "*required*" if column.needed else "",
+                column.meaning,
             )
         )
     calibration = []

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.logs import import_log, log_of
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.making import ImportReport
+from accelstudy.campaign.importing.recording import read_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
@@ -85,7 +86,7 @@ class Donor:
         if settings.means:
             forces = campaign.forces
         else:
-            samples = log_of(path, settings).samples
+            samples = read_log(path, settings).samples
             forces = samples.forces
         timed = not settings.means and settings.block is None
         if timed:

@@ -196,7 +196,7 @@ def test_every_calibration_of_a_study_is_in_a_dataset():
 def test_what_reading_refuses_is_diagnosed(tmp_path):
     given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
     write_campaign(given, tmp_path, plausible=False)
-    with pytest.raises(acs.InputError, match="looks like g"):
+    with pytest.raises(acs.InputError, match="look like g"):
         acs.read_campaign(tmp_path)
     assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
 
@@ -216,7 +216,7 @@ WRONG = {
     "acs.read_campaign(None)": "folder: expected a path, not None",
     "acs.read_log(table.assign(note=[1, 'x'] * 6000))": "log: the DataFrame cannot be a log",
     "acs.find_holds(table / 9.8)": "DataFrame: which column is time?",
-    "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g; give `unit` g",
+    "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g, not m/s^2; give `unit` g",
     "acs.find_holds(acs.read_log(table, rate=100), sensors={'a': [0, 1, 2]})": "sensors: several",
     "acs.simulate_campaign(repeats='x')": "repeats: must be a whole number",
     "acs.simulate_campaign(sigma='2')": "sigma: expected a number with its unit",

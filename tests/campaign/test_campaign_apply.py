@@ -412,9 +412,9 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
     ("log.csv", "fx,fy,fz\n", "no line of numbers"),
     ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
-     "about 1.05 m.s.2: these look like g; give --unit g"),
-    ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "give the --unit or the --columns"),
-    ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-3000\n" + "1,2,-9\n", "nowhere near gravity"),
+     "about 1.05 m.s.2: these look like g, not m.s.2; give --unit g"),
+    ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "these look like counts"),
+    ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-30\n" + "1,2,-9\n", "nowhere near gravity"),
     ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
     ("log.parquet", "fx,fy,fz\n1,2,9\n", "not a whole Parquet file"),
 ])  # fmt: skip

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from calling import refused
@@ -27,7 +28,7 @@ from accelstudy.campaign.batch.overview import (
     summarise_campaigns,
 )
 from accelstudy.campaign.batch.run import run_task
-from accelstudy.campaign.format import write_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import public_data, record_public
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -364,7 +365,17 @@ def test_settings_of_public_data_can_be_overlaid():
     task = task_of(**entry)
     assert (task.name, task.settings.name, task.settings.unit) == ("slow", "slow", "counts")
     assert task.settings.threshold_mps2 == 0.2
-    assert Task.model_validate(task.model_dump(mode="json")) == task
+    assert Task.model_validate(task.as_params()) == task
+
+
+def test_a_job_leaves_to_the_format_of_a_log_what_nobody_said(tmp_path):
+    """Axes of ROS were taken for frd, since the job had all settings as if they were given."""
+    path = write_log(tmp_path / "log")
+    names = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
+    pd.read_parquet(path).rename(columns=names).to_parquet(path)
+    task = Task.model_validate(task_of(log=str(path), **{"import": {"rate_hz": 100}}).as_params())
+    run_task(task, tmp_path / "out")
+    assert read_campaign(tmp_path / "out/campaign").log.frame == "flu"
 
 
 def test_patterns(tmp_path, monkeypatch):
@@ -422,7 +433,9 @@ def test_without_configuration(tmp_path):
 # --- without Snakemake ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("gravity", "error"), [(9.80, None), (98.0, "does not fit the forces")])
+@pytest.mark.parametrize(
+    ("gravity", "error"), [(9.80, None), (98.0, "does not fit a gravity of 98")]
+)
 def test_a_gravity_of_its_own(tmp_path, gravity, error):
     write_campaign(simulated_campaign(TRUTH), tmp_path / "a")
     task = task_of(gravity={"value_mps2": gravity}, campaign=str(tmp_path / "a"))

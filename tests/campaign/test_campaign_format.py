@@ -332,7 +332,7 @@ BAD = {
     "unit": (header(unit="ug"), "unit", "'m/s^2', 'g', 'mg' or 'counts'", "not 'ug'"),
     "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
-    "gravity in g": (header(gravity={"value_mps2": 1}), "gravity.value_mps2: 1", "some 9.8"),
+    "gravity in g": (header(gravity={"value_mps2": 1}), "gravity of 1 m/s²", "gravity.value_mps2"),
     "negative sigma of gravity": (header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
                                   "gravity.sigma_mps2"),
     "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), "sensor_noise.sigma_mps2"),
@@ -392,14 +392,14 @@ BAD = {
                 "look like radians, not gon"),
     "opposite sign": (columns(fx=times(-1), fy=times(-1), fz=times(-1)), "opposite sign",
                       "(0, 0, -g)"),
-    "g for m/s^2": (columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)), "norm is about 1",
-                    "looks like g, not m/s^2"),
-    "m/s^2 for g": (both(header(unit="g")), "looks like m/s^2, not g", "`unit` in campaign.yaml"),
+    "g for m/s^2": (columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)), "about 1 m/s^2",
+                    "look like g, not m/s^2"),
+    "m/s^2 for g": (both(header(unit="g")), "look like m/s^2, not g", "`unit` in campaign.yaml"),
     "counts for m/s^2": (columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
-                         "looks like counts, not m/s^2"),
+                         "look like counts, not m/s^2"),
     "m/s^2 for counts": (
         both(header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]})),
-        "looks like m/s^2, not counts",
+        "look like m/s^2, not counts",
     ),
     "wrong nominal": (
         both(
@@ -409,7 +409,7 @@ BAD = {
         "positions.csv: ", "nowhere near gravity", "`nominal`",
     ),
     "no unit fits": (columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
-                     "nowhere near gravity, 9.81 m/s^2"),
+                     "nowhere near gravity, 9.81 m/s²"),
     "no force": (columns(**{f: lambda old: [1e-300 * k for k in range(8)]
                             for f in ("fx", "fy", "fz")}), "their norm is about 0 m/s^2"),
     "one huge cell": (columns(fy=at(3, 1e11)), "fx, fy, fz: position 3: more than 1000 times"),

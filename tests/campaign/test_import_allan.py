@@ -7,7 +7,6 @@ from test_import_holds import shared
 from accelstudy.adjustment.quality import global_test
 from accelstudy.campaign.importing.allan import (
     accuracy_of_mean,
-    allan_moments,
     averaging_factors,
     pooled_deviation,
 )
@@ -30,7 +29,7 @@ def flicker(seed=1, n=N):
 
 def allan_deviation(values, step):
     """Allan deviation of one record, (n,) or (n, channels)."""
-    return pooled_deviation([allan_moments(values)], step)
+    return pooled_deviation([values], step)
 
 
 def slope(curve, low, high):
@@ -49,15 +48,13 @@ def test_definition():
     assert averaging_factors(0) == []
 
 
-def test_moments_of_other_channels():
+def test_channels_are_turned():
     rng = np.random.default_rng(2)
     samples = np.column_stack([3 + rng.standard_normal((100, 2)), np.full(100, 0.1)])
-    turn = rng.standard_normal((3, 2))
-    found, expected = allan_moments(samples), allan_moments(samples @ turn)
-    np.testing.assert_allclose(found.turned(turn).squares, expected.squares, rtol=1e-9, atol=1e-12)
-    assert (found.squares == found.squares.transpose(0, 2, 1)).all()
-    assert (found.squares[:, 2, 2] == 0).all()
-    np.testing.assert_array_equal(found.terms, 101 - 2 * np.array(found.factors))
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    found = pooled_deviation([samples], STEP, [turn]).deviation
+    np.testing.assert_allclose(found, allan_deviation(samples @ turn, STEP).deviation, rtol=1e-9)
+    assert (allan_deviation(samples, STEP).deviation[:, 2] == 0).all()
 
 
 def test_white_noise_level_and_slope():
@@ -75,19 +72,19 @@ def test_random_walk_and_flicker():
 
 
 def test_records_are_pooled():
-    records = [allan_moments(white(seed, 3 * 500).reshape(-1, 3) + seed) for seed in range(20)]
+    records = [white(seed, 3 * 500).reshape(-1, 3) + seed for seed in range(20)]
     curve = pooled_deviation(records, STEP)
     assert curve.deviation.shape == (len(curve.tau), 3)
     assert curve.tau[-1] <= 2.5
     assert curve.differences[0] == 20 * 499
     assert curve.pooled[0] == pytest.approx(0.02, rel=0.02)
-    with_short = pooled_deviation([*records, allan_moments(np.zeros((1, 3)))], STEP)
+    with_short = pooled_deviation([*records, np.zeros((1, 3))], STEP)
     np.testing.assert_array_equal(with_short.differences, curve.differences)
 
 
 @pytest.mark.parametrize("duration", [0.5, 2.0, 5.0])
 def test_white_noise_is_found_white(duration):
-    records = [allan_moments(white(seed, 3 * 500).reshape(-1, 3)) for seed in range(30)]
+    records = [white(seed, 3 * 500).reshape(-1, 3) for seed in range(30)]
     n = round(duration / STEP)
     accuracy = accuracy_of_mean(pooled_deviation(records, STEP), duration, 0.02, n)
     assert accuracy.white == pytest.approx(0.02 / np.sqrt(n))
@@ -131,7 +128,7 @@ def drawn_accuracies(n, duration, walk, count):
     for _ in range(count):
         noise = rng.standard_normal((2, 26, n))
         holds = noise[0] + walk * np.cumsum(noise[1], axis=1)
-        curve = pooled_deviation([allan_moments(hold) for hold in holds], 0.05)
+        curve = pooled_deviation([*holds[..., None]], 0.05)
         yield accuracy_of_mean(curve, duration, np.sqrt(np.mean(holds.var(axis=1))), n)
 
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from log_helpers import open_log
 from places import SHARED
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import find_joint_holds
-from accelstudy.campaign.importing.recording import open_log
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.settings import parse_settings
 from accelstudy.campaign.importing.windows import Windows
 
 RATE = 100.0
@@ -15,7 +17,7 @@ G = 9.81
 
 
 def find_holds(log, **options):
-    return find_joint_holds([log], **options)[0]
+    return find_joint_holds([Recording([log])], parse_settings(options))[0]
 
 
 def shared(name):
@@ -59,7 +61,7 @@ def assert_same(holds, others, rtol=1e-5):
 
 def opened(folder, forces, time=None, **options):
     rate = RATE if time is None else None
-    return open_log(write(folder, forces, time), rate=rate, **options)
+    return open_log(write(folder, forces, time), rate_hz=rate, **options)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -99,7 +101,7 @@ def test_no_hold_spans_a_gap(tmp_path):
     middle = edges[3].mean().astype(int)
     time[middle:] += 10
     log = opened(tmp_path, forces, time)
-    holds = find_holds(log, shortest=0.5)
+    holds = find_holds(log, shortest_s=0.5)
     assert "1 gap in time; no hold spans one" in holds.warnings
     assert len(holds) == len(edges) + 1
     assert not np.any((holds.of_each("start") < middle) & (holds.of_each("end") > middle))
@@ -120,7 +122,7 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
 def test_all_frozen(tmp_path):
     forces = np.repeat(np.arange(12.0).reshape(4, 3), 300, axis=0)
     with pytest.raises(InputError, match="frozen"):
-        find_holds(opened(tmp_path, forces), window=0.5)
+        find_holds(opened(tmp_path, forces), window_s=0.5)
 
 
 def test_saturated_holds_are_left_out(tmp_path):
@@ -151,20 +153,20 @@ def test_override_and_limits(tmp_path):
     forces, edges = session()
     log = opened(tmp_path, forces)
     chosen = find_holds(log)
-    given = find_holds(log, threshold=chosen.threshold.sd)
+    given = find_holds(log, threshold_mps2=chosen.threshold.sd)
     assert given.threshold.reason == "as given"
     assert_same(given, chosen)
-    assert len(find_holds(log, threshold=100.0)) == 1
-    longer = find_holds(log, trim=0.5)
+    assert len(find_holds(log, threshold_mps2=100.0)) == 1
+    longer = find_holds(log, trim_s=0.5)
     np.testing.assert_array_equal(longer.of_each("start"), chosen.of_each("start") + 30)
     np.testing.assert_array_equal(longer.of_each("end"), chosen.of_each("end") - 30)
     for options, message in [
-        ({"shortest": 5.0}, "no static hold of 5 s or more .* 8 rests of 4.0 s are no hold: "),
-        ({"threshold": 1e-6}, "no static hold"),
-        ({"threshold": 0.0}, "threshold: must be positive"),
-        ({"window": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),
-        ({"window": 1e6}, r"is the rate \(--rate\) right"),
-        ({"window": 1e3}, "too few samples for a window of 100001"),
+        ({"shortest_s": 5.0}, "no static hold of 5 s or more .* 8 rests of 4.0 s are no hold: "),
+        ({"threshold_mps2": 1e-6}, "no static hold"),
+        ({"threshold_mps2": 0.0}, "threshold_mps2: must be greater than 0"),
+        ({"window_s": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),
+        ({"window_s": 1e6}, r"is the rate \(--rate\) right"),
+        ({"window_s": 1e3}, "too few samples for a window of 100001"),
     ]:
         with pytest.raises(InputError, match=message):
             find_holds(log, **options)
@@ -216,7 +218,7 @@ def test_xsens():
 @pytest.mark.parametrize("i", range(3))
 def test_mpu9150(i):
     columns = {"fx": 0, "fy": 1, "fz": 2}
-    holds = find_holds(open_log(shared(f"mpu9150/imu{i}.log"), columns=columns, rate=100))
+    holds = find_holds(open_log(shared(f"mpu9150/imu{i}.log"), columns=columns, rate_hz=100))
     reference = pd.read_csv(shared(f"mpu9150/derived_static_means_imu{i}.csv"))
     assert len(holds) == len(reference) == 23
     worst, common = near(holds, reference)

@@ -10,13 +10,15 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from log_helpers import open_log
 from scipy.io import loadmat, savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing import sources
 from accelstudy.campaign.importing.logs import find_joint_holds
-from accelstudy.campaign.importing.recording import open_log
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.settings import ImportSettings
 
 N = 50
 TIME = 0.25 * np.arange(N)
@@ -77,11 +79,11 @@ def test_matlab(tmp_path, array):
 def test_matlab_4_and_a_chosen_array(tmp_path):
     savemat(tmp_path / "log.mat", {"log": TABLE, "other": FORCES}, format="4")
     with pytest.raises(InputError, match=r"which array\? There are log, other"):
-        open_log(tmp_path / "log.mat", rate=4)
-    _, forces = everything(open_log(tmp_path / "log.mat", rate=4, variable="other"))
+        open_log(tmp_path / "log.mat", rate_hz=4)
+    _, forces = everything(open_log(tmp_path / "log.mat", rate_hz=4, variable="other"))
     np.testing.assert_array_equal(forces, FORCES)
     with pytest.raises(InputError, match="did you mean 'other'"):
-        open_log(tmp_path / "log.mat", rate=4, variable="othr")
+        open_log(tmp_path / "log.mat", rate_hz=4, variable="othr")
 
 
 def test_parquet(tmp_path):
@@ -103,13 +105,13 @@ def test_units(tmp_path):
     np.testing.assert_allclose(everything(log)[1], (FORCES - 7) * (0.1, 0.2, -0.3))
     time, _ = everything(open_log(path, time_unit="ms", **BY_PLACE))
     np.testing.assert_allclose(time, TIME * 1e-3)
-    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate=50))
+    time, _ = everything(open_log(path, columns=BY_PLACE["columns"], rate_hz=50))
     np.testing.assert_allclose(time, np.arange(N) / 50)
 
 
 def test_three_columns_need_no_names(tmp_path):
     np.savetxt(tmp_path / "log.txt", FORCES, "%.3f")
-    np.testing.assert_array_equal(everything(open_log(tmp_path / "log.txt", rate=1))[1], FORCES)
+    np.testing.assert_array_equal(everything(open_log(tmp_path / "log.txt", rate_hz=1))[1], FORCES)
 
 
 def changed(row, place, value):
@@ -178,20 +180,20 @@ def test_many_rows_that_lack_a_reading_are_refused(tmp_path):
     ({}, r"which column is fx\? The columns are a, b, a, c, counted from 0"),
     ({"columns": {"fx": "q"}}, "fx: no column 'q'; there are a, b, a, c"),
     ({"columns": {"fx": 4}}, "fx: no column 4; there are 4, counted from 0"),
-    ({"columns": {"fx": -1}}, "fx: no column -1"),
+    ({"columns": {"fx": -1}}, "columns.fx: must be at least 0"),
     ({"columns": {"fx": "a"}}, "there are several columns 'a'"),
     ({"columns": {"fx": 1, "fy": 1, "fz": 3}}, "name the same column"),
     ({"columns": {"gx": 1}}, "unknown column 'gx'"),
     ({"columns": {"fx": 1, "fy": 2, "fz": 3}}, "give the column of time"),
-    ({**BY_PLACE, "rate": 100}, "not both"),
-    ({"columns": BY_PLACE["columns"], "rate": 0}, "rate must be positive"),
+    ({**BY_PLACE, "rate_hz": 100}, "not both"),
+    ({"columns": BY_PLACE["columns"], "rate_hz": 0}, "rate_hz: must be from"),
     ({**BY_PLACE, "unit": "counts"}, "needs a nominal scale"),
     ({**BY_PLACE, "unit": "counts", "scale": 0}, "must not be 0"),
     ({**BY_PLACE, "unit": "counts", "scale": (1, 2)}, "one number or three"),
-    ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be finite"),
+    ({**BY_PLACE, "unit": "counts", "scale": 1, "offset": np.inf}, "must be a finite number"),
     ({**BY_PLACE, "scale": 2}, "goes with unit counts"),
-    ({**BY_PLACE, "unit": "ft"}, "unknown unit of a log 'ft'"),
-    ({**BY_PLACE, "time_unit": "h"}, "unknown unit of time 'h'"),
+    ({**BY_PLACE, "unit": "ft"}, "unit: must be .* not 'ft'"),
+    ({**BY_PLACE, "time_unit": "h"}, "time_unit: must be .* not 'h'"),
 ])  # fmt: skip
 def test_bad_options(tmp_path, options, message):
     path = written(tmp_path, lines(before=["a,b,a,c"]))
@@ -263,7 +265,7 @@ def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
 def test_a_line_without_end_is_not_read(tmp_path):
     path = written(tmp_path, "1.5," * 20000)
     with pytest.raises(InputError, match="no end of a line in 65536 characters"):
-        open_log(path, rate=1)
+        open_log(path, rate_hz=1)
 
 
 @pytest.mark.parametrize("text", [
@@ -280,7 +282,7 @@ def test_what_is_no_table_is_no_more_work_than_its_size(tmp_path, monkeypatch, t
 
     monkeypatch.setattr(sources, "split_line", counting)
     with pytest.raises(InputError):
-        open_log(written(tmp_path, text), rate=1)
+        open_log(written(tmp_path, text), rate_hz=1)
     assert sum(looked_at) < 20 * len(text)
 
 
@@ -357,13 +359,13 @@ cells = st.one_of(
 @given(
     st.lists(st.lists(cells, max_size=6), max_size=40),
     st.sampled_from([",", ";", " ", "\t", ", "]),
-    st.sampled_from([{"rate": 100.0}, {"rate": 3.0}, {"time": 0}, {}]),
+    st.sampled_from([{"rate_hz": 100.0}, {"rate_hz": 3.0}, {"time": 0}, {}]),
     st.sampled_from([None, {"fx": 0, "fy": 1, "fz": 2}, {"fx": 3, "fy": 1, "fz": 2}]),
 )
-@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate": 9.0}, None)
-@example([['"'], ["0.0", "0.0", '"']], ",", {"rate": 100.0}, None)
-@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate": 100.0}, None)
-@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate": 100.0}, None)
+@example([["1", "2", "3"], ["1", "2", "3", "4"], ["2", "3", "4"]], ",", {"rate_hz": 9.0}, None)
+@example([['"'], ["0.0", "0.0", '"']], ",", {"rate_hz": 100.0}, None)
+@example([["1_0", "\u2028", "1", "1", "\u2028"], ["1e400"]], " ", {"rate_hz": 100.0}, None)
+@example([["1", "", "2", '"\n,1,nan\n"', "\t", "#"]], ",", {"rate_hz": 100.0}, None)
 def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8")
@@ -372,7 +374,7 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         time, forces = everything(log)
         assert len(time) == len(forces)
         assert np.isfinite(forces).all()
-        find_joint_holds([log], shortest=0.1, window=0.5)
+        find_joint_holds([Recording([log])], ImportSettings(shortest_s=0.1, window_s=0.5))
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -382,4 +384,4 @@ def test_whatever_the_bytes(tmp_path, content, name):
     path = tmp_path / name
     path.write_bytes(content)
     with one_line_at_most():
-        everything(open_log(path, columns={"fx": 0, "fy": 1, "fz": 2}, rate=1))
+        everything(open_log(path, columns={"fx": 0, "fy": 1, "fz": 2}, rate_hz=1))

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import call, refusal, succeed
+from log_helpers import open_log
 from test_import_campaign import XSENS
 from test_import_holds import RATE, G, session, shared, write
 
@@ -14,7 +15,6 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.recording import open_log
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
@@ -159,9 +159,9 @@ def test_sigma_does_not_depend_on_the_offset():
 
 
 @pytest.mark.parametrize(("factor", "options", "message"), [
-    (1 / G, [], "look like g; give --unit g"),
-    (1, ["--unit", "g"], "look like m/s^2; give --unit m/s^2"),
-    (1e3, [], "look like counts; give --unit counts and --scale"),
+    (1 / G, [], "look like g, not m/s^2; give --unit g"),
+    (1, ["--unit", "g"], "look like m/s^2, not g; give --unit m/s^2"),
+    (1e3, [], "look like counts, not m/s^2; give --unit counts"),
     (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
     (1, ["--threshold", "1e300"], "threshold_mps2: must be at most 1"),
     (1, ["--frame", "fru"], "is left-handed"),

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import refusal, succeed
+from log_helpers import open_log
 from recorded import EPOCH, write_bag, write_ulog
 from rosbags.rosbag2 import storage_mcap
 
@@ -16,7 +17,6 @@ import accelstudy as acs
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import recorded
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.recording import open_log
 from accelstudy.campaign.importing.settings import parse_settings
 
 G, SIGMA, COUNT = 9.80665, 0.01, 12

@@ -9,11 +9,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.blocks import segment_blocks
+from accelstudy.campaign.importing.recording import Recording
 from accelstudy.campaign.importing.resolution import (
     noise_before_rounding,
     rounding_of_mean,
     step_of,
 )
+from accelstudy.campaign.importing.settings import ImportSettings
 
 BIAS, SCALE = np.array([0.12, -0.08, 0.2]), 1 + 1e-6 * np.array([4000, -3000, 6000])
 
@@ -117,8 +119,9 @@ def test_a_pile_at_the_extreme_that_the_steps_explain_is_no_saturation(tmp_path,
         assert not blocks.left_out
 
 
-def find_holds_of_blocks(folder, read, full_range=np.inf):
-    return segment_blocks(opened(folder, read), 40, 10.0, full_range)[2]
+def find_holds_of_blocks(folder, read, full_range=None):
+    settings = ImportSettings(block=40, threshold_mps2=10.0, range_mps2=full_range)
+    return segment_blocks(Recording([opened(folder, read)]), settings)
 
 
 def test_with_a_range_only_the_range_counts(tmp_path):

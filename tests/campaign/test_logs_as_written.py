@@ -89,6 +89,12 @@ def test_notes_do_not_tell_the_delimiter(tmp_path):
     assert "forces from ax, ay, az" in said(found(written(tmp_path, [*notes, *lines])))
 
 
+def test_a_note_of_words_and_numbers_leaves_tabs_the_delimiter(tmp_path):
+    """Blanks gave a number more a row, of "say, 0"."""
+    path = written(tmp_path, rows_of(table(note=["say, 0"] * N), sep="\t"))
+    assert "forces from ax, ay, az" in said(found(path))
+
+
 @pytest.mark.parametrize("delimiter", ["|", "tab", ";"])
 def test_a_delimiter_can_be_given(tmp_path, delimiter):
     path = written(tmp_path, rows_of(table(), sep="\t" if delimiter == "tab" else delimiter))
@@ -217,7 +223,9 @@ def test_names_with_units(tmp_path, names, factor, unit):
 
 def test_milli_g_is_a_unit_and_others_are_suggested(tmp_path):
     path = written(tmp_path, rows_of(table(forces=FORCES * 1e3 / G)))
-    assert "these look like mg; give --unit mg" in refusal("import", path, "--out", tmp_path / "o")
+    assert "these look like mg, not m/s^2; give --unit mg" in refusal(
+        "import", path, "--out", tmp_path / "o"
+    )
     for unit in ("mg", "milli-g"):
         found(acs.read_log(path, unit=unit))
     names, *rows = rows_of(table(forces=FORCES * 1e3 / G))

@@ -6,9 +6,9 @@ import glob
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -24,8 +24,6 @@ from accelstudy.files.validation import Block, Configuration, PathName, checked
 from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")
-
-Kind = Literal["campaign", "log", "public"]
 
 
 class Entry(Block):
@@ -61,41 +59,37 @@ class Entry(Block):
         return self
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> str:
         """Which of `KINDS` it is."""
-        if self.campaign is not None:
-            return "campaign"
-        return "log" if self.log is not None else "public"
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
+    @property
+    def source(self) -> str:
+        """Normalised path of the folder or file, or name of the public data."""
+        return self.public or os.path.normpath(self.campaign or self.log or "")
 
-class Task(Block):
-    """One campaign to calibrate.
+    @property
+    def is_pattern(self) -> bool:
+        """Whether it stands for what matches it."""
+        source = self.source
+        return self.public is None and glob.has_magic(source) and not os.path.exists(source)
 
-    Attributes
-    ----------
-    name : str, of the results
-    kind : "campaign", "log" or "public"
-    source : str, path of the folder or file, or name of the public data
-    model : str
-    approach : str, optional; by default robot-aided if the campaign has the robot's angles
-    gravity : GravitySettings, replaces that of a campaign folder; None keeps it
-    settings : ImportSettings, of a log or public data
-    """
-
-    name: str
-    kind: Kind
-    source: str
-    model: str
-    approach: str | None
-    gravity: GravitySettings | None = None
-    settings: ImportSettings | None = None
+    def as_params(self) -> dict[str, Any]:
+        """What was given, as parameters of a rule; the format of a log says the rest."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def files(self) -> list[str]:
         """Existing files on which the result depends; none for public data."""
-        source = Path(self.source)
-        if self.kind == "campaign":
-            return [str(path) for name in (HEADER, *TABLES) if (path := source / name).is_file()]
-        return [str(source)] if self.kind == "log" and source.is_file() else []
+        names = (HEADER, *TABLES) if self.kind == "campaign" else ("",)
+        paths = [Path(self.source, name) for name in names] if self.public is None else []
+        return [str(path) for path in paths if path.is_file()]
+
+
+class Task(Entry):
+    """One campaign to calibrate: an entry without patterns, and with all that it inherits."""
+
+    name: PathName
+    model: ModelName
 
 
 class LotSettings(Block):
@@ -145,22 +139,21 @@ class BatchConfig(Configuration):
         return self
 
     def tasks(self) -> list[Task]:
-        """Campaigns in the order of the configuration; patterns match what is there now.
+        """Campaigns in the order of the configuration, each with its name and all it inherits.
 
-        A pattern leaves out what another entry names, so that this entry can differ from the rest.
+        Patterns match what is there now. A pattern leaves out what another entry names, so that
+        this entry can differ from the rest.
 
         Raises
         ------
         InputError
             If nothing matches a pattern.
         """
-        return list(self._tasks())
-
-    def _tasks(self) -> Iterator[Task]:
-        named = {_path(entry) for entry in self.campaigns if not _is_pattern(entry)}
+        tasks = []
+        named = {entry.source for entry in self.campaigns if not entry.is_pattern}
         for index, entry in enumerate(self.campaigns):
-            sources = [_path(entry)]
-            if _is_pattern(entry):
+            sources = [entry.source]
+            if entry.is_pattern:
                 wanted = os.path.isdir if entry.kind == "campaign" else os.path.isfile
                 matching = sorted(filter(wanted, glob.glob(sources[0])), key=natural)
                 if not matching:
@@ -168,15 +161,15 @@ class BatchConfig(Configuration):
                     raise InputError(f"campaigns.{index}: no {what} matches {sources[0]}")
                 sources = [path for path in matching if path not in named]
             for source in sources:
-                yield Task(
-                    name=entry.name or _name_of(entry.kind, source),
-                    kind=entry.kind,
-                    source=source,
-                    model=entry.model or self.model,
-                    approach=entry.approach or self.approach,
-                    gravity=entry.gravity if entry.kind == "campaign" else None,
-                    settings=_settings(entry, source),
-                )
+                inherited = {
+                    **entry.model_dump(by_alias=True, exclude_unset=True),
+                    entry.kind: source,
+                    "name": entry.name or _name_of(entry.kind, source),
+                    "model": entry.model or self.model,
+                    "approach": entry.approach or self.approach,
+                }
+                tasks.append(Task.model_validate(inherited | _settings(entry)))
+        return tasks
 
     @property
     def fingerprint(self) -> str:
@@ -200,17 +193,7 @@ def _check_names(model: str | None, approach: str | None) -> None:
         raise ValueError(str(error)) from None
 
 
-def _path(entry: Entry) -> str:
-    """Normalised path, or name of public data."""
-    return entry.public or os.path.normpath(entry.campaign or entry.log or "")
-
-
-def _is_pattern(entry: Entry) -> bool:
-    path = _path(entry)
-    return entry.public is None and glob.has_magic(path) and not os.path.exists(path)
-
-
-def _name_of(kind: Kind, source: str) -> str:
+def _name_of(kind: str, source: str) -> str:
     path = Path(os.path.abspath(source))
     name = source if kind == "public" else path.stem if kind == "log" else path.name
     name = re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "campaign"
@@ -220,15 +203,15 @@ def _name_of(kind: Kind, source: str) -> str:
         raise InputError(f"campaigns: {source}: {error}; give it a `name`") from None
 
 
-def _settings(entry: Entry, source: str) -> ImportSettings | None:
+def _settings(entry: Entry) -> dict[str, Any]:
     """How a file is imported; for public data the entry overlays what the registry says."""
     if entry.kind == "campaign":
-        return None
-    content = import_settings(source).model_dump(exclude_unset=True) if entry.public else {}
+        return {}
+    content = import_settings(entry.public).model_dump(exclude_unset=True) if entry.public else {}
     if entry.name is not None:
         content["name"] = entry.name
     if entry.settings is not None:
         content = overlay(content, entry.settings.model_dump(exclude_unset=True))
     if entry.gravity is not None:
         content["gravity"] = entry.gravity.model_dump()
-    return ImportSettings.model_validate(content)
+    return {"import": content}

@@ -23,35 +23,38 @@ from accelstudy.files.outputs import BATCH_JOB, whole_file
 from accelstudy.files.tables import write_table
 from accelstudy.pages import render
 
-CAMPAIGN_COLUMNS = {
-    "campaign": "string",
-    "status": "string",
-    "error": "string",
-    "kind": "string",
-    "source": "string",
-    "sensor": "string",
-    "model": "string",
-    "approach": "string",
-    "gravity_mps2": "float64",
-    "n_positions": "Int64",
-    "redundancy": "Int64",
-    "sigma_priori_mps2": "float64",
-    "sigma_posteriori_mps2": "float64",
-    "sigma_source": "string",
-    "sigma0": "float64",
-    "p_value": "float64",
-    "accepted": "boolean",
-    "state": "string",
-    "suspects": "string",
-    "rms_norm_residual_mps2": "float64",
-    "held_out_mps2": "float64",
-    "held_out_roll_rad": "float64",
-    "held_out_pitch_rad": "float64",
-    "tilt_roll_rad": "float64",
-    "tilt_pitch_rad": "float64",
-    "verdict": "string",
-    "warnings": "string",
+_CAMPAIGNS = {
+    "campaign": ("string", "name"),
+    "status": ("string", "status"),
+    "error": ("string", "error"),
+    "kind": ("string", "kind"),
+    "source": ("string", "source"),
+    "sensor": ("string", "sensor"),
+    "model": ("string", "model"),
+    "approach": ("string", "approach"),
+    "gravity_mps2": ("float64", "gravity_mps2"),
+    "n_positions": ("Int64", "n_positions"),
+    "redundancy": ("Int64", "redundancy"),
+    "sigma_priori_mps2": ("float64", "sigma_position_priori_mps2"),
+    "sigma_posteriori_mps2": ("float64", "sigma_position_posteriori_mps2"),
+    "sigma_source": ("string", "sigma_source"),
+    "sigma0": ("float64", ""),
+    "p_value": ("float64", "quality.global_test.p_value"),
+    "accepted": ("boolean", "quality.global_test.accepted"),
+    "state": ("string", "quality.state"),
+    "suspects": ("string", "quality.suspects"),
+    "rms_norm_residual_mps2": ("float64", "rms_norm_residual_mps2"),
+    "held_out_mps2": ("float64", "quality.held_out.rms_mps2"),
+    "held_out_roll_rad": ("float64", "quality.held_out.rms_roll_mgon"),
+    "held_out_pitch_rad": ("float64", "quality.held_out.rms_pitch_mgon"),
+    "tilt_roll_rad": ("float64", "quality.tilt_rms_mgon.roll"),
+    "tilt_pitch_rad": ("float64", "quality.tilt_rms_mgon.pitch"),
+    "verdict": ("string", "quality.verdict"),
+    "warnings": ("string", "warnings"),
 }
+"""Columns of the table of campaigns, their types, and their keys in status.json and
+calibration.json."""
+CAMPAIGN_COLUMNS = {column: kind for column, (kind, _) in _CAMPAIGNS.items()}
 """Columns of the table of campaigns and their types (docs/guides/campaign-format.md)."""
 
 PARAMETER_COLUMNS = {
@@ -93,9 +96,9 @@ def summarise_campaigns(
     rows, values = [], []
     for folder in paths:
         status = _read(folder / BATCH_JOB.marker)
-        content = _read(folder / "calibration.json") if status["status"] == "ok" else None
+        content = _read(folder / "calibration.json") if status["status"] == "ok" else {}
         rows.append(_row(status, content))
-        for entry in content["parameters"] if content else ():
+        for entry in content.get("parameters", ()):
             values.append({"campaign": status["name"], "parameter": entry["name"], **entry})
     table = pd.DataFrame(rows, columns=list(CAMPAIGN_COLUMNS)).astype(CAMPAIGN_COLUMNS)
     write_table(campaigns, table, provenance)
@@ -119,42 +122,25 @@ def _read(path: Path) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _row(status: Mapping[str, Any], content: Mapping[str, Any] | None) -> dict[str, Any]:
-    row = {**status, "campaign": status["name"]}
-    if content is None:
+def _row(status: Mapping[str, Any], content: Mapping[str, Any]) -> dict[str, Any]:
+    row = {column: _at({**content, **status}, key) for column, (_, key) in _CAMPAIGNS.items()}
+    if not content:
         return row
-    quality = content["quality"]
-    test, held, tilt = (
-        quality["global_test"] or {},
-        quality["held_out"] or {},
-        quality["tilt_rms_mgon"],
-    )
-    priori, posteriori = (content[f"sigma_position_{key}_mps2"] for key in ("priori", "posteriori"))
-    both = priori is not None and posteriori is not None
-    suspects = [str(suspect["position"]) for suspect in quality["suspects"]]
-    return {
-        **row,
-        "approach": content["approach"],
-        **{key: content[key] for key in CAMPAIGN_COLUMNS if key in content and key not in row},
-        "sigma_priori_mps2": priori,
-        "sigma_posteriori_mps2": posteriori,
-        "sigma0": posteriori / priori if both else None,
-        "p_value": test.get("p_value"),
-        "accepted": test.get("accepted"),
-        "state": quality["state"],
-        "suspects": ", ".join(suspects),
-        "held_out_mps2": held.get("rms_mps2"),
-        "held_out_roll_rad": _rad(held.get("rms_roll_mgon")),
-        "held_out_pitch_rad": _rad(held.get("rms_pitch_mgon")),
-        "tilt_roll_rad": _rad(tilt["roll"]),
-        "tilt_pitch_rad": _rad(tilt["pitch"]),
-        "verdict": quality["verdict"],
-        "warnings": "\n".join(content["warnings"]),
-    }
+    row["approach"] = content["approach"]  # that of the configuration may leave it open
+    priori, posteriori = row["sigma_priori_mps2"], row["sigma_posteriori_mps2"]
+    if priori is not None and posteriori is not None:
+        row["sigma0"] = posteriori / priori
+    row["suspects"] = ", ".join(str(suspect["position"]) for suspect in row["suspects"])
+    row["warnings"] = "\n".join(row["warnings"])
+    return {k: v * MGON if k.endswith("_rad") and v is not None else v for k, v in row.items()}
 
 
-def _rad(mgon: float | None) -> float | None:
-    return None if mgon is None else mgon * MGON
+def _at(content: Mapping[str, Any], key: str) -> Any:
+    """Value of a key such as quality.state; None where there is none."""
+    value: Any = content
+    for part in key.split("."):
+        value = (value or {}).get(part)
+    return value
 
 
 def _links(folder: Path, start: Path) -> dict[str, str | None]:

@@ -54,7 +54,7 @@ def run_task(
     with result_folder(folder, BATCH_JOB) as new:
         error = _calibrate(task, new, record, log)
         status = {
-            **task.model_dump(mode="json", include={"name", "kind", "source", "model", "approach"}),
+            **{key: getattr(task, key) for key in ("name", "kind", "source", "model", "approach")},
             "status": "ok" if error is None else "failed",
             "error": error,
         }

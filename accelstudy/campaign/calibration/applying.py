@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,6 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
-from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json, readable
@@ -77,6 +76,13 @@ class Calibration:
     def dof(self) -> float:
         """Degrees of freedom of the noise in its sigmas; infinite where it is known."""
         return dof_of(self.content)
+
+    @property
+    def usual_layout(self) -> LogLayout:
+        """How a log of the sensor is read: as that of the campaign, or in the campaign's unit."""
+        if self.log is not None:
+            return self.log
+        return LogLayout(unit=self.content["unit"], **(self.content["nominal"] or {}))
 
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:
@@ -376,58 +382,3 @@ def noise_of_reading(calibration: Calibration) -> float:
     """
     sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
     return next((sigma for sigma in sigmas if sigma is not None), 0.0)
-
-
-class Watch:
-    """Counts the rows of a log that lie beyond the ranges of a calibration.
-
-    Parameters
-    ----------
-    ranges : mapping, as `ranges_of` returns it
-    """
-
-    def __init__(self, ranges: Mapping[str, list[float]]) -> None:
-        groups = [
-            ("temperature", "°C", {"temperature_degC": ""}),
-            ("vibration", "m/s²", {"vibration_mps2": ""}),
-            ("specific force", "m/s²", {name: f" {way}" for name, way in FORCES.items()}),
-        ]
-        self._ranges = ranges
-        self._groups = [group for group in groups if set(group[2]) <= set(ranges)]
-        self._rows = dict.fromkeys((what for what, _, _ in groups), 0)
-        self._worst: dict[str, tuple[float, str, float]] = {}
-
-    def look_at(self, corrected: Array, hold: HoldConditions) -> None:
-        """Count calibrated forces (n, 3), m/s², and their conditions."""
-        columns = {
-            "temperature_degC": hold.temperature,
-            "vibration_mps2": hold.vibration,
-            **dict(zip(FORCES, corrected.T, strict=True)),
-        }
-        for what, _, names in self._groups:
-            beyond = np.zeros(len(corrected), dtype=bool)
-            for name in names:
-                values = columns[name]
-                if values is None:
-                    continue
-                low, high = self._ranges[name]
-                # In parts of the width, so that axes can be compared; NaN does not count.
-                excess = np.fmax(low - values, values - high) / max(high - low, 1e-9)
-                beyond |= excess > MARGIN
-                if (excess > MARGIN).any():
-                    i = int(np.nanargmax(excess))
-                    farthest = (float(excess[i]), name, float(values[i]))
-                    self._worst[what] = max(farthest, self._worst.get(what, farthest))
-            self._rows[what] += int(beyond.sum())
-
-    def warnings(self, rows: int) -> Iterator[str]:
-        """Say what lay beyond a range in a log of so many rows."""
-        for what, unit, names in self._groups:
-            if what in self._worst:
-                _, name, value = self._worst[what]
-                low, high = self._ranges[name]
-                yield (
-                    f"{what} outside the range of the calibration in {self._rows[what]} of "
-                    f"{counted(rows, 'row')}: up to {value:.4g} {unit}{names[name]}, while the "
-                    f"calibration had {low:.4g} to {high:.4g}; it is extrapolated there"
-                )

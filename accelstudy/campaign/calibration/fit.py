@@ -280,7 +280,7 @@ def check_columns(campaign: Campaign, model: SensorModel) -> None:
         for column in compose(effect.spec, (effect.spec,)).hold_columns:
             if getattr(hold, column) is None:
                 attribute = "angles" if column in ("roll", "pitch") else column
-                names = " and ".join(COLUMNS[attribute])
+                names = " and ".join(COLUMNS[attribute].names)
                 raise InputError(
                     f"{campaign.name}: the effect {effect.name!r} of the model needs the {column} "
                     f"of each position; the campaign has no {names}"

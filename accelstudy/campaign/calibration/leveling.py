@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,20 +16,21 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import (
-    SENSOR_UNITS,
     attitude_unit,
     display_unit,
     to_attitude,
     to_display,
 )
 from accelstudy.basics.wording import counted, quantity_text, short_list
-from accelstudy.campaign.calibration.applying import MARGIN, Calibration, Watch, noise_of_reading
-from accelstudy.campaign.calibration.readings import Readings, readings_of
+from accelstudy.campaign.calibration.applying import FORCES, MARGIN, Calibration, noise_of_reading
+from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
-from accelstudy.campaign.checks import likely_fault
-from accelstudy.campaign.importing.recording import AXES
+from accelstudy.campaign.checks import Remedies, check_norm
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.recording import AXES, CONDITIONS, Log, read_log
 from accelstudy.campaign.importing.sources import LogFile
-from accelstudy.effects import HoldConditions
+from accelstudy.effects import HoldConditions, course_of_log
+from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import near_pole
 from accelstudy.sensors.frames import Frame
 
@@ -44,6 +45,19 @@ MANY_SIGMAS = 2.2
 NEAR_POLE = "near_pole"
 """Column that says whether a row is too close to the roll pole for its sigmas."""
 
+OPTIONS = {
+    "time": "--time or --rate",
+    "temperature": "--columns temperature=NAME",
+    "vibration": "--columns vibration=NAME",
+}
+"""Conditions that a log can hold, and the options that name their columns."""
+
+REMEDIES = Remedies(
+    unit="give --unit {unit}",
+    gravity="give the --unit or the --columns of this log",
+    other="give the --unit or the --columns of this log",
+)
+"""What to do about a log whose readings are not as large as gravity."""
 DECIMALS = 9
 """Decimals of the added columns: far below any noise, and half the digits of a double."""
 
@@ -64,6 +78,93 @@ class Leveled:
     warnings: tuple[str, ...]
 
 
+class Readings(NamedTuple):
+    """The rows of a log, prepared for a calibration.
+
+    Attributes
+    ----------
+    log : Log
+    forces : (n, 3) array, m/s² in frd, mended as the data of the calibration were; NaN where a
+        reading is missing or absurd
+    hold : HoldConditions, what else is known of the rows, for effects that need it
+    mended : bool, whether `forces` are not as they were read
+    """
+
+    log: Log
+    forces: Array
+    hold: HoldConditions
+    mended: bool
+
+
+def readings_of(
+    log: LogFile,
+    calibration: Calibration,
+    given: Mapping[str, Any] | None = None,
+    start: float = 0.0,
+) -> Readings:
+    """Read a log; by default it is read like the log from which the campaign was made.
+
+    Parameters
+    ----------
+    log : anything that `open_source` opens
+    calibration : Calibration
+    given : mapping, optional
+        Keys of `LogLayout`, which count before the layout of the campaign's log; see `read_log`.
+    start : float, s, from the start of the calibration session to the first row
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or lacks a column, perhaps one that an effect needs.
+    """
+    given = dict(given or {})
+    needed = {condition for _, condition in calibration.needs}
+    opened = read_log(
+        log,
+        checked(LogLayout, given, "options"),
+        like=calibration.usual_layout,
+        conditions=[*({"time"} & needed), *CONDITIONS],
+        untimed=True,
+    )
+    timed = "time" if opened.layout.rate_hz is not None else ""
+    for effect, condition in calibration.needs:
+        if condition not in OPTIONS and not condition.startswith("step_"):
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row, which no log has; "
+                "a calibration without this effect can be applied"
+            )
+        if condition in OPTIONS and condition not in (*opened.places, timed):
+            raise InputError(
+                f"{log}: the effect {effect} needs the {condition} of each row; "
+                f"give it by {OPTIONS[condition]}"
+            )
+    table = opened.table  # before its numbers, so that the file is read once
+    forces, time = opened.rows.forces, opened.rows.time
+    temperature = opened.rows.conditions.get("temperature")
+    time = None if time is None else start + time
+    course = None
+    if time is not None and temperature is not None:
+        course = course_of_log(time, temperature)
+    # A log has no position before: effects that depend on it add nothing.
+    still = np.zeros(len(table))
+    hold = HoldConditions(
+        time=time,
+        temperature=temperature,
+        vibration=opened.rows.conditions.get("vibration"),
+        step_x=still,
+        step_y=still,
+        step_z=still,
+        course=course,
+    )
+    # What the user says of this log is right, whatever was wrong with the campaign.
+    option_of = {"unit_error": "unit", "axis_error": "frame"}
+    mended = calibration.content.get("mended") or {"error": "", "matrix": None}
+    mends = mended["matrix"] is not None and option_of.get(mended["error"]) not in given
+    if mends:
+        forces = forces @ mending(calibration.content).T
+    return Readings(opened, forces, hold, mends)
+
+
 def level(
     calibration: Calibration,
     log: LogFile,
@@ -80,6 +181,7 @@ def level(
     leveled : Leveled
     """
     readings = readings_of(log, calibration, given, start or 0.0)
+    _check_forces(calibration, readings)
     if sigma is not None:
         bounds.SIGMA_READING.check_key("--sigma", sigma)
     noise = noise_of_reading(calibration) if sigma is None else sigma
@@ -88,19 +190,18 @@ def level(
     for first in track(range(0, max(1, len(rows)), ROWS), "leveling"):
         some = rows[first : first + ROWS]
         of_rows = readings.forces[some], readings.hold.take(some)
-        parts.append(_leveled(calibration, readings.frame, *of_rows, noise))
+        parts.append(_leveled(calibration, readings.log.layout.axes, *of_rows, noise))
     corrected = np.concatenate([part[0] for part in parts])
     near = np.concatenate([part[1] for part in parts])
     added = {name: pa.chunked_array([part[2][name] for part in parts]) for name in parts[0][2]}
-    account = Account(calibration, readings, corrected, near)
+    empty = np.isnan(corrected[:, 0])
     doubts = (
-        *_implausible(calibration),
-        *_mended(calibration, readings),
-        *_estimated(calibration),
-        *(account.assumptions() if start is None else ()),
-        *account.warnings(),
+        *_of_calibration(calibration, readings),
+        *(_assumptions(calibration) if start is None else ()),
+        *_of_log(calibration, readings, empty, near),
+        *_beyond_ranges(calibration.ranges, corrected, readings.hold),
     )
-    return readings, added, Leveled(account.rows, account.empty, doubts)
+    return readings, added, Leveled(len(rows), int(empty.sum()), doubts)
 
 
 def level_frame(
@@ -122,7 +223,7 @@ def level_frame(
     """
     readings, added, leveled = level(calibration, log, given, sigma, start)
     if frame is None:
-        frame = infer_types(readings.source, readings.table).to_pandas()
+        frame = infer_types(readings.log.source, readings.log.table).to_pandas()
     values = {name: column.to_numpy() for name, column in added.items()}
     return frame.assign(**values), leveled
 
@@ -157,45 +258,13 @@ def level_log(
         far from gravity in most rows that it must be in another unit.
     """
     readings, added, leveled = level(calibration, log, given, sigma, start)
-    table = readings.table
+    table = readings.log.table
     # The row labels that pandas writes as a column are not part of the log.
     table = table.drop_columns([n for n in table.column_names if n.startswith("__index_level_")])
     if is_parquet(out):
-        table = infer_types(readings.source, table)
+        table = infer_types(readings.log.source, table)
     write_table(out, _with(table, added))
     return leveled
-
-
-def _implausible(calibration: Calibration) -> tuple[str, ...]:
-    """Warn that no sensor can have such a calibration."""
-    quality = calibration.content["quality"]
-    if quality["plausible"]:
-        return ()
-    return (f"do not use this calibration: {'; '.join(quality['warnings'])}",)
-
-
-def _mended(calibration: Calibration, readings: Readings) -> tuple[str, ...]:
-    """Say that the calibration is of mended data, and whether readings were mended, too."""
-    mended = calibration.content.get("mended")
-    if mended is None:
-        return ()
-    warning = f"the calibration is of mended data: {mended['reason']}"
-    if mended["matrix"] is None:
-        return (warning,)
-    if np.array_equal(readings.mending, np.eye(3)):
-        return (f"{warning}; readings are converted by the options only, and are not mended",)
-    return (f"{warning}; readings are mended in the same way",)
-
-
-def _estimated(calibration: Calibration) -> tuple[str, ...]:
-    """Say how many sigmas hold 95 %, if its noise is hardly known."""
-    needed = calibration.content["sigmas_95"] or 0.0
-    if needed <= MANY_SIGMAS:
-        return ()
-    return (
-        "the noise in the sigmas of the calibration is hardly known: to hold 95 % of the errors it "
-        f"takes up to {needed:.2f} sigmas of roll and pitch",
-    )
 
 
 def _leveled(
@@ -240,132 +309,128 @@ def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
     return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
 
 
-class Account:
-    """What the user should know about a log that was leveled.
+def _check_forces(calibration: Calibration, readings: Readings) -> None:
+    """Raise `InputError` if no row is usable, or most readings are far from gravity."""
+    log, forces = readings.log, readings.forces
+    forces = forces[np.isfinite(forces).all(axis=1)]
+    if not len(forces):
+        why = _reason(calibration, readings, 0)
+        raise InputError(f"{log.path}: no row has three numbers; the first: {why}")
+    raw = forces / abs(float(log.conversion.scale[0]))
+    check_norm(f"{log.path}", raw, forces, log.layout.unit, calibration.gravity, REMEDIES)
 
-    Parameters
-    ----------
-    calibration : Calibration
-    readings : Readings
-    corrected : (n, 3) array, m/s² in frd, calibrated forces of the rows; NaN where there is none
-    near : (n,) bool array, rows that are too close to the roll pole for their sigmas
 
-    Attributes
-    ----------
-    rows : int
-    empty : int, rows without a calibrated force
+def _of_calibration(calibration: Calibration, readings: Readings) -> Iterator[str]:
+    """What the user should know about the calibration."""
+    quality = calibration.content["quality"]
+    if not quality["plausible"]:
+        yield f"do not use this calibration: {'; '.join(quality['warnings'])}"
+    if mended := calibration.content.get("mended"):
+        how = ""
+        if mended["matrix"] is not None:
+            how = "; readings are converted by the options only, and are not mended"
+            if readings.mended:
+                how = "; readings are mended in the same way"
+        yield f"the calibration is of mended data: {mended['reason']}{how}"
+    needed = calibration.content["sigmas_95"] or 0.0
+    if needed > MANY_SIGMAS:
+        yield (
+            "the noise in the sigmas of the calibration is hardly known: to hold 95 % of the "
+            f"errors it takes up to {needed:.2f} sigmas of roll and pitch"
+        )
 
-    Raises
-    ------
-    InputError
-        If no row is usable, or most readings are far from gravity.
-    """
 
-    def __init__(
-        self,
-        calibration: Calibration,
-        readings: Readings,
-        corrected: Array,
-        near: NDArray[np.bool_],
-    ) -> None:
-        self._calibration, self._readings = calibration, readings
-        self._empty = np.isnan(corrected[:, 0])
-        self.rows, self.empty = len(corrected), int(self._empty.sum())
-        self._near = int(near.sum())
-        norms = np.linalg.norm(readings.forces, axis=1)
-        norms = norms[np.isfinite(norms)]
-        if not len(norms):
-            path = readings.source.path
-            raise InputError(f"{path}: no row has three numbers; the first: {self._reason()}")
-        # Even bad sensors are wrong by some tenths only; larger differences come from motion.
-        gravity, time = calibration.gravity, readings.hold.time
-        if 2 * np.sum((norms < gravity / 2) | (norms > gravity * 2)) > len(norms):
-            raise self._wrong_unit()
-        self._after = 0
-        if calibration.drifts and time is not None:
-            self._after = int(np.sum(time > (1 + MARGIN) * self._session_end))
-        self._watch = Watch(calibration.ranges)
-        self._watch.look_at(corrected, readings.hold)
+def _assumptions(calibration: Calibration) -> Iterator[str]:
+    """Assumptions that are made if the user does not say when the log was started."""
+    needs = calibration.needs
+    warmed = {effect for effect, column in needs if column == "temperature"}
+    timed = [e for e, column in needs if column == "time" and e not in warmed]
+    lagging = [e for e, column in needs if column == "time" and e in warmed]
+    if lagging:
+        yield f"{short_list(lagging)}: assumes that the sensor has the temperature of row 1"
+    if timed:
+        yield (
+            f"{short_list(timed)}: assumes that the first row is the start of the calibration "
+            "session; if not, give the seconds between them by --start"
+        )
 
-    def assumptions(self) -> Iterator[str]:
-        """Assumptions that are made if the user does not say when the log was started."""
-        needs = self._calibration.needs
-        warmed = {effect for effect, column in needs if column == "temperature"}
-        timed = [e for e, column in needs if column == "time" and e not in warmed]
-        lagging = [e for e, column in needs if column == "time" and e in warmed]
-        if lagging:
-            yield f"{short_list(lagging)}: assumes that the sensor has the temperature of row 1"
-        if timed:
+
+def _of_log(
+    calibration: Calibration,
+    readings: Readings,
+    empty: NDArray[np.bool_],
+    near: NDArray[np.bool_],
+) -> Iterator[str]:
+    """What the user should know about the rows, of which some are empty or near the roll pole."""
+    of_all, time = f"of {counted(len(empty), 'row')}", readings.hold.time
+    yield from readings.log.source.warnings
+    if empty.any():
+        first = _reason(calibration, readings, int(np.argmax(empty)))
+        yield f"{empty.sum()} {of_all} have no calibrated force and get empty cells; {first}"
+    if near.any():
+        yield (
+            f"{near.sum()} {of_all} are too close to a pitch of "
+            f"±{quantity_text(np.pi / 2, 'rad')}, where roll has no meaning, for their sigmas "
+            f"of roll and pitch to hold ({NEAR_POLE} is true there); use the calibrated force"
+        )
+    end = calibration.ranges.get("time_s", [0.0, np.inf])[1]
+    if calibration.drifts and time is not None and (after := time > (1 + MARGIN) * end).any():
+        yield (
+            f"{short_list(calibration.drifts)}: kept constant after the end of the calibration "
+            f"session ({end:.0f} s), in {after.sum()} {of_all}"
+        )
+    sizes = dict(zip(calibration.model.parameter_names, calibration.parameters, strict=True))
+    moved = {effect for effect, column in calibration.needs if column.startswith("step_")}
+    for effect in calibration.model.effects:
+        if effect.name in moved:
+            each = [f"{p.name} = {quantity_text(sizes[p.name], p.unit)}" for p in effect.parameters]
             yield (
-                f"{short_list(timed)}: assumes that the first row is the start of the calibration "
-                "session; if not, give the seconds between them by --start"
-            )
-
-    def warnings(self) -> Iterator[str]:
-        """Warnings about the log."""
-        of_all = f"of {counted(self.rows, 'row')}"
-        yield from self._readings.source.warnings
-        if self.empty:
-            first = self._reason()
-            yield f"{self.empty} {of_all} have no calibrated force and get empty cells; {first}"
-        if self._near:
-            yield (
-                f"{self._near} {of_all} are too close to a pitch of "
-                f"±{quantity_text(np.pi / 2, 'rad')}, where roll has no meaning, for their sigmas "
-                f"of roll and pitch to hold ({NEAR_POLE} is true there); use the calibrated force"
-            )
-        if self._after:
-            yield (
-                f"{short_list(self._calibration.drifts)}: kept constant after the end of the "
-                f"calibration session ({self._session_end:.0f} s), in {self._after} {of_all}"
-            )
-        moved = dict.fromkeys(e for e, c in self._calibration.needs if c.startswith("step_"))
-        for name in moved:
-            yield (
-                f"{name} is not corrected ({self._sizes(name)}): it depends on the position "
+                f"{effect.name} is not corrected ({', '.join(each)}): it depends on the position "
                 "before, which a log does not have"
             )
-        yield from self._watch.warnings(self.rows)
 
-    @property
-    def _session_end(self) -> float:
-        return self._calibration.ranges.get("time_s", [0.0, np.inf])[1]
 
-    def _sizes(self, name: str) -> str:
-        model = self._calibration.model
-        values = dict(zip(model.parameter_names, self._calibration.parameters, strict=True))
-        (effect,) = (effect for effect in model.effects if effect.name == name)
-        return ", ".join(
-            f"{p.name} = {quantity_text(float(values[p.name]), p.unit)}" for p in effect.parameters
-        )
-
-    def _reason(self) -> str:
-        """Say why the first empty row is empty, and where it is."""
-        readings, source = self._readings, self._readings.source
-        row = int(np.argmax(self._empty))
-        keys = [key for key, values in readings.values.items() if not np.isfinite(values[row])]
-        if not keys and np.isnan(readings.forces[row]).any():  # it is absurd
-            keys = [max(AXES, key=lambda axis: abs(readings.values[axis][row]))]
-        # This reads the file again to find the line.
-        where, cell = source.look_up(row, readings.places[keys[0] if keys else "fx"])
-        if keys:
-            return f"{where}, column {source.names[readings.places[keys[0]]]} ({keys[0]}): {cell}"
-        full = self._calibration.content.get("range_mps2")
-        end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
-        return f"{where}: the calibration has no force for such a reading{end}"
-
-    def _wrong_unit(self) -> InputError:
-        readings, gravity = self._readings, self._calibration.gravity
-        forces = readings.forces[np.isfinite(readings.forces).all(axis=1)]
-        raw = forces / abs(float(readings.conversion.scale[0]))
-        fault = likely_fault(raw, forces, readings.unit, gravity)
-        looks = f"these look like {fault.cause}; give --unit {fault.cause}"
-        return InputError(
-            f"{readings.source.path}: the readings are about {fault.given:.3g} {readings.unit}: "
-            + (
-                looks
-                if fault.cause in SENSOR_UNITS
-                else "nowhere near gravity, "
-                f"{gravity:.3g} m/s²; give the --unit or the --columns of this log"
+def _beyond_ranges(
+    ranges: Mapping[str, list[float]], corrected: Array, hold: HoldConditions
+) -> Iterator[str]:
+    """Say how many rows, of forces (n, 3) in m/s², lie beyond the ranges of a calibration."""
+    columns = {
+        "temperature_degC": hold.temperature,
+        "vibration_mps2": hold.vibration,
+        **dict(zip(FORCES, corrected.T, strict=True)),
+    }
+    for what, unit, names in (
+        ("temperature", "°C", ["temperature_degC"]),
+        ("vibration", "m/s²", ["vibration_mps2"]),
+        ("specific force", "m/s²", [*FORCES]),
+    ):
+        values = [column for name in names if (column := columns[name]) is not None]
+        if not values or not {*names} <= ranges.keys():
+            continue
+        low, high = np.array([ranges[name] for name in names]).T[..., None]
+        # In parts of the width, so that axes can be compared; NaN does not count.
+        excess = np.fmax(low - values, values - high) / np.maximum(high - low, 1e-9)
+        beyond = excess > MARGIN
+        if beyond.any():
+            axis, row = np.unravel_index(np.nanargmax(excess), excess.shape)
+            way = f" {FORCES[names[axis]]}" if names[axis] in FORCES else ""
+            yield (
+                f"{what} outside the range of the calibration in {beyond.any(axis=0).sum()} of "
+                f"{counted(len(corrected), 'row')}: up to {values[axis][row]:.4g} {unit}{way}, "
+                f"while the calibration had {low[axis, 0]:.4g} to {high[axis, 0]:.4g}; it is "
+                "extrapolated there"
             )
-        )
+
+
+def _reason(calibration: Calibration, readings: Readings, row: int) -> str:
+    """Say why a row is empty, and where it is."""
+    log, rows = readings.log, readings.log.rows
+    needed = {condition for _, condition in calibration.needs}
+    lost = [key for key, missing in rows.lost.items() if missing[row]]
+    lost += [k for k, values in rows.conditions.items() if k in needed and np.isnan(values[row])]
+    if lost:
+        return log.describe(row, lost[0])
+    where, _ = log.source.look_up(row, log.places["fx"])
+    full = calibration.content.get("range_mps2")
+    end = "" if full is None else f", or it is at the end of the range, ± {full:.4g} m/s²"
+    return f"{where}: the calibration has no force for such a reading{end}"

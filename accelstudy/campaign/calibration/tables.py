@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-from collections import Counter
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,17 +17,6 @@ from accelstudy.files.parquet import write_parquet
 
 ROWS = 2**16
 """Rows that are worked on together, where what is made of them on the way takes memory."""
-
-
-def column_names(source: Source) -> list[str]:
-    """Names of the columns, all different: `column_0` … of a log without names."""
-    if not source.named:
-        return [f"column_{place}" for place in range(len(source.names))]
-    names, seen = [], Counter[str]()
-    for name in source.names:
-        names.append(f"{name}.{seen[name]}" if seen[name] else name)
-        seen[name] += 1
-    return names
 
 
 def infer_types(source: Source, table: pa.Table) -> pa.Table:

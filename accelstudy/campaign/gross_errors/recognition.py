@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
+from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.gross_errors.base import (
     EVERYWHERE,
     SINGLE,
@@ -21,7 +21,6 @@ from accelstudy.campaign.gross_errors.base import (
     gross_error_names,
 )
 from accelstudy.campaign.gross_errors.real_sensor import CLEARLY, SHOWS, RealSensor
-from accelstudy.leveling.angles import usual_norm
 
 if TYPE_CHECKING:
     from accelstudy.approaches import Approach
@@ -33,6 +32,8 @@ TOGETHER = 4
 """Largest number of gross errors of one rank that are looked for in a campaign."""
 GROSS = 0.1
 """Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
+REMEDIES = Remedies(*["correct the columns"] * 3)
+"""What to do about forces that no unit makes as large as gravity."""
 AS_GOOD = 1.25
 """Two explanations whose distances differ by less than this factor fit equally well; the simpler
 one is taken."""
@@ -113,7 +114,8 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     for rank in SINGLE:
         errors += _errors(rank, mended, attitude, mounted)
         mended = errors[-1][1].campaign if errors else campaign
-    _check_norm(mended)
+    where, forces = f"{campaign.name}: fx, fy, fz", mended.forces
+    check_norm(where, forces, forces, "m/s^2", campaign.gravity, REMEDIES)
     return Recognised(tuple(errors)) if errors else None
 
 
@@ -163,13 +165,3 @@ def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bo
         return bool(gained or before.usual > CLEARLY * after.usual)
     was, now = (np.median(sensor.distance[mending.changed]) for sensor in (before, after))
     return bool(was > max(CLEARLY * now, CLEARLY**2 * after.usual, SHOWS * before.gravity))
-
-
-def _check_norm(campaign: Campaign) -> None:
-    """Raise `InputError` if the forces differ from gravity by more than even a bad sensor does."""
-    norm = usual_norm(campaign.forces)
-    if not 0.5 < norm / campaign.gravity < 2:
-        raise InputError(
-            f"{campaign.name}: fx, fy, fz: their norm is about {norm:.3g} m/s^2, nowhere near "
-            f"gravity, {campaign.gravity:g} m/s^2, in no unit; correct the columns"
-        )

@@ -8,7 +8,7 @@ over τ for noise of any colour. For white noise both agree.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,79 +45,41 @@ class AllanDeviation:
         return AllanDeviation(self.tau, self.deviation[:, chosen], self.differences)
 
 
-@dataclass(frozen=True)
-class AllanMoments:
-    """What one record contributes to the Allan variance, for any direction.
-
-    Attributes
-    ----------
-    factors : tuple of int, numbers of samples averaged
-    squares : (k, c, c) array, sums of products of the channels' differences of neighbouring means
-    terms, independent : (k,) int arrays, differences, and how many of them are independent
-    """
-
-    factors: tuple[int, ...]
-    squares: Array
-    terms: NDArray[np.int_]
-    independent: NDArray[np.int_]
-
-    def turned(self, matrix: Array) -> AllanMoments:
-        """Moments of other channels, samples @ matrix, for a matrix (c, d)."""
-        return replace(self, squares=matrix.T @ self.squares @ matrix)
-
-
-def allan_moments(samples: ArrayLike) -> AllanMoments:
-    """Moments of a record without gaps, (n, c).
-
-    Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
-    the mean over all k (overlapping estimate; IEEE Std 1139).
-    """
-    samples = np.asarray(samples, dtype=float).reshape(len(np.asarray(samples)), -1)
-    channels = np.ascontiguousarray(samples.T)  # what goes along a channel is faster so
-    c, n = channels.shape
-    factors = averaging_factors(n // 2)
-    averaged = np.array(factors, dtype=int)
-    terms = n + 1 - 2 * averaged
-    centred = channels - channels.mean(axis=1, keepdims=True)
-    centred[(channels == channels[:, :1]).all(axis=1)] = 0.0  # not what rounding the mean leaves
-    sums = np.zeros((c, n + 1))
-    np.cumsum(centred, axis=1, out=sums[:, 1:])
-    squares = np.zeros((len(factors), c, c))
-    memory, differences = np.empty(n + 1), np.empty_like(sums)
-    for at, m in enumerate(factors):
-        for i in range(c):
-            first = np.subtract(sums[i, m:], sums[i, :-m], out=memory[: n + 1 - m])
-            second = np.subtract(first[m:], first[:-m], out=differences[i, : n + 1 - 2 * m])
-            for j in range(i + 1):
-                squares[at, i, j] = squares[at, j, i] = second @ differences[j, : len(second)]
-    squares /= 2.0 * averaged[:, None, None] ** 2
-    return AllanMoments(tuple(factors), squares, terms, n // averaged - 1)
-
-
 def pooled_deviation(
-    records: Sequence[AllanMoments], step: float, frames: Sequence[Array] | None = None
+    records: Sequence[Array], step: float, frames: Sequence[Array] | None = None
 ) -> AllanDeviation:
     """Allan deviation of all records of one sensor together; records may be short.
 
+    Over m samples: σ²(τ) = ⟨(S[k + 2m] − 2 S[k + m] + S[k])²⟩ / (2 m²), S the running sum, and
+    the mean over all k (overlapping estimate; IEEE Std 1139).
+
     Parameters
     ----------
-    records : sequence of AllanMoments
+    records : sequence of (n, c) arrays without gaps
     step : float, s, between samples
     frames : sequence of (c, c) arrays, optional
         For each record, to the columns of which its channels are turned.
     """
+    arrays = [np.asarray(record, dtype=float).reshape(len(record), -1) for record in records]
     # The averaging times of a short record are the first ones of a long one.
-    factors = max((record.factors for record in records), key=len)
-    squares = np.zeros((len(factors), records[0].squares.shape[1]))
+    factors = np.array(averaging_factors(max(map(len, arrays)) // 2), dtype=int)
+    squares = np.zeros((len(factors), arrays[0].shape[1]))
     terms, independent = np.zeros((2, len(factors)), dtype=int)
-    for i, record in enumerate(records):
-        k = len(record.factors)
-        turned = record if frames is None else record.turned(frames[i])
-        squares[:k] += np.diagonal(turned.squares, axis1=1, axis2=2)
-        terms[:k] += record.terms
-        independent[:k] += record.independent
+    for i, record in enumerate(arrays):
+        centred = record - record.mean(axis=0)
+        centred[:, (record == record[:1]).all(axis=0)] = 0.0  # not what rounding the mean leaves
+        turned = centred if frames is None else centred @ frames[i]
+        sums = np.zeros((turned.shape[1], len(record) + 1))
+        np.cumsum(turned.T, axis=1, out=sums[:, 1:])
+        k = np.searchsorted(factors, len(record) // 2, side="right")
+        for at, m in enumerate(factors[:k]):
+            first = sums[:, m:] - sums[:, :-m]
+            second = first[:, m:] - first[:, :-m]
+            squares[at] += np.einsum("cn,cn->c", second, second) / (2.0 * m**2)
+        terms[:k] += len(record) + 1 - 2 * factors[:k]
+        independent[:k] += len(record) // factors[:k] - 1
     deviation = np.sqrt(squares / terms[:, None])
-    return AllanDeviation(step * np.array(factors, dtype=float), deviation, independent)
+    return AllanDeviation(step * factors.astype(float), deviation, independent)
 
 
 def averaging_factors(largest: int) -> list[int]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.recording import Log, Recording
-from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation, find_saturated
+from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.segments import Segment, Segmentation, find_saturated
+from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import FACTOR, Threshold, Windows, threshold_of
 
 Array = NDArray[np.float64]
@@ -24,26 +25,17 @@ RESTLESS = 10.0
 moves: a hand that trembles makes some five of it, a turn by a few degrees dozens."""
 
 
-def segment_blocks(
-    log: Recording, size: int | None, threshold: float | None, full_range: float
-) -> tuple[Windows, Threshold, Segmentation]:
+def segment_blocks(log: Recording, settings: ImportSettings) -> Segmentation:
     """Make each block of a log a position; those in which the sensor moves are to be left out.
 
-    The blocks have so many samples, or are the parts of the log.
-
-    Parameters
-    ----------
-    log : Log or LogSeries
-    size : int, samples of each position; None if each part of a LogSeries is one
-    threshold : float, m/s², scatter of the parts of a block up to which it is at rest; chosen from
-        the data if None
-    full_range : float, m/s², the sensor measures ± this
+    The blocks have as many samples as the settings say, or are the files of the log.
 
     Raises
     ------
     InputError
         If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
+    size, threshold = settings.block, settings.threshold_mps2
     block = log.samples.recording if size is None else _blocks(log, size)
     first = np.flatnonzero(np.diff(block, prepend=-1))
     edges = [*first.tolist(), len(block)]
@@ -54,7 +46,7 @@ def segment_blocks(
     # Blocks of which most is left out are no positions, which the report says.
     blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
     windows = Windows(log, (least // 2) | 1)
-    full = find_saturated(windows, [*blocks.values()], full_range)
+    full = find_saturated(windows, [*blocks.values()], settings.full_range)
     left_out = {n: "the sensor is saturated" for n, f in zip(blocks, full, strict=True) if f}
     scatter = {
         n: _scatter(log.samples.forces[each]) for n, each in blocks.items() if n not in left_out
@@ -72,8 +64,7 @@ def segment_blocks(
         if each > chosen.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
     segments = {n: Segment.of(log.samples, each) for n, each in blocks.items()}
-    envelope = Envelope(windows)
-    return windows, chosen, Segmentation(segments, 0, 0, (), envelope, left_out, least)
+    return Segmentation(windows, chosen, segments, left_out=left_out, size=least)
 
 
 def _scatter(forces: Array) -> float:
@@ -84,8 +75,7 @@ def _scatter(forces: Array) -> float:
 
 def _blocks(log: Recording, size: int) -> NDArray[np.int_]:
     """Block of each sample, from 0; a row that is left out counts as well."""
-    assert isinstance(log, Log)
-    total, row = log.losses.rows, log.samples.row
+    total, row = len(log.first.rows.forces), log.samples.row
     fewer = total // size * size
     if len(row) and row[-1] >= fewer:  # a note at the end is no sample
         raise InputError(

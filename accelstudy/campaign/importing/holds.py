@@ -24,16 +24,19 @@ from accelstudy.campaign.importing.allan import (
     accuracy_of_mean,
     pooled_deviation,
 )
+from accelstudy.campaign.importing.recording import Samples
 from accelstudy.campaign.importing.resolution import rounding_of_mean
 from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation
-from accelstudy.campaign.importing.settings import Selection
-from accelstudy.campaign.importing.windows import RESTLESS, Threshold, Windows
+from accelstudy.campaign.importing.settings import ImportSettings, Selection
+from accelstudy.campaign.importing.windows import RESTLESS, Threshold, usual_window
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 
 _ALIKE = 1.5  # largest over smallest norm of the means of one sensor in gravity
 _SPREAD = 0.25  # rms of the means along their thinnest direction, over gravity; of a sphere 0.58
+LONGEST_RECORD = 2**20
+"""Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 SLOW = 2.0
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand."""
@@ -171,13 +174,8 @@ class DetectedHolds:
 
 
 def detected_holds(
-    windows: Windows,
-    threshold: Threshold,
     segmentation: Segmentation,
-    selection: Selection,
-    window: float,
-    trim: float,
-    shortest: float,
+    settings: ImportSettings,
 ) -> DetectedHolds:
     """Collect the holds of one sensor, as they were found with these settings.
 
@@ -186,7 +184,9 @@ def detected_holds(
     InputError
         If nothing is at rest, a person leaves all of it out, or the sensor was never still.
     """
-    log = windows.log
+    windows, threshold = segmentation.windows, segmentation.threshold
+    log, shortest = windows.log, settings.shortest_s
+    window, trim = settings.window_s or usual_window(log), settings.trim_s
 
     def never_still(why: str) -> InputError:
         if segmentation.size is not None:
@@ -226,8 +226,8 @@ def detected_holds(
             f"{threshold.sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
         )
     warnings += _too_short(segmentation.short, window, trim, shortest)
-    segments = _joined(segmentation.segments, selection, threshold.sd)
-    left_out = {**segmentation.left_out, **_left_out(segments, selection)}
+    segments = _joined(segmentation.segments, settings.selection, threshold.sd, log.samples)
+    left_out = {**segmentation.left_out, **_left_out(segments, settings.selection)}
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
         why = f"exclude: no {'hold' if segmentation.size is None else 'block'} is left"
@@ -240,7 +240,7 @@ def detected_holds(
         threshold=threshold,
         step=log.step,
         resolution=windows.steps,
-        envelope=segmentation.envelope,
+        envelope=Envelope(windows),
         warnings=tuple(warnings),
         size=segmentation.size,
     )
@@ -269,7 +269,7 @@ def _too_short(rests: Sequence[float], window: float, trim: float, shortest: flo
 
 
 def _joined(
-    segments: Mapping[int, Segment], selection: Selection, alike: float
+    segments: Mapping[int, Segment], selection: Selection, alike: float, samples: Samples
 ) -> dict[int, Segment]:
     """Join holds; they keep the number of the first.
 
@@ -278,6 +278,7 @@ def _joined(
     segments : mapping of int to Segment
     selection : Selection
     alike : float, m/s², by which the means of holds in one attitude may differ
+    samples : Samples, of the log
 
     Raises
     ------
@@ -304,7 +305,8 @@ def _joined(
                     f"join: holds {group[0]} and {number} differ by {step:.2g} m/s²: the "
                     "sensor was turned between them"
                 )
-            holds[group[0]] = holds[group[0]] + holds.pop(number)
+            parts = *holds[group[0]].parts, *holds.pop(number).parts
+            holds[group[0]] = Segment.of(samples, *parts)
     return holds
 
 
@@ -357,7 +359,11 @@ def hold_noise(segments: Sequence[Segment], step: float, resolution: ArrayLike =
         for segment, frame in zip(segments, frames, strict=True)
     ]
     sd = np.sqrt(np.mean(variances, axis=0))
-    records = [(r, f) for s, f in zip(segments, frames, strict=True) for r in s.noise]
+    records = [
+        (record[:LONGEST_RECORD], frame)
+        for segment, frame in zip(segments, frames, strict=True)
+        for record in segment.records
+    ]
     allan = pooled_deviation([r for r, _ in records], step, [f for _, f in records])
     typical = int(np.median([segment.n for segment in segments]))
     of_sensor = slice(0, 1 if directed else 3)
@@ -374,10 +380,11 @@ def hold_noise(segments: Sequence[Segment], step: float, resolution: ArrayLike =
 
 def _conditions(segments: Sequence[Segment], names: Sequence[str]) -> dict[str, Array]:
     """Mean temperature and rms vibration of holds."""
-    count, total, squares = np.array([s.conditions for s in segments]).transpose(1, 0, 2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        values = {"temperature": total / count, "vibration": np.sqrt(squares / count)}
-    return {name: values[name][:, i] for i, name in enumerate(names)}
+    which = {"temperature": 0, "vibration": 1}
+    return {
+        name: np.array([segment.conditions[which[name], i] for segment in segments])
+        for i, name in enumerate(names)
+    }
 
 
 def _center(means: Array) -> tuple[Array, bool]:

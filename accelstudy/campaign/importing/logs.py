@@ -5,86 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.blocks import segment_blocks
 from accelstudy.campaign.importing.holds import DetectedHolds, detected_holds
 from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.recording import (
-    AXES,
-    Log,
-    LogSeries,
-    Recording,
-    open_log,
-    told_by_names,
-)
-from accelstudy.campaign.importing.segments import Segment, segment_logs
-from accelstudy.campaign.importing.settings import (
-    ImportSettings,
-    Selection,
-    named_after,
-    parse_selection,
-)
-from accelstudy.campaign.importing.sources import LogFile, Source
-from accelstudy.campaign.importing.windows import Windows, samples_in, threshold_of, usual_window
+from accelstudy.campaign.importing.recording import AXES, Recording, read_log
+from accelstudy.campaign.importing.segments import segment_logs
+from accelstudy.campaign.importing.settings import ImportSettings, named_after
+from accelstudy.campaign.importing.sources import LogFile
+from accelstudy.campaign.importing.windows import Windows, samples_in, usual_window
 from accelstudy.campaign.session import Campaign
-from accelstudy.files.reading import overlay
 
-
-class TellsAngles(Protocol):
-    """A sensor beside those of the logs, as `accelstudy.campaign.beside` has it."""
-
-    def averaged(
-        self, log: Log, holds: DetectedHolds, gravity: float
-    ) -> tuple[DetectedHolds, list[Segment]]:
-        """Average its log in the holds; without those that it does not cover."""
-
-    def beside(
-        self, campaign: Campaign, report: ImportReport, segments: list[Segment], log: Log
-    ) -> tuple[Campaign, ImportReport]:
-        """Give a campaign roll and pitch of its holds."""
-
-
-def log_of(path: LogFile, settings: ImportSettings, untimed: bool = False) -> Log:
-    """Open a log by the settings; see `open_log` for `untimed`."""
-    source = open_source(path, settings.variable, settings.delimiter)
-    settings = as_its_format(settings, source)
-    return open_layout(path, settings, source, untimed or settings.block is not None)
-
-
-def open_layout(path: LogFile, layout: LogLayout, source: Source, untimed: bool = False) -> Log:
-    """Open a log by its layout; see `open_log` for `untimed`."""
-    return open_log(
-        path,
-        columns=layout.columns,
-        time=layout.time,
-        rate=layout.rate_hz,
-        untimed=untimed,
-        unit=layout.unit,
-        scale=layout.scale,
-        offset=layout.offset,
-        time_unit=layout.time_unit,
-        variable=layout.variable,
-        delimiter=layout.delimiter,
-        frame=layout.axes,
-        source=source,
-    )
-
-
-def as_its_format(settings: ImportSettings, source: Source) -> ImportSettings:
-    """Settings with what the format of a log says, where they do not say it."""
-    given = settings.model_dump(exclude_unset=True)
-    own = {**told_by_names(source, settings.columns, settings.time)}
-    if "rate_hz" in given:
-        own.pop("time", None)
-    return ImportSettings.model_validate(overlay(own, given))
+if TYPE_CHECKING:
+    from accelstudy.campaign.beside import Beside
 
 
 def import_log(
@@ -98,7 +35,7 @@ def import_log(
 def import_all(
     paths: Sequence[LogFile],
     settings: ImportSettings,
-    beside: TellsAngles | None = None,
+    beside: Beside | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import a table of means, or find the static holds of logs; see `import_sensors`."""
     if not settings.means:
@@ -119,7 +56,7 @@ def import_all(
 def import_sensors(
     paths: Sequence[LogFile],
     settings: ImportSettings,
-    beside: TellsAngles | None = None,
+    beside: Beside | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Find the static holds of the sensors in a log, or in logs of one position each.
 
@@ -128,7 +65,7 @@ def import_sensors(
     paths : raw logs, see `open_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
-    beside : TellsAngles, optional, a calibrated sensor on the same plate, whose roll and pitch the
+    beside : Beside, optional, a calibrated sensor on the same plate, whose roll and pitch the
         campaigns get
 
     Returns
@@ -154,28 +91,16 @@ def import_sensors(
             raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
         return _import_blocks(paths, chosen)
     logs = _turned_together({name: _recording(paths, each) for name, each in chosen.items()})
-    chosen = {name: as_its_format(each, _source(logs[name])) for name, each in chosen.items()}
-    if any(isinstance(log, LogSeries) and _whole_files(log, settings) for log in logs.values()):
+    if len(paths) > 1 and any(_whole_files(log, settings) for log in logs.values()):
         return _import_blocks(paths, chosen)
-    detected = find_joint_holds(
-        list(logs.values()),
-        window=settings.window_s,
-        threshold=settings.threshold_mps2,
-        trim=settings.trim_s,
-        shortest=settings.shortest_s,
-        full_range=_full_range(settings),
-        selection=parse_selection(settings.exclude, settings.join),
-        one_each=len(paths) > 1,
-    )
+    detected = find_joint_holds(list(logs.values()), settings, one_each=len(paths) > 1)
     result = {}
-    for (name, each), holds in zip(chosen.items(), detected, strict=True):
+    for (name, log), holds in zip(logs.items(), detected, strict=True):
         if beside is None:
-            result[name] = campaign_of_holds(paths, each, logs[name], holds)
+            result[name] = campaign_of_holds(log, holds)
             continue
-        log, g = _parts(logs[name])[0], each.gravity.value_mps2
-        covered, segments = beside.averaged(log, holds, g)
-        made = campaign_of_holds(paths, each, log, covered)
-        result[name] = beside.beside(*made, segments, log)
+        covered, segments = beside.averaged(log, holds, settings.gravity.value_mps2)
+        result[name] = beside.beside(*campaign_of_holds(log, covered), segments, log)
     return result
 
 
@@ -186,20 +111,14 @@ def _import_blocks(
     result = {}
     for name, each in chosen.items():
         log = _recording(paths, each)
-        each = as_its_format(each, _source(log))
-        selection = parse_selection(each.exclude, each.join)
-        if "time" not in _parts(log)[0].places and (selection.spans or selection.joined_spans):
+        timed = "time" in log.first.places
+        if not timed and (each.selection.spans or each.selection.joined_spans):
             raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
-        windows, threshold, blocks = segment_blocks(
-            log, each.block, each.threshold_mps2, _full_range(each)
-        )
-        window = windows.width * log.step
-        holds = detected_holds(windows, threshold, blocks, selection, window, 0.0, 0.0)
-        result[name] = campaign_of_holds(paths, each, log, holds)
+        result[name] = campaign_of_holds(log, detected_holds(segment_blocks(log, each), each))
     return result
 
 
-def _whole_files(log: LogSeries, settings: ImportSettings) -> bool:
+def _whole_files(log: Recording, settings: ImportSettings) -> bool:
     """Whether files of one position each have no rate, or all are too short to find a hold in."""
     if settings.rate_hz is None and any("time" not in part.places for part in log.parts):
         return True
@@ -209,32 +128,17 @@ def _whole_files(log: LogSeries, settings: ImportSettings) -> bool:
 
 
 def find_joint_holds(
-    logs: Sequence[Recording],
-    *,
-    window: float | None = None,
-    threshold: float | None = None,
-    trim: float = 0.2,
-    shortest: float = 1.0,
-    full_range: float = np.inf,
-    selection: Selection | None = None,
-    one_each: bool = False,
+    logs: Sequence[Recording], settings: ImportSettings, one_each: bool = False
 ) -> list[DetectedHolds]:
     """Find the static holds of sensors that were turned together.
 
     The sensors are on one body. So a hold is where all of them rest, and has the same number for
-    all.
+    all. It begins and ends half a window inside the samples at rest.
 
     Parameters
     ----------
     logs : sequence of Recording, one for each sensor, of simultaneous samples
-    window : float, s, length of the sliding window, see `usual_window`; a hold begins and ends half
-        a window inside the samples at rest
-    threshold : float, m/s², standard deviation of a window up to which it is at rest; chosen from
-        the data of each sensor if omitted
-    trim : float, s, cut off in addition at both ends of a hold
-    shortest : float, s, least length of what is left
-    full_range : float, m/s², the sensors measure ± this
-    selection : Selection, holds that a person leaves out or joins
+    settings : ImportSettings, of which those of the holds count
     one_each : bool, whether the logs have several recordings with one position each: the longest
         hold, which gets the number of the recording
 
@@ -249,16 +153,9 @@ def find_joint_holds(
         If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
         was never still.
     """
-    window = window or usual_window(logs[0])
-    width = samples_in(logs[0], window)
+    width = samples_in(logs[0], settings.window_s or usual_window(logs[0]))
     windows = [Windows(log, width) for log in logs]
-    thresholds = [threshold_of(each, threshold) for each in windows]
-    segmentations = segment_logs(windows, thresholds, trim, shortest, full_range, one_each)
-    selection = selection or Selection()
-    return [
-        detected_holds(*each, selection, window, trim, shortest)
-        for each in zip(windows, thresholds, segmentations, strict=True)
-    ]
+    return [detected_holds(each, settings) for each in segment_logs(windows, settings, one_each)]
 
 
 def import_to(
@@ -275,7 +172,7 @@ def import_each(
     paths: Sequence[LogFile],
     settings: ImportSettings,
     figure: bool = True,
-    beside: TellsAngles | None = None,
+    beside: Beside | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Import logs, or a table of means, and write the campaigns to folders.
 
@@ -323,36 +220,20 @@ def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     }
 
 
-def _recording(paths: Sequence[LogFile], settings: ImportSettings) -> Log | LogSeries:
-    parts = [log_of(path, settings, untimed=len(paths) > 1) for path in paths]
-    if len(parts) == 1:
-        return parts[0]
-    return LogSeries([replace(part, lively=False) for part in parts])
+def _recording(paths: Sequence[LogFile], settings: ImportSettings) -> Recording:
+    several = len(paths) > 1
+    parts = [read_log(path, settings, untimed=several or bool(settings.block)) for path in paths]
+    return Recording([replace(part, lively=not several) for part in parts])
 
 
-def _turned_together(logs: dict[str, Log | LogSeries]) -> dict[str, Log | LogSeries]:
+def _turned_together(logs: dict[str, Recording]) -> dict[str, Recording]:
     """Logs of sensors in one file, of which a row that lacks a reading of one is no row of any."""
-    result = dict(logs)
-    for name, log in logs.items() if len(logs) > 1 else ():
+    result = {}
+    for name, log in logs.items():
         parts = []
-        for i, part in enumerate(_parts(log)):
-            others = {other: _parts(logs[other])[i].places for other in logs if other != name}
+        for i, part in enumerate(log.parts):
+            others = {other: logs[other].parts[i].places for other in logs if other != name}
             beside = {f"{other}: {axis}": at[axis] for other, at in others.items() for axis in AXES}
             parts.append(replace(part, beside=beside))
-        result[name] = LogSeries(parts) if isinstance(log, LogSeries) else parts[0]
+        result[name] = Recording(parts)
     return result
-
-
-def _parts(log: Log | LogSeries) -> Sequence[Log]:
-    return log.parts if isinstance(log, LogSeries) else [log]
-
-
-def _source(log: Log | LogSeries) -> Source:
-    return _parts(log)[0].source
-
-
-def _full_range(settings: ImportSettings) -> float:
-    """Range of the sensor; infinite if it is unknown, or if the offset of counts is."""
-    if settings.range_mps2 is None or (settings.unit == "counts" and settings.offset is None):
-        return np.inf
-    return settings.range_mps2

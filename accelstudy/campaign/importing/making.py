@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import counted, short_list
-from accelstudy.campaign.checks import likely_fault
+from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.allan import MeanAccuracy
 from accelstudy.campaign.importing.holds import DetectedHolds
 from accelstudy.campaign.importing.names import thermometers
-from accelstudy.campaign.importing.recording import AXES, Log, LogSeries, Recording
+from accelstudy.campaign.importing.recording import AXES, Log, Recording
 from accelstudy.campaign.importing.resolution import steps_text
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.sources import LogFile, Source
+from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -34,6 +33,13 @@ sensor turns within its holds."""
 
 COUNTS = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
+
+REMEDIES = Remedies(
+    unit="give --unit {unit}, and --scale if these are counts",
+    gravity="give --gravity",
+    other="give other --unit, --scale, --offset or --columns",
+)
+"""What to do about forces that are not as large as gravity."""
 
 
 @dataclass(frozen=True)
@@ -106,12 +112,12 @@ def shown(sigma: float) -> str:
     return f"{1e3 * sigma:.3g} mm/s²"
 
 
-def campaign_of_holds(
-    paths: Sequence[LogFile], settings: ImportSettings, log: Recording, holds: DetectedHolds
-) -> tuple[Campaign, ImportReport]:
+def campaign_of_holds(log: Recording, holds: DetectedHolds) -> tuple[Campaign, ImportReport]:
     """Make the campaign of the holds of one sensor, and its report."""
+    first, settings = log.first, log.first.layout
+    assert isinstance(settings, ImportSettings)
     warnings = [*holds.warnings, *_doubts(holds, settings.gravity.value_mps2)]
-    notes = []
+    notes = [*_recognised(first)]
     if settings.frame != "frd":
         notes.append(
             f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
@@ -121,30 +127,23 @@ def campaign_of_holds(
         settings, offset, note = _with_offset(settings, holds)
         forces, holds = forces - offset, replace(holds, envelope=holds.envelope.less(offset))
         notes += note
-    first, time = log, (holds.t0 + holds.t1) / 2
-    if isinstance(log, LogSeries):
-        first = log.parts[0]
-        notes.append(
-            f"files: {len(log.parts)}, "
-            + (
+    several = len(log.parts) > 1
+    if several:
+        of_each = "each as a whole one position"
+        if holds.size is None:
+            of_each = (
                 "with the longest hold of each as one position; what is before and after it does "
                 "not count"
-                if holds.size is None
-                else "each as a whole one position"
             )
-            + ("" if log.timed else "; the times of the files do not tell that of a position")
-        )
-        missing = [i for i in range(1, len(paths) + 1) if i not in holds.segments]
-        warnings += [f"{paths[i - 1]}: no static hold; position {i} is missing" for i in missing]
-    assert isinstance(first, Log)
-    parts = log.parts if isinstance(log, LogSeries) else [first]
-    notes = [*_recognised(settings, first), *notes]
-    warnings += [warning for part in parts for warning in part.warnings()]
+        untold = "" if log.timed else "; the times of the files do not tell that of a position"
+        notes.append(f"files: {len(log.parts)}, {of_each}{untold}")
+        for i, part in enumerate(log.parts, 1):
+            if i not in holds.segments:
+                warnings.append(f"{part.path}: no static hold; position {i} is missing")
+    warnings += [warning for part in log.parts for warning in part.warnings()]
     columns: dict[str, Any] = {}
-    if (holds.size is None or "time" in first.places) and (
-        not isinstance(log, LogSeries) or log.timed
-    ):
-        columns["time"] = time
+    if (holds.size is None or "time" in first.places) and (not several or log.timed):
+        columns["time"] = (holds.t0 + holds.t1) / 2
     for name, values in holds.conditions.items():
         if np.isfinite(values).all():
             columns[name] = values
@@ -153,7 +152,7 @@ def campaign_of_holds(
             warnings.append(f"hold {hold} has no {name}; the column is left out")
     warnings += far_from_gravity(settings, forces)
     campaign = imported_campaign(
-        paths[0],
+        log.path,
         settings,
         forces,
         positions=holds.number,
@@ -162,7 +161,7 @@ def campaign_of_holds(
         resolution=holds.resolution if _rounds(holds) else None,
         n_samples=holds.n_samples,
         sd=holds.of_each("sd"),
-        log=layout_of(settings, first.source, first.places),
+        log=_layout_of(settings, first),
         warnings=tuple(warnings),
         **columns,
     ).without(holds.left_out)
@@ -173,22 +172,19 @@ def campaign_of_holds(
     return campaign, report
 
 
-def _recognised(settings: ImportSettings, log: Log) -> Iterator[str]:
+def _recognised(log: Log) -> Iterator[str]:
     """How the columns of a log were taken."""
     names = [name if log.source.named else f"column {name}" for name in log.source.names]
     used = {key: names[place] for key, place in log.places.items()}
-    unused = [
-        name
-        for place, name in enumerate(names)
-        if place not in {*log.places.values(), *log.beside.values()}
-    ]
+    taken = {*log.places.values(), *log.beside.values()}
+    unused = [name for place, name in enumerate(names) if place not in taken]
     forces = ", ".join(used[axis] for axis in AXES)
     time = f"time from {used['time']}, " if "time" in used else ""
     if time and log.places["time"] not in log.source.dates:
-        time = f"time from {used['time']} ({settings.time_unit}), "
+        time = f"time from {used['time']} ({log.layout.time_unit}), "
     conditions = "".join(f", {key} from {used[key]}" for key in log.conditions)
     yield (
-        f"columns: {time}forces from {forces} ({settings.unit}){conditions}"
+        f"columns: {time}forces from {forces} ({log.layout.unit}){conditions}"
         + (f"; not used: {short_list(unused)}" if unused else "")
     )
     if "temperature" not in used and (heat := thermometers(log.source.names)):
@@ -262,7 +258,7 @@ def imported_campaign(
     if settings.unit == "counts":
         scale = frame.rearranged(conversion.scale) * frame.signs
         nominal = Conversion(scale, frame.rearranged(conversion.offset))
-    _check_size(path, settings, raw, forces)
+    check_norm(f"{path}", raw, forces, settings.unit, settings.gravity.value_mps2, REMEDIES)
     return Campaign(
         **{
             "name": settings.name,
@@ -279,26 +275,6 @@ def imported_campaign(
     )
 
 
-def _check_size(path: LogFile, settings: ImportSettings, raw: Array, forces: Array) -> None:
-    """Check that forces are roughly as large as gravity; the error names the options to change."""
-    gravity, unit = settings.gravity.value_mps2, settings.unit
-    cause, given, norm = likely_fault(raw, forces, unit, gravity)
-    if cause is None:
-        return
-    at_rest = f"{path}: at rest the forces are about {given:.3g} {unit}"
-    if cause == "gravity":
-        raise InputError(
-            f"{at_rest}, which does not fit a gravity of {gravity:g} m/s²; give --gravity"
-        )
-    if cause == "counts":
-        raise InputError(f"{at_rest}: these look like counts; give --unit counts and --scale")
-    if cause != "unknown":
-        raise InputError(f"{at_rest}: these look like {cause}; give --unit {cause}")
-    advice = "--scale and --offset" if unit == "counts" else "--unit or --columns"
-    converted = f", by --scale and --offset {norm:.3g} m/s²," if unit == "counts" else ","
-    raise InputError(f"{at_rest}{converted} which is nowhere near gravity; give other {advice}")
-
-
 def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
     """Warn if forces (n, 3), m/s², at rest differ from gravity by more than a scale error can."""
     norm, gravity = usual_norm(forces), settings.gravity.value_mps2
@@ -313,15 +289,15 @@ def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
     ]
 
 
-def layout_of(settings: LogLayout, source: Source, places: Mapping[str, int]) -> LogLayout:
+def _layout_of(settings: LogLayout, log: Log) -> LogLayout:
     """How a log was read, with all its columns, by name if it has names."""
 
     def column(key: str) -> Place:
-        place = places[key]
-        name = source.names[place]
-        return name if source.named and name and source.names.count(name) == 1 else place
+        place = log.places[key]
+        name = log.source.names[place]
+        return name if log.source.named and name and log.source.names.count(name) == 1 else place
 
     layout = settings.model_dump(include=set(LogLayout.model_fields))
-    time = column("time") if "time" in places else None
-    columns = {key: column(key) for key in places if key not in ("time", "nanoseconds")}
+    time = column("time") if "time" in log.places else None
+    columns = {key: column(key) for key in log.places if key not in ("time", "nanoseconds")}
     return LogLayout.model_validate({**layout, "columns": columns, "time": time})

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import MGON, ROBOT_UNITS, UNITS
-from accelstudy.campaign.checks import clearly_worse, misfit_of_angles
+from accelstudy.basics.units import MGON, UNITS
+from accelstudy.campaign.checks import OPPOSITE, better_angles
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.making import (
     ImportReport,
@@ -94,9 +94,15 @@ def import_means(
         warnings=tuple(warnings),
     )
     if settings.robot is not None:
-        unit, signs = UNITS["rad"][settings.robot.unit], frame.signs
+        given, signs = settings.robot.unit, frame.signs
+        unit = UNITS["rad"][given]
         angles = np.column_stack([values[key] for key in ANGLES]) * signs[:2]
-        _check_angles(path, angles, settings.robot.unit, campaign)
+        if better := better_angles(angles, given, campaign.forces, campaign.gravity):
+            right = "another --frame" if better == OPPOSITE else f"--robot-unit {better}"
+            raise InputError(
+                f"{path}: the robot's angles do not fit the forces in {given}; {right} would be "
+                "right"
+            )
         yaw = values.get("yaw")
         campaign = replace(
             campaign,
@@ -165,19 +171,3 @@ def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array]
         time, first = counted_from_first(columns[[*places].index("time")])
         values["time"] = (time + (first if abs(first * factor) < _YEARS else 0.0)) * factor
     return values, warnings
-
-
-def _check_angles(path: LogFile, angles: Array, unit: str, campaign: Campaign) -> None:
-    """Check that no other unit or frame fits the forces clearly better, for angles (n, 2)."""
-
-    def misfit(unit: str, sign: int = 1) -> float:
-        given = angles * UNITS["rad"][unit]
-        return misfit_of_angles(given, sign * campaign.forces, campaign.gravity)
-
-    others = {f"--robot-unit {name}": misfit(name) for name in ROBOT_UNITS if name != unit}
-    others["another --frame"] = misfit(unit, -1)
-    best = min(others, key=lambda option: others[option])
-    if clearly_worse(misfit(unit), others[best]):
-        raise InputError(
-            f"{path}: the robot's angles do not fit the forces in {unit}; {best} would be right"
-        )

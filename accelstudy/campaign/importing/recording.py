@@ -8,18 +8,19 @@ forces in m/s². An error is one line with its place in the file.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
 from accelstudy.basics.wording import counted, short_list
+from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.names import (
     places_by_name,
     unit_in,
@@ -27,13 +28,13 @@ from accelstudy.campaign.importing.names import (
 )
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
+from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
-from accelstudy.sensors.frames import FRD, Frame
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 Array = NDArray[np.float64]
-
-Column = str | int
-"""A column by its name in the header, or by its place, counted from 0."""
 
 AXES = ("fx", "fy", "fz")
 
@@ -79,91 +80,121 @@ class Samples(NamedTuple):
     recording: NDArray[np.int_]
 
 
-def open_log(
+def read_log(
     path: LogFile,
+    layout: LogLayout | None = None,
     *,
-    columns: Mapping[str, Column] | None = None,
-    time: Column | None = None,
-    rate: float | None = None,
+    like: LogLayout | None = None,
+    conditions: Collection[str] = ("time", *CONDITIONS),
     untimed: bool = False,
-    unit: str = "m/s^2",
-    scale: ArrayLike | None = None,
-    offset: ArrayLike | None = None,
-    time_unit: str = "s",
-    variable: str | None = None,
-    delimiter: str | None = None,
-    frame: Frame = FRD,
-    source: Source | None = None,
 ) -> Log:
-    """Find out how a log is laid out.
+    """Find out how a log is laid out; its numbers are read when they are first asked for.
+
+    What `layout` says counts before what the format of the file and the names of its columns say,
+    and this before how another log of the sensor was read. A log with the columns of that other one
+    is read as it was.
 
     Parameters
     ----------
     path : anything that `open_source` opens
-    columns : mapping of "fx", "fy", "fz", "temperature" and "vibration" to columns; by their names
-        in the header if omitted, or the only three columns there are. The last two may be absent.
-    time : column of time; by its name in the header if omitted
-    rate : float, samples per second, instead of a column of time
-    untimed : bool, whether a log may have neither; its times are numbers of samples then
-    unit : "m/s^2", "g", "mg" or "counts"
-    scale, offset : number or (3,), with counts only: f = (raw − offset) · scale, in m/s²
-    time_unit : "s", "ms", "us" or "ns"
-    variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
-    delimiter : str, between the columns of a text, see `LogLayout`
-    frame : Frame, the axes of the log
-    source : Source, the file if it is open already
+    layout : LogLayout, of which the keys that were given count
+    like : LogLayout, how another log of the sensor was read
+    conditions : names of what to look for beside the forces; time and `CONDITIONS` by default
+    untimed : bool, whether a log may have neither a time nor a rate; its times are numbers of
+        samples then
 
     Raises
     ------
     InputError
         If the file cannot be read or lacks a column.
     """
-    conversion = conversion_of(unit, scale, offset)
-    if time_unit not in CLOCK_UNITS:
-        raise UnknownNameError("unit of time", time_unit, CLOCK_UNITS)
-    if rate is not None and time is not None:
+    given = {} if layout is None else layout.model_dump(exclude_unset=True, exclude_none=True)
+    if {"time", "rate_hz"} <= given.keys():
         raise InputError(f"{path}: give the rate or the column of time, not both")
-    if rate is not None and not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"{path}: the rate must be positive, not {rate:g}")
-    source = source or open_source(path, variable, delimiter)
-    given = dict(columns or {})
-    for key in given:
+    kind = LogLayout if layout is None else type(layout)
+    chosen = _laid_over(like, given, kind)
+    source = open_source(path, chosen.variable, chosen.delimiter)
+    if like is None or like.columns.get("fx") not in source.names:
+        own = {**told_by_names(source, chosen.columns, chosen.time)}
+        if "rate_hz" in given:
+            own.pop("time", None)
+        chosen = _laid_over(like, overlay(own, given), kind)
+    try:
+        places = _places(source, chosen, given, conditions, untimed)
+    except InputError as error:
+        if like is None or "columns" in given:
+            raise
+        raise InputError(
+            f"{error}; the columns are those of the log of the campaign, --columns and --time "
+            "change them"
+        ) from None
+    return Log(
+        source,
+        chosen,
+        places,
+        time_factor_of(source, places, chosen.time_unit),
+        conversion_of(chosen.unit, chosen.scale, chosen.offset),
+    )
+
+
+def _laid_over(
+    like: LogLayout | None, given: Mapping[str, Any], kind: type[LogLayout]
+) -> LogLayout:
+    """Layout of another log overlaid with what is given of this one.
+
+    If all three columns of the forces are given, they replace all others, since then the log is
+    another one. A column of time replaces a rate, and a unit the scale of counts.
+    """
+    below = {} if like is None else like.model_dump(exclude_none=True)
+    replaced = {"time", "rate_hz"} if given.keys() & {"time", "rate_hz"} else set()
+    if given.get("unit", "counts") != "counts":
+        replaced |= {"scale", "offset"}
+    if {*AXES} <= given.get("columns", {}).keys():
+        replaced |= {"columns"}
+    kept = {key: value for key, value in below.items() if key not in replaced}
+    return kind.model_validate(overlay(kept, given))
+
+
+def _places(
+    source: Source,
+    layout: LogLayout,
+    given: Mapping[str, Any],
+    conditions: Collection[str],
+    untimed: bool,
+) -> dict[str, int]:
+    """Places of the columns of a log; those of another log of the sensor may be missing."""
+    columns = dict(layout.columns)
+    for key in columns:
         if key not in (*AXES, *CONDITIONS):
             raise UnknownNameError("column", key, (*AXES, *CONDITIONS))
-    places = locate(source, {k: v for k, v in given.items() if k in AXES}, AXES)
-    if rate is None:
-        wanted = {} if time is None else {"time": time}
+    places = locate(source, {k: v for k, v in columns.items() if k in AXES}, AXES)
+    if layout.time is not None:
+        columns["time"] = layout.time
+    for key in conditions:
+        if key == "time" and layout.rate_hz is not None:
+            continue
+        wanted = {key: columns[key]} if key in columns else {}
+        needed = key == "time" and not untimed
         try:
-            places = {**places, **locate(source, wanted, ("time",))}
+            place = locate(source, wanted, (key,), needed)
         except InputError as error:
-            if time is not None:
+            if key in given.keys() | given.get("columns", {}).keys():
                 raise
-            if not untimed:
+            if needed:
                 raise InputError(
                     f"{error}; give the column of time (--time), or the rate (--rate), or, for a "
                     "log without the moves between positions, the samples of each (--block)"
                 ) from None
-            rate = 1.0
-    for key in CONDITIONS:
-        wanted = {key: given[key]} if key in given else {}
-        place = locate(source, wanted, (key,), needed=False)
-        if key in given or not {*place.values()} & {*places.values()}:
+            continue
+        if key in ("time", *wanted) or not {*place.values()} & {*places.values()}:
             places |= place
-    if len(set(places.values())) < len(places):
-        raise InputError(f"{path}: two of {', '.join(places)} name the same column")
-    return Log(
-        path=source.path,
-        source=source,
-        places=places | nanoseconds_beside(source, places),
-        rate=rate,
-        time_factor=time_factor_of(source, places, time_unit),
-        conversion=conversion,
-        frame=frame,
-    )
+    if len({*places.values()}) < len(places):
+        raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
+    return places | nanoseconds_beside(source, places)
 
 
 def locate(
-    source: Source, given: Mapping[str, Column], wanted: Sequence[str], needed: bool = True
+    source: Source, given: Mapping[str, Place], wanted: Sequence[str], needed: bool = True
 ) -> dict[str, int]:
     """Places of the wanted columns: as given, by their usual names, or the only three columns.
 
@@ -223,7 +254,7 @@ def nanoseconds_beside(source: Source, places: Mapping[str, int]) -> dict[str, i
 
 
 def told_by_names(
-    source: Source, columns: Mapping[str, Column], time: Column | None
+    source: Source, columns: Mapping[str, Place], time: Place | None
 ) -> Mapping[str, Any]:
     """Keys of `LogLayout` that the names of the columns tell: the units of forces and of time."""
     own: dict[str, Any] = dict(source.layout)
@@ -258,7 +289,7 @@ def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) ->
     return 1e-9 if dated else UNITS["s"][time_unit]
 
 
-def _place(source: Source, key: str, column: Column) -> int:
+def _place(source: Source, key: str, column: Place) -> int:
     """Place of a column; digits are a place, unless a column has them as its name."""
     names = source.names
     if source.named and isinstance(column, str) and column in names:
@@ -297,56 +328,104 @@ def absurd_from(raw: Array, conversion: Conversion) -> float:
     return max(ABSURD, 1000 * float(usual))
 
 
-@dataclass(frozen=True)
-class Losses:
-    """Rows of a log that are left out, since a reading is missing or absurd.
+class Rows(NamedTuple):
+    """All rows of a log, n of them; what is no number, or absurd, is NaN.
 
     Attributes
     ----------
-    rows, count : int, rows of the log, and how many of them are left out
-    first : list of (row, key), the first ones, and what is missing there
+    time : (n,) array, s since the first row that has one; None where nothing tells it
+    forces : (n, 3) array, m/s², in forward, right, down
+    conditions : mapping of `CONDITIONS`, as far as the log has them, to (n,) arrays, °C or m/s²
+    lost : mapping of "time", "fx", … to (n,) bool arrays, where a reading is missing or absurd
+    start : float, s, where the times begin in the file; NaN without a column of time
     """
 
-    rows: int
-    count: int
-    first: list[tuple[int, str]]
+    time: Array | None
+    forces: Array
+    conditions: dict[str, Array]
+    lost: dict[str, NDArray[np.bool_]]
+    start: float
 
 
 @dataclass(frozen=True)
 class Log:
-    """A raw log whose layout is known.
+    """The log of one sensor in one file.
 
     Attributes
     ----------
-    path : Path
     source : Source, what gives the numbers as they stand in the file
+    layout : LogLayout, how they are read
     places : mapping of "fx", "fy", "fz" and perhaps "time", "nanoseconds" (to be added to a time
         in whole seconds) and `CONDITIONS` to columns
-    rate : float, 1/s; None with a column of time
-    time_factor : float, s per unit of that column, of whose dates these are ns
+    time_factor : float, s per unit of the column of time, of whose dates these are ns
     conversion : Conversion, of forces to m/s², in the axes of the log
-    frame : Frame, the axes of the log
     lively : bool, whether each channel must change; in a single position, one of a coarse sensor
         may be constant
     beside : mapping of names to columns of other sensors, which lose the same rows
     """
 
-    path: Path
     source: Source
+    layout: LogLayout
     places: Mapping[str, int]
-    rate: float | None
     time_factor: float
     conversion: Conversion
-    frame: Frame
     lively: bool = True
     beside: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def path(self) -> Path:
+        """Name of the log in messages."""
+        return self.source.path
 
     @property
     def conditions(self) -> tuple[str, ...]:
         """Which of `CONDITIONS` the log has."""
         return tuple(key for key in CONDITIONS if key in self.places)
 
-    @property
+    @cached_property
+    def table(self) -> pa.Table:
+        """Rows as they are in the file, with all their columns; by unique names."""
+        import pyarrow as pa
+
+        names = unique_names(self.source)
+        return pa.table(self.source.columns(range(len(names))), names=names)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """All rows; of those of `table`, if that was asked for before."""
+        columns = {**self.places, **self.beside}
+        places = [*columns.values()]
+        cells = [self.table.column(p) for p in places] if "table" in vars(self) else None
+        values = dict(zip(columns, self.source.numbers(places, cells), strict=True))
+        count, start, time = len(values["fx"]), np.nan, None
+        if "time" in self.places:
+            values["time"], start = counted_from_first(values["time"])
+        lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
+        if "time" in self.places:
+            time = values.pop("time") * self.time_factor + 1e-9 * values.pop("nanoseconds", 0)
+            if "nanoseconds" in lost:
+                lost["time"] |= lost.pop("nanoseconds")
+            known = np.flatnonzero(~lost["time"])
+            first = time[known[0]] if len(known) else 0.0
+            time, start = time - first, start * self.time_factor + first
+        elif self.layout.rate_hz is not None:
+            time = np.arange(count) / self.layout.rate_hz
+        conversion, frame = self.conversion, self.layout.axes
+        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
+        limit = absurd_from(usual, conversion)
+        # Each axis in one piece, as sums along it are faster.
+        forces = np.empty((3, count))
+        to = np.argsort(frame.order)
+        for i, key in enumerate((*AXES, *self.beside)):
+            reading = values.pop(key)
+            converted = conversion.of_axis(i % 3).to_si(reading)
+            lost[key] |= absurd(reading, converted, limit)
+            if key in AXES:
+                forces[to[i]] = np.where(lost[key], np.nan, frame.signs[to[i]] * converted)
+        conditions = {k: np.where(lost.pop(k), np.nan, values[k]) for k in self.conditions}
+        return Rows(time, forces.T, conditions, lost, start)
+
+    @cached_property
     def samples(self) -> Samples:
         """Samples from the beginning to the end; times count from the first one.
 
@@ -356,12 +435,18 @@ class Log:
             If time does not increase, a channel is constant, the log is empty, or many rows lack a
             reading.
         """
-        return self._read[0]
-
-    @property
-    def losses(self) -> Losses:
-        """Rows that are no samples."""
-        return self._read[1]
+        time, forces, known, lost, _ = self.rows
+        if time is None:
+            time = np.arange(float(len(forces)))
+        row = np.flatnonzero(~np.any([*lost.values()], axis=0))
+        conditions = np.array([*known.values()]).reshape(len(known), len(forces))
+        if len(row) < len(forces):
+            time, forces, conditions = time[row], forces.T[:, row].T, conditions[:, row]
+        if "time" in self.places and len(row):
+            time = time - time[0]
+        samples = Samples(time, forces, conditions.T, row, np.zeros(len(row), dtype=int))
+        self._check(samples)
+        return samples
 
     @cached_property
     def step(self) -> float:
@@ -370,8 +455,8 @@ class Log:
         Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
         and only the mean fits the number of samples.
         """
-        if self.rate is not None:
-            return 1.0 / self.rate
+        if "time" not in self.places:
+            return 1.0 / (self.layout.rate_hz or 1.0)
         if len(self.samples.time) < 2:
             raise InputError(f"{self.path}: too few samples")
         return usual_step(np.diff(self.samples.time))
@@ -379,11 +464,12 @@ class Log:
     @property
     def start(self) -> float:
         """Time of the first sample as written in the file, s; NaN without a column of time."""
-        return self._read[2]
+        time = self.rows.time
+        return self.rows.start + (0.0 if time is None else float(time[self.samples.row[0]]))
 
     def likely_unit(self) -> str:
         """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
-        if self.rate is not None:
+        if "time" not in self.places:
             return ""
         step = self.step / self.time_factor
         rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
@@ -395,70 +481,27 @@ class Log:
             f"--time-unit {unit}"
         )
 
-    @cached_property
-    def _read(self) -> tuple[Samples, Losses, float]:
-        columns = {**self.places, **self.beside}
-        values = dict(zip(columns, self.source.numbers([*columns.values()]), strict=True))
-        time, start = np.arange(len(values["fx"])) / (self.rate or 1.0), np.nan
-        if self.rate is None:
-            values["time"], start = counted_from_first(values["time"])
-            time = values["time"] * self.time_factor + 1e-9 * values.get("nanoseconds", 0)
-        lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
-        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
-        limit = absurd_from(usual, self.conversion)
-        for axes in (AXES, *zip(*[iter(self.beside)] * 3, strict=True)):
-            converted = []
-            for i, key in enumerate(axes):
-                reading = values.pop(key)
-                converted.append(self.conversion.of_axis(i).to_si(reading))
-                lost[key] |= absurd(reading, converted[i], limit)
-            if axes is AXES:
-                # Each axis in one piece, as sums along it are faster.
-                forces = self.frame.to_frd(np.array(converted).T)
-        unknown = [lost.pop(key) for key in self.conditions]
-        conditions = np.empty((len(forces), len(unknown)), order="F")
-        for i, (key, none) in enumerate(zip(self.conditions, unknown, strict=True)):
-            conditions[:, i] = np.where(none, np.nan, values[key])
-        usable = ~np.any([*lost.values()], axis=0)
-        row = np.flatnonzero(usable)
-        if len(row) < len(usable):
-            time, forces, conditions = time[row], forces[row], conditions[row]
-        first = [
-            (int(i), next(key for key, none in lost.items() if none[i]))
-            for i in np.flatnonzero(~usable)[:NAMED]
-        ]
-        losses = Losses(len(usable), len(usable) - len(row), first)
-        if self.rate is None and len(row):
-            start = start * self.time_factor + time[0]
-            time = time - time[0]
-        samples = Samples(
-            time,
-            np.asfortranarray(forces),
-            np.asfortranarray(conditions),
-            row,
-            np.zeros(len(row), dtype=int),
-        )
-        self._check(samples, losses)
-        return samples, losses, start
-
-    def _check(self, samples: Samples, losses: Losses) -> None:
+    def _check(self, samples: Samples) -> None:
+        rows, frame = len(self.rows.forces), self.layout.axes
         backward = np.diff(samples.time) <= 0
-        if self.rate is None and backward.any():
+        if "time" in self.places and backward.any():
             row = int(samples.row[1 + np.argmax(backward)])
             where, cell = self.source.look_up(row, self.places["time"])
             raise InputError(
                 f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
                 f"time does not increase ({cell}); give the rate if it does not count"
             )
-        if losses.count > MANY * losses.rows:
-            hint = "; give the rate (--rate) instead" if losses.first[0][1] == "time" else ""
+        count = rows - len(samples.row)
+        if count > MANY * rows:
+            key = self._lost_in(first := int(self._unusable[0]))
+            hint = "; give the rate (--rate) instead" if key == "time" else ""
             raise InputError(
-                f"{self.path}: {self._lost(*losses.first[0])}, not a usable number{hint}; "
-                f"{losses.count} of {counted(losses.rows, 'row')} lack one, which are too many"
+                f"{self.path}: {self.describe(first, key)}, not a usable number{hint}; "
+                f"{count} of {counted(rows, 'row')} lack one, which are too many"
             )
-        if losses.rows < 2:
-            raise InputError(f"{self.path}: too few samples ({losses.rows})")
-        constant = (samples.forces == samples.forces[:1]).all(axis=0)[np.argsort(self.frame.order)]
+        if rows < 2:
+            raise InputError(f"{self.path}: too few samples ({rows})")
+        constant = (samples.forces == samples.forces[:1]).all(axis=0)[np.argsort(frame.order)]
         if self.lively and constant.any():
             axis = AXES[int(np.argmax(constant))]
             name = self.source.names[self.places[axis]]
@@ -466,39 +509,61 @@ class Log:
 
     def warnings(self) -> list[str]:
         """What could not be read."""
-        losses = self.losses
-        if not losses.count:
+        unusable = self._unusable
+        if not len(unusable):
             return [*self.source.warnings]
-        each = "; ".join(self._lost(*first) for first in losses.first)
-        more = "; …" if losses.count > len(losses.first) else ""
+        named = [int(row) for row in unusable[:NAMED]]
+        each = "; ".join(self.describe(row, self._lost_in(row)) for row in named)
+        more = "; …" if len(unusable) > len(named) else ""
         return [
             *self.source.warnings,
-            f"{losses.count} of {counted(losses.rows, 'row')} left out, as a reading is missing or "
-            f"absurd: {each}{more}",
+            f"{len(unusable)} of {counted(len(self.rows.forces), 'row')} left out, as a reading is "
+            f"missing or absurd: {each}{more}",
         ]
 
-    def _lost(self, row: int, key: str) -> str:
-        """Say what is missing in a row."""
+    @property
+    def _unusable(self) -> NDArray[np.int_]:
+        return np.flatnonzero(np.any([*self.rows.lost.values()], axis=0))
+
+    def _lost_in(self, row: int) -> str:
+        """What is missing in an unusable row."""
+        return next(key for key, lost in self.rows.lost.items() if lost[row])
+
+    def describe(self, row: int, key: str) -> str:
+        """Say what stands in a row for "time", "fx", …; this reads the file again to find it."""
         place = {**self.places, **self.beside}[key]
         where, cell = self.source.look_up(row, place)
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
 
 
+def unique_names(source: Source) -> list[str]:
+    """Names of the columns, all different: `column_0` … of a log without names."""
+    if not source.named:
+        return [f"column_{place}" for place in range(len(source.names))]
+    before = [source.names[:place].count(name) for place, name in enumerate(source.names)]
+    return [f"{name}.{n}" if n else name for name, n in zip(source.names, before, strict=True)]
+
+
 @dataclass(frozen=True)
-class LogSeries:
-    """Several logs of one sensor, each a recording of its own.
+class Recording:
+    """The logs of one sensor, often only one, in their order.
 
     Attributes
     ----------
-    parts : tuple of Log, in their order
+    parts : tuple of Log
     """
 
     parts: Sequence[Log]
 
     @property
+    def first(self) -> Log:
+        """The first of the logs, which has the layout of all."""
+        return self.parts[0]
+
+    @property
     def path(self) -> Path:
         """First of the files."""
-        return self.parts[0].path
+        return self.first.path
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -513,26 +578,27 @@ class LogSeries:
         if odd:
             raise InputError(
                 f"{self.parts[odd[0]].path}: {1 / steps[odd[0]]:.6g} samples per second, but "
-                f"{1 / steps[0]:.6g} in {self.parts[0].path}"
+                f"{1 / steps[0]:.6g} in {self.path}"
             )
         return float(np.mean(steps))
 
     @cached_property
     def timed(self) -> bool:
         """Whether the times of the parts count from one zero, so that they follow each other."""
-        starts = np.array([part.start for part in self.parts])
-        return bool(np.all(np.diff(starts) > 0))
+        return bool(np.all(np.diff([part.start for part in self.parts]) > 0))
 
     def likely_unit(self) -> str:
         """See `Log`."""
-        return self.parts[0].likely_unit()
+        return self.first.likely_unit()
 
     @cached_property
     def samples(self) -> Samples:
         """Samples of all parts; if their times do not tell, each begins where the last one ends."""
+        if len(self.parts) == 1:
+            return self.first.samples
         end, parts = 0.0, []
         for i, part in enumerate(self.parts):
-            start = part.start - self.parts[0].start if self.timed else end
+            start = part.start - self.first.start if self.timed else end
             if start < end - self.step / 2:  # a clock rounds
                 raise InputError(f"{part.path}: begins before the recording before it ends")
             columns = [part.conditions.index(key) for key in self.conditions]
@@ -546,10 +612,6 @@ class LogSeries:
             )
             end = start + own.time[-1] + self.step
         return Samples(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-
-
-Recording = Log | LogSeries
-"""What the detector of holds takes: a log, or several."""
 
 
 def usual_step(steps: Array) -> float:

@@ -10,17 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.campaign.importing.allan import AllanMoments, allan_moments
 from accelstudy.campaign.importing.recording import Samples
 from accelstudy.campaign.importing.resolution import noise_before_rounding
-from accelstudy.campaign.importing.windows import Threshold, Windows
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.importing.windows import Threshold, Windows, threshold_of
 
 Array = NDArray[np.float64]
 
 SPANS = 1200
 """Spans of time of an envelope, about as many as a page can show."""
-LONGEST_RECORD = 2**20
-"""Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
 SATURATED = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
 BEYOND, SURE = 5.0, 3.0
@@ -38,45 +36,40 @@ class Segmentation:
 
     Attributes
     ----------
+    windows, threshold : Windows, Threshold, by which it was judged
     segments : mapping of int to Segment, by the numbers that figures and options use
     saturated, wandering : int, runs at rest that are no holds: the sensor is saturated, or it turns
         slowly
     short : tuple of float, s, lengths of the rests that are too short to be holds
-    envelope : Envelope, of the log, for its figure
     left_out : mapping of int to str, segments that are no positions, and why
     size : int, samples of each, or of the shortest, if the log consists of blocks
     """
 
+    windows: Windows
+    threshold: Threshold
     segments: Mapping[int, Segment]
-    saturated: int
-    wandering: int
-    short: tuple[float, ...]
-    envelope: Envelope
+    saturated: int = 0
+    wandering: int = 0
+    short: tuple[float, ...] = ()
     left_out: Mapping[int, str] = field(default_factory=dict)
     size: int | None = None
 
 
 def segment_logs(
-    windows: Sequence[Windows],
-    thresholds: Sequence[Threshold],
-    trim: float,
-    shortest: float,
-    full_range: float,
-    one_each: bool,
+    windows: Sequence[Windows], settings: ImportSettings, one_each: bool
 ) -> list[Segmentation]:
     """Segments in which all sensors rest, of logs with simultaneous samples.
 
     Parameters
     ----------
-    windows, thresholds : sequences, one for each sensor
-    trim : float, s, cut off at both ends of a run
-    shortest : float, s, least length of what is left
-    full_range : float, m/s², the sensors measure ± this
+    windows : sequence of Windows, one for each sensor
+    settings : ImportSettings, of which those of the holds count
     one_each : bool, whether the logs have several recordings with one position each: the longest
         segment, which gets the number of the recording
     """
     step = windows[0].log.step
-    cut, least = round(trim / step), max(2, round(shortest / step))
+    cut, least = round(settings.trim_s / step), max(2, round(settings.shortest_s / step))
+    thresholds = [threshold_of(each, settings.threshold_mps2) for each in windows]
     still = np.all([w.at_rest(t.sd) for w, t in zip(windows, thresholds, strict=True)], axis=0)
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     rests = [slice(first + cut, end - cut) for first, end in edges.tolist()]
@@ -84,45 +77,35 @@ def segment_logs(
     holds = [rest for rest, n in zip(rests, rested, strict=True) if n >= least]
     lost = 2 * cut + windows[0].width
     short = tuple((n + lost) * step for n in rested if SHORTEST <= n < least)
-    kept, counts = [], []
+    kept: list[dict[int, Segment]] = []
+    counts = []
     for each, threshold in zip(windows, thresholds, strict=True):
-        samples = each.log.samples
-        segments: list[Segment | None] = [Segment.of(samples, hold) for hold in holds]
-        full = find_saturated(each, holds, full_range)
+        full = find_saturated(each, holds, settings.full_range)
+        segments = {
+            i: Segment.of(each.log.samples, hold) for i, hold in enumerate(holds) if not full[i]
+        }
         # A sensor that turns slowly is nearly still in each window, yet has no constant attitude:
         # its force changes over the run by more than within each of them.
         limit = (WANDERING * threshold.sd) ** 2
-        wanders = [not f and s.variance > limit for f, s in zip(full, segments, strict=True) if s]
-        counts.append((sum(full), sum(wanders)))
-        out = np.logical_or(full, wanders)
-        kept.append([None if none else s for none, s in zip(out, segments, strict=True)])
-    recordings = [int(windows[0].log.samples.recording[hold.start]) for hold in holds]
-    groups = [
-        (recording, group)
-        for recording, group in zip(recordings, map(list, zip(*kept, strict=True)), strict=True)
-        if any(group)
-    ]
-    numbered = _numbered(groups, one_each)
+        kept.append({i: s for i, s in segments.items() if s.variance <= limit})
+        counts.append((sum(full), len(segments) - len(kept[-1])))
+    places = sorted(set().union(*kept))
+    numbers = dict(enumerate(places, 1))
+    if one_each:
+        recording = windows[0].log.samples.recording
+        by_length = sorted(places, key=lambda i: holds[i].stop - holds[i].start)
+        longest = {int(recording[holds[i].start]) + 1: i for i in by_length}
+        numbers = dict(sorted(longest.items()))
     return [
         Segmentation(
-            {n: part for n, group in numbered.items() if (part := group[i]) is not None},
-            *counts[i],
+            windows[k],
+            thresholds[k],
+            {n: segments[i] for n, i in numbers.items() if i in segments},
+            *counts[k],
             short,
-            Envelope(each),
         )
-        for i, each in enumerate(windows)
+        for k, segments in enumerate(kept)
     ]
-
-
-def _numbered(
-    groups: Sequence[tuple[int, list[Segment | None]]], one_each: bool
-) -> dict[int, list[Segment | None]]:
-    """Number the holds: in order, or the longest of each recording by the recording's number."""
-    if not one_each:
-        return {number: group for number, (_, group) in enumerate(groups, 1)}
-    by_length = sorted(groups, key=lambda group: max(part.n for part in group[1] if part))
-    longest = {recording + 1: group for recording, group in by_length}
-    return dict(sorted(longest.items()))
 
 
 @dataclass(frozen=True)
@@ -131,49 +114,54 @@ class Segment:
 
     Attributes
     ----------
-    start, end : int, first sample, and the one after the last
+    parts : tuple of slices of the samples of the log, each uninterrupted
     t0, t1 : float, s, times of the first and of the last sample
     n : int, samples
     mean : (3,) array, m/s², mean specific force
-    products : (3, 3) array, (m/s²)², sums of products of the deviations from the mean
-    conditions : (3, k) array, number, sum and sum of squares of what else was measured
-    noise : tuple of AllanMoments, of the forces, one for each uninterrupted part
+    covariance : (3, 3) array, (m/s²)², of the samples
+    conditions : (2, k) array, mean and rms of what else was measured, NaN where nothing was
+    records : tuple of (n, 3) arrays, m/s², the forces of each part
     """
 
-    start: int
-    end: int
+    parts: tuple[slice, ...]
     t0: float
     t1: float
     n: int
     mean: Array
-    products: Array
+    covariance: Array
     conditions: Array
-    noise: tuple[AllanMoments, ...]
+    records: tuple[Array, ...]
 
     @classmethod
-    def of(cls, samples: Samples, chosen: slice) -> Segment:
-        """Segment of neighbouring samples."""
-        time, forces, conditions, *_ = (values[chosen] for values in samples)
-        mean = forces.mean(axis=0)
-        centred = forces - mean
+    def of(cls, samples: Samples, *parts: slice) -> Segment:
+        """Segment of the samples in some parts of a log, in their order."""
+        records = tuple(samples.forces[part] for part in parts)
+        forces = np.concatenate(records)
+        conditions = np.concatenate([samples.conditions[part] for part in parts])
         measured = np.isfinite(conditions)
         values = np.where(measured, conditions, 0.0)
+        with np.errstate(invalid="ignore"):
+            known = [values.sum(axis=0), (values**2).sum(axis=0)] / measured.sum(axis=0)
         return cls(
-            chosen.start,
-            chosen.stop,
-            float(time[0]),
-            float(time[-1]),
-            len(time),
-            mean,
-            centred.T @ centred,
-            np.array([measured.sum(axis=0), values.sum(axis=0), (values**2).sum(axis=0)]),
-            (allan_moments(forces[:LONGEST_RECORD]),),
+            parts,
+            float(samples.time[parts[0].start]),
+            float(samples.time[parts[-1].stop - 1]),
+            len(forces),
+            forces.mean(axis=0),
+            np.cov(forces, rowvar=False),
+            np.array([known[0], np.sqrt(known[1])]),
+            records,
         )
 
     @property
-    def covariance(self) -> Array:
-        """Covariance of the samples of the axes, (3, 3), (m/s²)²."""
-        return self.products / (self.n - 1)
+    def start(self) -> int:
+        """First sample."""
+        return int(self.parts[0].start)
+
+    @property
+    def end(self) -> int:
+        """Sample after the last."""
+        return int(self.parts[-1].stop)
 
     @property
     def sd(self) -> Array:
@@ -184,21 +172,6 @@ class Segment:
     def variance(self) -> float:
         """Norm of the variances of the axes, the measure of the detector, (m/s²)²."""
         return float(np.linalg.norm(np.diag(self.covariance)))
-
-    def __add__(self, later: Segment) -> Segment:
-        """Both holds as one, without the samples between them (Chan, Golub and LeVeque 1979)."""
-        n, step = self.n + later.n, later.mean - self.mean
-        return Segment(
-            self.start,
-            later.end,
-            self.t0,
-            later.t1,
-            n,
-            self.mean + step * later.n / n,
-            self.products + later.products + np.outer(step, step) * self.n * later.n / n,
-            self.conditions + later.conditions,
-            self.noise + later.noise,
-        )
 
 
 def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[bool]:

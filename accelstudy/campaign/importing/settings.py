@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from accelstudy.basics.errors import InputError
@@ -79,6 +80,18 @@ class ImportSettings(LogLayout):
         [], description="holds to leave out, as 13:moved or 120s-135s:somebody passed"
     )
     join: list[str] = Field([], description="holds that are one, as 4,5 or 120s-135s")
+
+    @property
+    def full_range(self) -> float:
+        """Range of the sensor, m/s²; infinite if it is unknown, or the offset of counts is."""
+        if self.range_mps2 is None or (self.unit == "counts" and self.offset is None):
+            return np.inf
+        return self.range_mps2
+
+    @property
+    def selection(self) -> Selection:
+        """Holds to leave out and to join."""
+        return parse_selection(self.exclude, self.join)
 
 
 def parse_settings(content: Mapping[str, Any], source: str = "settings") -> ImportSettings:

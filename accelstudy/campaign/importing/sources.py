@@ -22,7 +22,7 @@ from accelstudy.basics.progress import stage
 from accelstudy.basics.wording import counted, one_line
 from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.files.parquet import whole_parquet
-from accelstudy.files.reading import Unpacked, readable
+from accelstudy.files.reading import readable
 
 # Slow to import, so where a file needs it: what calibrates a campaign reads no log.
 if TYPE_CHECKING:
@@ -172,6 +172,9 @@ class TextSource(Source):
             given = _SEPARATORS.get(delimiter, delimiter)
             layouts = ((given, "."), *(() if given == "," else ((given, ","),)))
         tables = [_Table(lines, *layout) for layout in layouts]
+        if any(table.delimiter == "\t" and table.many >= 3 for table in tables):
+            # Tabs make a log of the rows already, so blanks are those of a note.
+            tables = [table for table in tables if table.delimiter is not None]
         table = max(tables, key=lambda table: table.score)
         if not table.score:
             advice = "" if delimiter is None else f" with --delimiter {delimiter!r}"
@@ -367,7 +370,7 @@ class TextSource(Source):
     def _open_binary(self) -> BinaryIO:
         with self.path.open("rb") as start:
             packed = start.read(len(GZIP)) == GZIP
-        return cast(BinaryIO, Unpacked(self.path)) if packed else self.path.open("rb")
+        return cast(BinaryIO, gzip.open(self.path)) if packed else self.path.open("rb")
 
     def _open(self, skipped: int = 0) -> TextIO:
         """Open the file and skip some lines; quotation marks in a header have no meaning."""
@@ -397,13 +400,14 @@ class _Table:
     delimiter, decimal : see `TextSource`
     score : int, numbers in rows of the usual width, of which the right marks give most; 0 if the
         lines are no table
+    many : int, numbers in a usual row
     first, width, dates, names, notes : see `TextSource`; no names where there are none
     header : tuple of str, lines with names and units
     long : set of int, places of columns of whole numbers with more digits than a float
     """
 
     def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
-        self.delimiter, self.decimal = delimiter, decimal
+        self.delimiter, self.decimal, self.many = delimiter, decimal, 0
         rows = [
             (i, split_line(line, delimiter))
             for i, line in enumerate(lines)
@@ -418,8 +422,8 @@ class _Table:
             return
         # A line may hold text beside its numbers; everything before the first such line is the
         # header, but for rows that lack some reading.
-        many = max(1, _most_frequent(numbers[i] for i, _ in alike))
-        full = next(place for place, (i, _) in enumerate(alike) if numbers[i] >= many)
+        self.many = max(1, _most_frequent(numbers[i] for i, _ in alike))
+        full = next(place for place, (i, _) in enumerate(alike) if numbers[i] >= self.many)
         before = takewhile(lambda row: self._lacks(row[1], alike[full][1]), alike[full - 1 :: -1])
         self.first = min([alike[full][0], *(i for i, _ in before if full)])
         self.width = usual

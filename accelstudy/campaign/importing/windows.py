@@ -61,7 +61,7 @@ class Windows:
 
     Parameters
     ----------
-    log : Log or LogSeries
+    log : Recording
     width : int, samples of a window; odd
 
     Attributes
@@ -227,18 +227,8 @@ class Threshold:
 
 
 def threshold_of(windows: Windows, given: float | None) -> Threshold:
-    """Threshold that a person chose, m/s², or the one that the data tell.
-
-    Raises
-    ------
-    InputError
-        If it is not positive, or no threshold can be told from the data.
-    """
-    if given is None:
-        return choose_threshold(windows)
-    if not (np.isfinite(given) and given > 0):
-        raise InputError(f"threshold: must be positive, not {given:g}")
-    return Threshold(given, np.nan, "as given")
+    """Threshold that a person chose, m/s², or the one that the data tell."""
+    return choose_threshold(windows) if given is None else Threshold(given, np.nan, "as given")
 
 
 def choose_threshold(windows: Windows) -> Threshold:
