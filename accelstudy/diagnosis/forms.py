@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.basics.wording import number
 from accelstudy.effects import learned
 from accelstudy.effects.learned import WAVES
-from accelstudy.effects.smooth import LENGTHS, ORDERS, frequencies, harmonics, sines, spectrum
 
 Array = NDArray[np.float64]
 
@@ -23,8 +22,8 @@ MOST_CYCLES, EACH = 10.0, 3
 """Periods of a sine in the range of its coordinate at most; each needs as many different values."""
 APART = 100
 """Parts of its range in which values of a coordinate count as one."""
-REPEATED = 1.5
-"""Periods of what is no sine at least: it must come back."""
+FINE = 1 / 16
+"""Step of the number of periods that are tried."""
 TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
          4: "four times per turn", 5: "five times per turn", 6: "six times per turn"}  # fmt: skip
 """Harmonics of an angle."""
@@ -34,12 +33,8 @@ POWERS = {1: "in proportion to it", 2: "with its square", 3: "with its cube",
 POLYNOMIALS = {1: "in a straight line", 2: "as a parabola", 3: "as a cubic"}
 """Of a coordinate that has none."""
 
-CONSTANTS = np.geomspace(0.03, 1.0, 12)
-"""Constants of an exponential, in ranges of its coordinate."""
-WIDTHS = np.linspace(0.1, 0.8, 8)
-"""Widths of a dead band, as parts of the largest value."""
-BUMPS = np.geomspace(0.03, 0.2, 8)
-"""Standard deviations of a bump, in ranges of its coordinate."""
+PARTS = np.geomspace(0.03, 1.0, 80)
+"""Constants of an exponential, and widths of a dead band, in ranges of the coordinate."""
 
 # --- coordinates and targets --------------------------------------------------------------------
 
@@ -137,18 +132,14 @@ class Form:
     basis : callable, φ of s and of c (...), (..., k)
     settings : (t,) array
     shown : callable, shows a setting
-    weight : float, prior
     is_sine : bool, of which the amplitude is told; of others it is how much they go up and down
-    is_searched : bool, whether settings between these are tried as well
     """
 
     words: str
     basis: Callable[[float, Array], Array]
     settings: Array = field(default_factory=lambda: np.zeros(1))
     shown: Callable[[float], str] = str
-    weight: float = 1.0
     is_sine: bool = False
-    is_searched: bool = False
 
     def said(self, setting: float) -> str:
         """Say it with a setting."""
@@ -165,16 +156,18 @@ def forms(coordinate: str, c: Array) -> list[Form]:
     ]
     if len(values) <= EACH:  # a line or a parabola is all that shows
         return polynomials
-    found = _of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)
-    if of.has_zero:
-        found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
-        found += _about_zero(of, values) if values[0] < 0 < values[-1] else []
-    else:
-        found += polynomials
-    if coordinate in ("time", "order", "vibration"):
-        start = 0.0 if of.has_zero else values[0]
-        found.append(Form("with its square root", lambda _, x: np.sqrt(x[..., None] - start)))
-    return [*found, *_somewhere(of, np.unique(c))]
+    found = [*(_of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)), _step(of, c)]
+    if not of.has_zero:
+        return [*found, *polynomials]
+    found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
+    if values[0] < 0 < values[-1]:
+        widths = PARTS * np.abs(values).max()
+        found += [
+            Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
+            Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
+            Form("beyond ±{} only", _beyond, widths, of.at),
+        ]
+    return found
 
 
 def distinct(c: Array) -> Array:
@@ -187,56 +180,37 @@ def distinct(c: Array) -> Array:
 
 
 def _of_an_angle() -> list[Form]:
-    """Harmonics."""
-    found = [
-        Form(words, harmonic, np.array([k]), weight=1 / k, is_sine=True)
-        for k, words in TURNS.items()
-    ]
-    both = partial(harmonic, orders=(1, 2))
-    return [*found, Form("once and twice per turn", both, np.ones(1), weight=0.5)]
+    return [Form(words, _sine, np.array([float(k)]), is_sine=True) for k, words in TURNS.items()]
 
 
 def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
-    """Sines and exponentials in the range of some values (n,)."""
+    """A sine, and exponentials, in the range of some values (n,)."""
     low, high = values[0], values[-1]
-    cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, 0.25)
-    turns = 2 * np.pi * cycles / (high - low)
-
-    def period(turn: float) -> str:
-        return of.by(2 * np.pi / turn)
-
+    cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, FINE)
+    constants = (high - low) * PARTS
     found = []
-    if np.any(cycles >= REPEATED):
-        found = [
-            Form("as a sine with a period of {}", harmonic, turns, period,
-                 is_sine=True, is_searched=True),
-            Form("periodically every {}, in another form than a sine",
-                 partial(harmonic, orders=(1, 2, 3)), turns[cycles >= REPEATED], period,
-                 is_searched=True),
-        ]  # fmt: skip
-    constants = (high - low) * CONSTANTS
+    if len(cycles):
+        turns = 2 * np.pi * cycles / (high - low)
+
+        def period(turn: float) -> str:
+            return of.by(2 * np.pi / turn)
+
+        found = [Form("as a sine with a period of {}", _sine, turns, period, is_sine=True)]
     if of.is_course:
         words = "decaying with a time constant of {}"
-        return [*found, Form(words, partial(_exp, low, -1), constants, of.by, is_searched=True)]
-    for end, sign, verb in ((high, 1, "growing"), (low, -1, "decaying")):
-        words = verb + " by the factor e every {}"
-        found.append(Form(words, partial(_exp, end, sign), constants, of.by, 0.5, is_searched=True))
-    return found
-
-
-def _about_zero(of: Coordinate, values: Array) -> list[Form]:
-    """Forms about the zero of a coordinate that has both signs."""
-    widths = WIDTHS * np.abs(values).max()
+        return [*found, Form(words, partial(_exp, low, -1), constants, of.by)]
     return [
-        Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
-        Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
-        Form("with its square and its sign", lambda _, x: (x * np.abs(x))[..., None]),
-        Form("beyond ±{} only", _beyond, widths, of.at, is_searched=True),
+        *found,
+        *(
+            Form(verb + " by the factor e every {}", partial(_exp, end, sign), constants, of.by)
+            for end, sign, verb in ((high, 1, "growing"), (low, -1, "decaying"))
+        ),
     ]
 
 
-def _somewhere(of: Coordinate, values: Array) -> list[Form]:
-    """Steps, bends and bumps at a free place among some values (n,)."""
+def _step(of: Coordinate, c: Array) -> Form:
+    """A step between any two values of a coordinate."""
+    values = np.unique(c)
     between = (values[1:] + values[:-1]) / 2
     some = np.unique(np.linspace(0, len(between) - 1, PLACES).round().astype(int))
 
@@ -244,19 +218,7 @@ def _somewhere(of: Coordinate, values: Array) -> list[Form]:
         after = int(np.searchsorted(values, place))
         return f"{of.at(values[after - 1])} and {of.at(values[after])}"
 
-    step = Form("in a step between {}", lambda s, x: (x > s)[..., None].astype(float),
-                between[some], gap, is_searched=True)  # fmt: skip
-    inner = np.linspace(values[0], values[-1], 13)[1:-1]
-    return [
-        step,
-        Form("in a straight line from {} on", lambda s, x: np.maximum(x[..., None] - s, 0),
-             inner, of.at, 0.5, is_searched=True),
-        Form("in a straight line up to {}", lambda s, x: np.minimum(x[..., None] - s, 0),
-             inner, of.at, 0.5, is_searched=True),
-        *(Form("in a bump at {}", partial(_bump, share * np.ptp(values)),
-               np.linspace(values[0], values[-1], 25), of.at, 0.5 / len(BUMPS), is_searched=True)
-          for share in BUMPS),
-    ]  # fmt: skip
+    return Form("in a step between {}", lambda s, x: (x > s)[..., None] * 1.0, between[some], gap)
 
 
 def _power(p: int, _: float, x: Array) -> Array:
@@ -276,23 +238,5 @@ def _beyond(width: float, x: Array) -> Array:
     return (np.sign(x) * np.maximum(np.abs(x) - width, 0))[..., None]
 
 
-def _bump(width: float, at: float, x: Array) -> Array:
-    return np.exp(-(((x[..., None] - at) / width) ** 2) / 2)
-
-
-def harmonic(turn: float, x: Array, orders: ArrayLike = 1) -> Array:
-    """Sines and cosines of an angle and of its multiples."""
-    phase = turn * x[..., None] * np.atleast_1d(orders)
-    return np.concatenate([np.sin(phase), np.cos(phase)], axis=-1)
-
-
-def smooth(coordinate: str, c: Array) -> tuple[Callable[[Array], Array], Array]:
-    """Functions of a coordinate with the values c (n, a), (..., k), and prior variances (p, k)."""
-    if coordinate in ANGLES:
-        return lambda x: np.stack(harmonics(x, np), -1), np.tile(spectrum(ORDERS, LENGTHS), 2)
-    low, high = float(c.min()), float(c.max())
-
-    def basis(x: Array) -> Array:
-        return np.stack(sines((2 * x - low - high) / (high - low), np), -1)
-
-    return basis, spectrum(frequencies(), LENGTHS)
+def _sine(turn: float, x: Array) -> Array:
+    return np.stack([np.sin(turn * x), np.cos(turn * x)], axis=-1)

@@ -73,7 +73,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, Learned)
     beside = space_of(others, len(problem.residuals.z))
-    ranking = ranked(problem.frame, problem.evidence, effect, beside)
+    ranking = ranked(problem.frame, problem.evidence, effect, finding.place, beside)
     at = argument(frame, effect)
     grid = np.linspace(at.min(), at.max(), POINTS)
     names = list(solution.model.parameter_names)

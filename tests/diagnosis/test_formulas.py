@@ -77,13 +77,14 @@ def test_the_right_formula_comes_first():
                 frame,
                 Evidence(base.level, frame.residuals.redundancy),
                 get_effect(f"learned({words}, target=bias)"),
+                (words.split(",")[0].removeprefix("coordinate="), "bias"),
                 np.zeros((len(frame.residuals.z), 0)),
             )
             assert sum(one.posterior for one in ranking.formulas) <= 1 + 1e-9
             right += said in ranking.formulas[0].text
             wrong += "xyz"[tried % 3] in ranking.axes
             tried += 1
-    # Of 120 such campaigns 107 had the right one first, and one an axis that takes no part.
+    # Of 120 such campaigns 113 had the right one first, and four an axis that takes no part.
     assert right >= least(tried, 0.89)
     assert wrong <= most(tried, 0.1)
 
