@@ -11,7 +11,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,8 +86,8 @@ class Determinant(Criterion):
 
     estimated: NDArray[np.bool_]
 
-    name: ClassVar[str] = "D"
-    text: ClassVar[str] = "determinant of the covariance matrix of the parameters"
+    name: str = "D"
+    text: str = "determinant of the covariance matrix of the parameters"
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
@@ -182,7 +181,7 @@ class MeanSquare(Criterion):
     def _solved(self, normal: Array) -> tuple[Array, Array]:
         """N₁₁⁻¹, and the shifts N₁₁⁻¹ N₁₂ that neglected parameters cause."""
         kept, left = self._places
-        cofactors = np.linalg.inv(_kept(normal, self.estimated))
+        cofactors: Array = np.asarray(np.linalg.inv(_kept(normal, self.estimated)), dtype=float)
         if not len(self.variance):
             return cofactors, np.zeros((len(kept), 0))
         return cofactors, cofactors @ normal[..., kept[:, None], left]
@@ -219,10 +218,8 @@ class Rivals(Criterion):
     first: NDArray[np.bool_]
     second: NDArray[np.bool_]
 
-    name: ClassVar[str] = "discriminate"
-    text: ClassVar[str] = (
-        "mean square of the sizes at which the two effects can be told from each other"
-    )
+    name: str = "discriminate"
+    text: str = "mean square of the sizes at which the two effects can be told from each other"
 
     def left(self, normal: Array) -> Array:
         """Part l of each parameter of the first effect, then of the second, (..., q)."""
@@ -302,7 +299,7 @@ def rivals(task: Task, first: str, second: str) -> Rivals:
     owner = [e.spec for e in task.extended.effects for _ in e.parameters]
     owner += [""] * (len(task.names) - len(owner))
     masks = [np.array([o == spec for o in owner]) for spec in (first, second)]
-    return Rivals(task.estimated, *masks)
+    return Rivals(task.estimated, masks[0], masks[1])
 
 
 def _ridged(normal: Array) -> Array:

@@ -218,7 +218,12 @@ def _step(of: Coordinate, c: Array) -> Form:
         after = int(np.searchsorted(values, place))
         return f"{of.at(values[after - 1])} and {of.at(values[after])}"
 
-    return Form("in a step between {}", lambda s, x: (x > s)[..., None] * 1.0, between[some], gap)
+    return Form(
+        "in a step between {}",
+        lambda s, x: np.asarray(x > s, dtype=float)[..., None],
+        between[some],
+        gap,
+    )
 
 
 def _power(p: int, _: float, x: Array) -> Array:
