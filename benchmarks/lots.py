@@ -20,13 +20,13 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
-from studies.hidden.cells import distinct_pairs
 from studies.hidden.physics.atlas import visible_effects
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
 from studies.hidden.physics.lots import LotCase, generate_lot, lot_oracle
 from studies.hidden.physics.measuring import NOISES
 from studies.hidden.physics.oracle import visible_outside, visible_unforeseen
 from studies.hidden.scoring.judging import all_true, same_effects
+from studies.hidden.study import distinct_pairs
 from timing import table
 
 MODEL = "bias-scale-nonorthogonality"

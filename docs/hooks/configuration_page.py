@@ -6,8 +6,8 @@ from schemas import blocks
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.diagnosis.round_trip import RoundTrip
 from accelstudy.study.config import config_schema
-from studies.hidden.config import HiddenConfig
 from studies.hidden.real_noise import RealNoiseConfig
+from studies.hidden.study import HiddenConfig
 
 
 def configuration():

@@ -1,118 +1,144 @@
-"""The campaigns of both studies, made with the rows of their truths; the tables of the jobs."""
+"""A campaign of either study, from its case to a row: its truth, and what is said of it."""
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any, NamedTuple, TypeVar
+from pathlib import Path
+from time import process_time
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.session import Campaign
-from studies.hidden.cells import Cell
-from studies.hidden.physics.generate import Truth, generate
-
-Row = dict[str, Any]
+from accelstudy.diagnosis.pipeline import judge
+from accelstudy.diagnosis.result import Verdict
+from accelstudy.effects import effects_without
+from accelstudy.files.tables import write_table
+from accelstudy.files.validation import checked
+from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
+from studies.hidden.baselines import METHODS, answers
+from studies.hidden.physics.generate import Case, Truth
+from studies.hidden.real_noise import RealNoiseConfig
+from studies.hidden.study import HiddenConfig, Job, Made, Row, removed
 
 KEY = ["cell", "campaign"]
-"""Columns by which truths and answers belong together."""
-_TEXT, _NUMBER, _FLAG = "string", "float64", "boolean"
-_KEYS = {"cell": _TEXT, "campaign": "int64"}
-SCHEMA: dict[str, dict[str, str]] = {
-    "truths": {
-        **_KEYS,
-        **dict.fromkeys(("set", "what"), _TEXT),
-        "size": _NUMBER,
-        **dict.fromkeys(("design", "approach", "sigma", "classes", "effects", "noise"), _TEXT),
-        **dict.fromkeys(("gross", "gross_name"), _TEXT),
-        "oracle_detected": _FLAG,
-        **dict.fromkeys(("oracle_best", "oracle_told"), _TEXT),
-        "oracle_alternatives": "Int64",
-        **dict.fromkeys(("left", "true_place", "sensor", "seed", "failed"), _TEXT),
-    },
-    "outcomes": {
-        **_KEYS,
-        **dict.fromkeys(("verdict", "found", "specs", "found_classes", "positions"), _TEXT),
-        **dict.fromkeys(("posteriors", "credible_set", "place", "fits"), _TEXT),
-        "confirmed": _FLAG,
-        "statement": _TEXT,
-        **dict.fromkeys(("held_out_z", "sigma0_before", "sigma0_after", "p_size"), _NUMBER),
-        **dict.fromkeys(("redundancy", "positions_used"), "Int64"),
-        **dict.fromkeys(("reason", "error"), _TEXT),
-    },
-    "seconds": {**_KEYS, "seconds": _NUMBER},
-    "baselines": {**_KEYS, "method": _TEXT, "detected": _FLAG, "found": _TEXT, "error": _TEXT},
+_TYPES = {
+    "string": "cell set what design approach sigma classes effects noise gross gross_name "
+    "oracle_best oracle_told left true_place sensor seed verdict found specs found_classes "
+    "positions posteriors credible_set place fits statement reason error method",
+    "boolean": "oracle_detected confirmed recorded detected",
+    "Int64": "campaign oracle_alternatives redundancy positions_used",
+    "float64": "size held_out_z sigma0_before sigma0_after p_size seconds p_known known_ratio "
+    "known_sigma ratio ratio_sigma",
 }
-"""Columns of the tables of a chunk, and their types; lists and mappings are JSON."""
+TYPES = {name: kind for kind, names in _TYPES.items() for name in names.split()}
+"""Type of each column; lists and mappings are JSON."""
+COLUMNS = {
+    "campaigns": [name for name in TYPES if name not in ("method", "detected", "seconds")],
+    "seconds": [*KEY, "seconds"],
+    "baselines": [*KEY, "method", "detected", "found", "error"],
+}
+"""Columns of the tables that a job writes; the times stand apart, as they differ in every run."""
 
 
-class Made(NamedTuple):
-    """A campaign and its truth, with further columns of its row and of that of its diagnosis."""
-
-    campaign: Campaign
-    truth: Truth
-    columns: Row = {}  # noqa: RUF012, nobody changes it
-    of_answer: Callable[[Any], Row] = lambda verdict: {}
-
-
-C = TypeVar("C", bound=Cell)
-Make = Callable[[C, int], Made]
-"""Makes a campaign of a cell by its number."""
+def parse_hidden(
+    content: Mapping[str, Any], source: str = "config"
+) -> HiddenConfig | RealNoiseConfig:
+    """Check a configuration of either study; raise `InputError` with one line."""
+    if "logs" in content:
+        return checked(RealNoiseConfig, content, source)
+    return checked(HiddenConfig, content, source)
 
 
-def rows_table(rows: Iterable[Row], schema: Mapping[str, str]) -> pd.DataFrame:
-    """Table of rows, with columns of given types."""
-    return pd.DataFrame(rows, columns=[*schema]).astype(dict(schema))
+def run(job: Job, outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]) -> None:
+    """Make and diagnose the campaigns of a job, and write the tables of `COLUMNS` to paths."""
+    rows = [rows_of(job, case, k) for case, k in job.campaigns]
+    for name in COLUMNS:
+        write_table(outputs[name], table_of(name, rows), provenance)
 
 
-def simulated(seed: int) -> Make[Cell]:
-    """Make campaigns by the physics of the study."""
-    return lambda cell, k: Made(*generate(cell.case, cell.seed(seed, k)))
+def campaigns_of(job: Job) -> pd.DataFrame:
+    """Truths and answers of the campaigns of a job."""
+    return table_of("campaigns", [rows_of(job, case, k) for case, k in job.campaigns])
 
 
-def made_of(cell: C, k: int, make: Make[C]) -> tuple[Made | None, Row]:
-    """Make a campaign, and the row of its truth; None if it could not be made."""
-    made: Made | None
-    made, error = tried(lambda number: make(cell, number), k, f"{cell.name} {k}: not made")
-    truth = made.truth if made else Truth()
-    oracle = truth.oracle
-    # No name is right for what a session cannot show or the catalogue lacks.
-    nameless = cell.case.set in ("invisible", "outside", "unforeseen")
-    known = [[name for name in one if name not in cell.removed] for one in truth.classes]
-    row = {
-        "set": cell.case.set,
-        "what": cell.what,
-        "size": cell.size,
-        "design": cell.case.design,
-        "approach": cell.case.approach,
-        "sigma": cell.sigma,
-        "classes": json.dumps([] if nameless else [one for one in known if one]),
-        "effects": json.dumps([asdict(one) for one in truth.effects]),
-        "noise": json.dumps(truth.noise),
-        "gross": json.dumps(truth.gross if made else {}),
-        "gross_name": truth.gross["name"],
-        "oracle_detected": None if oracle is None else oracle.detected,
-        "oracle_best": json.dumps([] if oracle is None else oracle.best),
-        "oracle_told": json.dumps([] if oracle is None else oracle.told),
-        "oracle_alternatives": None if oracle is None else oracle.alternatives,
-        "left": json.dumps(truth.left),
-        "true_place": json.dumps(truth.place),
-        "sensor": json.dumps(truth.sensor),
-        "seed": json.dumps(truth.seed if made else None),
-        "failed": error,
+def table_of(name: str, rows: list[dict[str, list[Row]]]) -> pd.DataFrame:
+    """One of the tables of `COLUMNS`."""
+    content = [row for each in rows for row in each[name]]
+    table = pd.DataFrame(content, columns=COLUMNS[name])
+    return table.astype({column: TYPES[column] for column in COLUMNS[name]})
+
+
+def rows_of(job: Job, case: Case, k: int) -> dict[str, list[Row]]:
+    """Rows of a campaign, for each table of `COLUMNS`.
+
+    The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
+    """
+    what, model = f"{case.name} {k}", get_model(job.model)
+    made, failed = tried(lambda: job.make(case, k), f"{what}: not made")
+
+    def diagnosed() -> Row:
+        verdict = judge(made.campaign, model, seed=job.seed)
+        return outcome(verdict) | made.of_answer(verdict)
+
+    key, simpler = {"cell": case.name, "campaign": k}, []
+    with effects_without(removed(case)):
+        start = process_time()
+        answer, error = tried(diagnosed, what, failed)
+        seconds = process_time() - start
+        if job.baselines_every and int.from_bytes(case.digest(k)[:8]) % job.baselines_every == 0:
+            simpler = simpler_rows(made, model, what, failed)
+    truth = truth_row(case, made) | (made.columns if made else {})
+    return {
+        "campaigns": [key | truth | (answer or {}) | {"error": error}],
+        "seconds": [key | {"seconds": seconds}],
+        "baselines": [key | row for row in simpler],
     }
-    return made, row | (made.columns if made else {})
 
 
-def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
-    """Return the result of a work and no error, or None and the error; None is not worked on."""
-    if given is None:
-        return None, ""
+def truth_row(case: Case, made: Made | None) -> Row:
+    """What is true of a campaign."""
+    truth = made.truth if made else Truth()
+    # No name is right for what a session cannot show or the catalogue lacks.
+    nameless = case.set in ("invisible", "outside", "unforeseen")
+    known = [[name for name in one if name not in removed(case)] for one in truth.classes]
+    parts = asdict(truth)
+    oracle = parts.pop("oracle") or {}
+    return {
+        **{name: getattr(case, name) for name in ("set", "what", "size")},
+        **{name: getattr(case, name) for name in ("design", "approach", "sigma")},
+        **{name: json.dumps(value) for name, value in parts.items()},
+        "classes": json.dumps([] if nameless else [one for one in known if one]),
+        "gross_name": truth.gross["name"],
+        "oracle_detected": oracle.get("detected"),
+        "oracle_best": json.dumps(oracle.get("best", [])),
+        "oracle_told": json.dumps(oracle.get("told", [])),
+        "oracle_alternatives": oracle.get("alternatives"),
+    }
+
+
+def simpler_rows(made: Made | None, model: SensorModel, what: str, failed: str) -> list[Row]:
+    """What the simpler methods say; where the model cannot be fitted, each finds nothing."""
+    told, error = tried(lambda: [*answers(made.campaign, model)] if made else [], what, failed)
+    told = told or [(method, (False, [])) for method in METHODS]
+    return [
+        {"method": method, "detected": detected, "found": json.dumps(names), "error": error}
+        for method, (detected, names) in told
+    ]
+
+
+def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, str]:
+    """Return the result of a work and no error, or None and the error or that of an earlier one."""
+    if failed:
+        return None, failed
     try:
-        return work(given), ""
+        return work(), ""
     except InputError as error:
         logging.info("%s: %s", what, error)
         return None, f"refused: {error}"
@@ -123,21 +149,54 @@ def tried(work: Callable[[Any], Any], given: Any, what: str) -> tuple[Any, str]:
         return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
-def joined(truths: pd.DataFrame, outcomes: pd.DataFrame) -> pd.DataFrame:
-    """Truths and outcomes side by side, one row for each campaign.
+def outcome(d: Verdict) -> Row:
+    """Row of the table of outcomes."""
+    test, held = d.global_test, d.gap.held_out
+    fits = (d.base, d.final.solution) if d.verdict == "learned" else ()
+    explanations = [
+        {
+            "names": list(one.names),
+            "classes": [list(names) for names in one.classes],
+            "posterior": _rounded(one.posterior),
+        }
+        for one in d.credible_set
+    ]
+    return {
+        "verdict": d.verdict,
+        "found": json.dumps([one.name for one in d.effects]),
+        "specs": json.dumps([one.spec for one in d.effects]),
+        "found_classes": json.dumps([list(one.equivalence_class) for one in d.effects]),
+        "positions": json.dumps([one.position for one in d.effects]),
+        "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
+        "credible_set": json.dumps(explanations),
+        "place": json.dumps(d.place),
+        "fits": json.dumps([fit_squares(one) for one in fits]),
+        "confirmed": bool(d.gap.confirmed),
+        "statement": d.gap.statement or "",
+        "held_out_z": np.nan if held is None else float(held.z),
+        "sigma0_before": float(d.gap.before),
+        "sigma0_after": np.nan if d.gap.after is None else float(d.gap.after),
+        "p_size": np.nan if test is None else float(test.p_value),
+        "redundancy": d.base.redundancy,
+        "positions_used": d.campaign.n_positions,
+        "reason": d.reason,
+    }
 
-    Raises
-    ------
-    InputError
-        If a campaign has a truth and no outcome, or the other way round.
+
+def fit_squares(solution: Solution) -> dict[str, Any]:
+    """Sums of squares of the residuals of a fit, by kind, and what white noise leaves of them.
+
+    With H = U Uᵀ of the conditions, U an orthonormal basis of the columns of Ã, residuals of unit
+    weight have the sum of squares tr (I − H)² on average. Rows of Ã beside the conditions, those of
+    parameters with a prior, only hold the parameters.
     """
-    table = truths.merge(outcomes, on=KEY, how="outer", validate="1:1", indicator=True)
-    alone = table[table["_merge"] != "both"]
-    if len(alone):
-        first = alone.iloc[0]
-        lacks = "outcome" if first["_merge"] == "left_only" else "truth"
-        raise InputError(
-            f"{first['cell']}, campaign {first['campaign']}: has no {lacks}; {len(alone)} in all; "
-            "run the study again"
-        )
-    return table.drop(columns="_merge")
+    rows = solution.misclosures.size
+    basis = column_basis(solution.design)[:rows]
+    noise = rows - 2 * np.sum(basis**2) + np.sum((basis.T @ basis) ** 2)
+    squares = np.sum(solution.residuals**2, axis=0)
+    values = {"force": np.sum(squares[:3]), "angle": np.sum(squares[3:]), "noise": noise}
+    return {name: _rounded(float(value)) for name, value in values.items()}
+
+
+def _rounded(probability: float | None) -> float | None:
+    return None if probability is None else float(f"{probability:.6g}")

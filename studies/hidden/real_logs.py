@@ -31,6 +31,8 @@ from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Settings
 from studies.hidden.physics.measuring import Sensor
 
 Array = NDArray[np.float64]
+Spans = NDArray[np.int_]
+"""First sample of each hold, and the one after its last, (n, 2)."""
 
 BUMPED = "outlier_position"
 PUT: Mapping[str, Kind] = {
@@ -59,7 +61,7 @@ class Donor:
     forces : (N, 3) array, m/s², readings, or means where the log has no others
     time : (N,) array, s
     timed : bool, whether the log itself gives the time
-    spans : (n, 2) int array, first sample of each hold, and the one after its last
+    spans : Spans
     own : tuple of str, an effect that it has by itself, by any of these names
     """
 
@@ -68,8 +70,8 @@ class Donor:
     forces: Array
     time: Array
     timed: bool
-    spans: NDArray[np.int_]
-    own: tuple[str, ...]
+    spans: Spans
+    own: Sequence[str]
 
     @classmethod
     def opened(
@@ -82,28 +84,18 @@ class Donor:
     ) -> Donor:
         """Read a log, and find its holds; without times one position takes an interval, s."""
         campaign, report = import_log(path, settings)
-        spans = spans_of(campaign, report)
-        if settings.means:
-            forces = campaign.forces
-        else:
-            samples = read_log(path, settings).samples
-            forces = samples.forces
-        timed = not settings.means and settings.block is None
-        if timed:
+        samples = None if settings.means else read_log(path, settings).samples
+        forces = campaign.forces if samples is None else samples.forces
+        timed = samples is not None and settings.block is None
+        time: Array = interval / (settings.block or 1) * (np.arange(len(forces), dtype=float) + 0.5)
+        if samples is not None and timed:
             time = samples.time
-        else:
-            middles = np.arange(len(forces)) + 0.5
-            time = np.asarray(interval / (settings.block or 1) * middles, dtype=float)
-        return cls(name, settings, forces, time, timed, spans, tuple(own))
-
-    def means(self, values: Array, spans: NDArray[np.int_]) -> Array:
-        """Means (..., n, 3) over holds of values (..., N, 3)."""
-        return np.stack([values[..., a:b, :].mean(axis=-2) for a, b in spans], axis=-2)
+        return cls(name, settings, forces, time, timed, spans_of(campaign, report), own)
 
     @cached_property
     def sensor(self) -> Sensor:
         """The sensor that measures the same force in all holds, by least squares."""
-        means = self.means(self.forces, self.spans)
+        means = means_of(self.forces, self.spans)
 
         def misclosures(p: Array) -> Array:
             sensor = Sensor(*p.reshape(3, 3))
@@ -111,93 +103,120 @@ class Donor:
 
         return Sensor(*optimize.least_squares(misclosures, np.zeros(9)).x.reshape(3, 3))
 
-    @cached_property
-    def felt(self) -> Array:
-        """Forces along its axes that the sensor felt, (N, 3), m/s²."""
-        return (self.forces - self.sensor.bias) / (1 + self.sensor.scale)
-
-    @cached_property
-    def hold_of(self) -> NDArray[np.int_]:
-        """Hold to which each sample belongs, (N,); a move is shared by the holds around it."""
-        middles = (self.spans[:-1, 1] + self.spans[1:, 0]) / 2
-        return np.searchsorted(middles, np.arange(len(self.forces)), side="right")
-
     @property
     def redundancy(self) -> int:
         """That of a calibration with nine parameters, and with what the log has by itself."""
         return len(self.spans) - 9 - (EFFECTS[self.own[0]].k if self.own else 0)
 
-    def atlas(self, spans: NDArray[np.int_], course: Course | None, sigma: float = 1.0) -> Atlas:
+    def atlas(self, spans: Spans, course: Course | None, sigma: float = 1.0) -> Atlas:
         """All that holds can show; what the log has by itself is absorbed."""
-        n, means = len(spans), self.means(self.forces, spans)
+        n, means, (starts, ends) = len(spans), means_of(self.forces, spans), spans.T
         session = Session(
             self.name,
             joints_of((means - self.sensor.bias) @ self.sensor.correction.T),
             np.zeros(n),
             sigma,
             ANGLE_SIGMA,
-            length=float(np.median(self.time[spans[:, 1] - 1] - self.time[spans[:, 0]])),
-            time=(self.time[spans[:, 0]] + self.time[spans[:, 1] - 1]) / 2,
+            length=float(np.median(self.time[ends - 1] - self.time[starts])),
+            time=(self.time[starts] + self.time[ends - 1]) / 2,
             course=course,
         )
         atlas = Atlas(session, Conditions.of(session, "gravity", self.sensor))
-        for name in self.own[:1]:
-            shape, known = atlas.shape(EFFECTS[name], {}), atlas.conditions.absorbed
-            assert shape is not None
-            absorbed = np.linalg.qr(np.concatenate([known, shape.basis], axis=1))[0]
-            atlas = Atlas(session, replace(atlas.conditions, absorbed=absorbed))
-        return atlas
+        if not self.own:
+            return atlas
+        shape, conditions = atlas.shape(EFFECTS[self.own[0]], {}), atlas.conditions
+        assert shape is not None
+        absorbed = np.linalg.qr(np.concatenate([conditions.absorbed, shape.basis], axis=1))[0]
+        return Atlas(session, replace(conditions, absorbed=absorbed))
 
     @cached_property
     def sigma(self) -> float:
         """Noise of a position mean, m/s², as the residuals of the log itself have it."""
-        left = self.atlas(self.spans, None).conditions.seen(
-            self.means(self.forces, self.spans)[None], np.zeros((1, len(self.spans), 2))
-        )
+        left = residuals(self.atlas(self.spans, None), means_of(self.forces, self.spans))
         return float(np.sqrt(np.sum(left**2) / self.redundancy))
 
     def unit(self, kind: Kind, settings: dict[str, float], course: Course | None) -> Array:
         """What each parameter of a kind adds to the readings, (k, N, 3)."""
-        felt, time, by_hold = self.felt, self.time, kind.name in BY_HOLD
-        if by_hold:
-            felt, time = self.means(felt, self.spans), time[self.spans[:, 0]]
+        felt, time = (self.forces - self.sensor.bias) / (1 + self.sensor.scale), self.time
+        if kind.name in BY_HOLD:
+            felt, time = means_of(felt, self.spans), time[self.spans[:, 0]]
         session = Session(
             self.name, np.zeros((len(time), 2)), time, 1.0, 1.0, time=time, course=course
         )
         added = Cause(kind, settings, np.eye(kind.k)).change(felt[None], session)
-        return added[:, self.hold_of] if by_hold else added
+        if kind.name not in BY_HOLD:
+            return added
+        # A move is shared by the holds around it.
+        middles = (self.spans[:-1, 1] + self.spans[1:, 0]) / 2
+        return added[:, np.searchsorted(middles, np.arange(len(self.forces)), side="right")]
+
+    def left(
+        self, kind: Kind, settings: dict[str, float], atlas: Atlas, spans: Spans
+    ) -> tuple[Array, Shape | None]:
+        """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape."""
+        holds = means_of(self.unit(kind, settings, atlas.session.course), spans)
+        left = atlas.conditions.left(atlas.conditions.changed(holds))
+        size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
+        return left, Shape.of(kind, settings, left, size)
+
+    def drawn(
+        self, name: str, size: float, course: Course | None, rng: np.random.Generator
+    ) -> Cause:
+        """Draw an effect that has a noncentrality in the log.
+
+        Raises
+        ------
+        InputError
+            If the log cannot show it.
+        """
+        kind, atlas = PUT[name], self.atlas(self.spans, course, self.sigma)
+        settings = kind.settings.draw(atlas.session, rng)
+        if "t" in settings:  # between two holds: what jumps within one is another effect
+            starts, ends = self.spans.T
+            between = (self.time[ends[:-1] - 1] + self.time[starts[1:]]) / 2
+            settings["t"] = float(between[np.argmin(abs(between - settings["t"]))])
+        left, shape = self.left(kind, settings, atlas, self.spans)
+        if shape is None:
+            raise InputError(f"{self.name}: cannot show {name}")
+        parameters = shape.drawn(rng)
+        factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
+        return Cause(kind, settings, parameters[None] * factor)
 
     def write(
         self,
         path: Path,
-        puts: Sequence[Cause],
+        causes: Sequence[Cause],
         course: Course | None,
         columns: Mapping[str, Array],
     ) -> ImportSettings:
         """Write the log with effects in its readings, and columns; returns how it is imported."""
         given, added = self.settings, np.zeros(self.forces.shape)
-        for one in puts:
+        for one in causes:
             added += np.tensordot(one.parameters[0], self.unit(one.kind, one.settings, course), 1)
         conversion = conversion_of(given.unit, given.scale, given.offset)
         raw = conversion.from_si(given.axes.from_frd(self.forces + added))
         if given.unit == "counts":
             raw = np.round(raw)
-        table = dict(zip(("fx", "fy", "fz"), raw.T, strict=True)) | dict(columns)
+        table = {**dict(zip(("fx", "fy", "fz"), raw.T, strict=True)), **columns}
         if given.time is not None:
             table["time"] = self.time
         pd.DataFrame(table).to_parquet(path)
-        return given.model_copy(
-            update={
-                "columns": {name: name for name in table if name != "time"},
-                "time": "time" if "time" in table else None,
-                "time_unit": "s",
-                "variable": None,
-            }
-        )
+        layout = {
+            "columns": {name: name for name in table if name != "time"},
+            "time": "time" if "time" in table else None,
+            "time_unit": "s",
+            "variable": None,
+        }
+        return given.model_copy(update=layout)
 
 
-def spans_of(campaign: Campaign, report: ImportReport) -> NDArray[np.int_]:
-    """First sample of each hold that is used, and the one after its last, (n, 2)."""
+def means_of(values: Array, spans: Spans) -> Array:
+    """Means (..., n, 3) over holds of values (..., N, 3)."""
+    return np.stack([values[..., a:b, :].mean(axis=-2) for a, b in spans], axis=-2)
+
+
+def spans_of(campaign: Campaign, report: ImportReport) -> Spans:
+    """Samples of each hold that is used."""
     if report.holds is None:
         first = np.arange(campaign.n_positions)
         return np.column_stack([first, first + 1])
@@ -205,74 +224,69 @@ def spans_of(campaign: Campaign, report: ImportReport) -> NDArray[np.int_]:
     return np.array([[segment.start, segment.end] for segment in used])
 
 
-def put(
-    name: str, size: float, log: Donor, course: Course | None, rng: np.random.Generator
-) -> Cause:
-    """Draw an effect that has a noncentrality in a log.
-
-    Raises
-    ------
-    InputError
-        If the log cannot show it.
-    """
-    kind, atlas = PUT[name], log.atlas(log.spans, course, log.sigma)
-    settings = kind.settings.draw(atlas.session, rng)
-    if "t" in settings:  # between two holds: what jumps within one is another effect
-        between = (log.time[log.spans[:-1, 1] - 1] + log.time[log.spans[1:, 0]]) / 2
-        settings["t"] = float(between[np.argmin(abs(between - settings["t"]))])
-    left, shape = seen(log, log.spans, atlas, kind, settings)
-    if shape is None:
-        raise InputError(f"{log.name}: cannot show {name}")
-    parameters = shape.drawn(rng)
-    return Cause(
-        kind, settings, parameters[None] * np.sqrt(size / np.sum((parameters @ left) ** 2))
-    )
-
-
-def seen(
-    log: Donor,
-    spans: NDArray[np.int_],
-    atlas: Atlas,
-    kind: Kind,
-    settings: dict[str, float],
-) -> tuple[Array, Shape | None]:
-    """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape."""
-    holds = log.means(log.unit(kind, settings, atlas.session.course), spans)
-    left = atlas.conditions.left(atlas.conditions.changed(holds))
-    size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
-    return left, Shape.of(kind, settings, left, size)
+def residuals(atlas: Atlas, forces: Array) -> Array:
+    """Residuals (m,) of unit weight of a calibration by forces (n, 3)."""
+    return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What an effect shows in the holds of a log, all of unit weight.
+    """An effect in the holds of a log that was imported with it, all of unit weight.
 
     Attributes
     ----------
+    log : Donor
     cause : Cause
-    spans : (n, 2) int array, of the holds
+    spans : Spans, of the holds
     atlas : Atlas, of the holds
-    shape : Shape
     whole : (m,) array, residuals of a calibration
-    beside : (m, d) array, orthonormal, what the other effects take up
+    shape : Shape
     left : (k, m) array, what each parameter leaves
-    redundancy : int
+    beside : (m, d) array, orthonormal, what the other effects take up
     """
 
+    log: Donor
     cause: Cause
-    spans: NDArray[np.int_]
+    spans: Spans
     atlas: Atlas
-    shape: Shape
     whole: Array
-    beside: Array
+    shape: Shape
     left: Array
-    redundancy: int
+    beside: Array
+
+    @classmethod
+    def all(
+        cls, log: Donor, spans: Spans, course: Course | None, causes: Sequence[Cause], forces: Array
+    ) -> list[Shown]:
+        """Show each of some effects beside the others.
+
+        Raises
+        ------
+        InputError
+            If the holds cannot show one.
+        """
+        if not causes:
+            return []
+        atlas = log.atlas(spans, course, log.sigma)
+        whole, found = residuals(atlas, forces), []
+        for cause in causes:
+            left, shape = log.left(cause.kind, cause.settings, atlas, spans)
+            if shape is None:
+                raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
+            found.append((cause, left, shape))
+        nothing = np.zeros((len(whole), 0))
+        return [
+            cls(log, cause, spans, atlas, whole, shape, left, np.concatenate(
+                [nothing, *(other.basis for *_, other in found if other is not shape)], axis=1
+            ))
+            for cause, left, shape in found
+        ]  # fmt: skip
 
     def without(self, rows: Array) -> Array:
         """Residuals (..., m) without what the other effects take up."""
         return np.asarray(rows - (rows @ self.beside) @ self.beside.T)
 
-    @property
+    @cached_property
     def true(self) -> Array:
         """What the effect left in the residuals, (m,), beside the others."""
         return self.without(self.cause.parameters[0] @ self.left)
@@ -282,38 +296,9 @@ class Shown:
         z, true = self.without(self.whole), self.true
         basis = np.linalg.qr(self.without(self.shape.basis.T).T)[0]
         gain, d = float(np.sum((z @ basis) ** 2)), basis.shape[1]
-        dof = self.redundancy - d
+        lost = len(self.log.spans) - len(self.spans)
+        dof = self.log.redundancy - lost - self.beside.shape[1] - d
         variance = (float(z @ z) - gain) / dof
         p = float(special.fdtrc(d, dof, gain / d / variance))
         size = float(true @ true)
         return p, float(z @ true) / size, float(np.sqrt(variance / size))
-
-
-def shown(
-    log: Donor,
-    spans: NDArray[np.int_],
-    course: Course | None,
-    causes: Sequence[Cause],
-    forces: Array,
-) -> list[Shown]:
-    """What effects show in the holds of a log that was imported with them.
-
-    Raises
-    ------
-    InputError
-        If the holds cannot show one.
-    """
-    if not causes:
-        return []
-    atlas = log.atlas(spans, course, log.sigma)
-    whole = atlas.conditions.seen(forces[None], np.zeros((1, len(spans), 2)))[0]
-    found = [seen(log, spans, atlas, one.kind, one.settings) for one in causes]
-    result = []
-    for i, (cause, (left, shape)) in enumerate(zip(causes, found, strict=True)):
-        if shape is None:
-            raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
-        others = [other.basis for k, (_, other) in enumerate(found) if other and k != i]
-        beside = np.concatenate([np.zeros((len(whole), 0)), *others], axis=1)
-        redundancy = log.redundancy + len(spans) - len(log.spans) - beside.shape[1]
-        result.append(Shown(cause, spans, atlas, shape, whole, beside, left, redundancy))
-    return result

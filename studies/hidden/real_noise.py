@@ -8,44 +8,31 @@ test says that knows the form of the effect, and the oracle's best answer.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import ClassVar, Self
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import UnknownNameError
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.config_names import ModelName
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import get_effect
-from accelstudy.files.tables import write_table
-from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, checked
-from studies.hidden.campaigns import SCHEMA, Made, Row, rows_table
-from studies.hidden.cells import Cell
-from studies.hidden.config import Study
-from studies.hidden.diagnosing import diagnosed
-from studies.hidden.physics.designs import Course
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates
+from studies.hidden.physics.designs import Array, Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.oracle import Oracle
-from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, put, seen, shown, spans_of
-
-Array = NDArray[np.float64]
+from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, spans_of
+from studies.hidden.study import Job, Made, Row, Study
 
 FEWEST = 5
 """Redundancy of a log, below which nothing is put into it."""
-SIZES = ("p_known", "known_ratio", "known_sigma", "ratio", "ratio_sigma")
-"""p-value of the F test that knows the form; size over true size and its sigma, by that test and by
-the diagnosis. Of two effects they are those of the one that is less certain."""
-LOG_SCHEMA = {**SCHEMA["truths"], **SCHEMA["outcomes"], **dict.fromkeys(SIZES, "float64"),
-              "recorded": "boolean"}  # fmt: skip
-"""Columns of the table of a log: a row of truth and answer each."""
 
 
 class Log(Block):
@@ -58,6 +45,9 @@ class Log(Block):
 
 class RealNoiseConfig(Study):
     """A study with real noise; results go to ``results/<study>``."""
+
+    tables: ClassVar = ("campaigns",)
+    """Tables of its score."""
 
     public_folder: str = Field(
         "resources/public", description="where the logs are, or are downloaded to"
@@ -73,114 +63,102 @@ class RealNoiseConfig(Study):
         "others with a temperature (and a time) recorded that does nothing"
     )
 
-    def model_of(self, log: str) -> str:
-        """Model with which a log is diagnosed."""
-        return self.logs[log].model or self.model
+    @model_validator(mode="after")
+    def _names_exist(self) -> Self:
+        for name in self.logs:
+            import_settings(name)
+        for name in "+".join(self.effects).split("+"):
+            if name not in PUT:
+                raise ValueError(f"effects: {UnknownNameError('effect', name, PUT)}")
+        return self
 
+    @property
+    def jobs(self) -> list[str]:
+        """Names of the jobs, one for each log."""
+        return [*self.logs]
 
-def parse_real_noise(content: Mapping[str, Any], source: str = "config") -> RealNoiseConfig:
-    """As `parse_hidden`, of a study with real noise."""
-    config = checked(RealNoiseConfig, content, source)
-    for name in config.logs:
-        import_settings(name)
-    for name in {one for each in config.effects for one in each.split("+")}:
-        if name not in PUT:
-            raise InputError(f"{source}: effects: {UnknownNameError('effect', name, PUT)}")
-    return config
+    def write_plan(self, path: str | Path) -> None:
+        """Write an empty plan: what can be put into a log shows when it is read."""
+        with whole_file(path) as temporary:
+            temporary.write_text("{}", encoding="utf-8")
+
+    def job(self, name: str, plan: str | Path) -> Job:
+        """Campaigns of a log."""
+        path, settings = public_file(name, self.public_folder), import_settings(name)
+        return self.of_log(Donor.opened(name, path, settings, self.interval_s, self.logs[name].own))
+
+    def of_log(self, log: Donor) -> Job:
+        """Campaigns of a log that is open."""
+        return Job(
+            self.log_cases(log),
+            lambda case, k: changed_log(log, case, case.seed(self.seed, k)),
+            self.logs[log.name].model or self.model,
+            self.diagnosis_seed,
+        )
+
+    def log_cases(self, log: Donor) -> Iterator[tuple[LogCase, int]]:
+        """All campaigns of a log; beside an effect of its own, single ones of other names."""
+        for number in range(self.nothing):
+            yield LogCase("null", log.name, recorded=True if number else None), number
+        for effects in self.effects if log.redundancy >= FEWEST else ():
+            names = tuple(effects.split("+"))
+            if log.own and (len(names) > 1 or names[0] in log.own):
+                continue
+            lacking = {need for name in names for need in PUT[name].needs}
+            lacking -= {"time"} if log.timed else set()
+            both = (True, False) if len(names) == 1 else (True,)
+            for size in self.sizes:
+                for recorded in both if lacking else (None,):
+                    set_ = "one" if len(names) == 1 else "two"
+                    lam = (size,) * len(names)
+                    yield LogCase(set_, log.name, effect=names, lam=lam, recorded=recorded), 0
 
 
 @dataclass(frozen=True)
-class LogCell(Cell):
-    """Campaigns of a log.
+class LogCase(Case):
+    """A kind of campaign of a log.
 
     Attributes
     ----------
     recorded : bool, whether the columns on which effects depend are there; None if they need none
     """
 
+    approach: str = "gravity"
+    sigma_known: bool = False
     recorded: bool | None = None
+
+    @property
+    def session(self) -> str:
+        """Log, effects and their size."""
+        return f"{self.design}/{self.what or 'nothing'}/{self.size:g}"
 
     @property
     def name(self) -> str:
         """Name, unique within a study."""
         columns = {None: "as it is", True: "recorded", False: "not recorded"}[self.recorded]
-        return f"{self.case.design}/{self.what or 'nothing'}/{self.size:g}/{columns}"
+        return f"{self.session}/{columns}"
 
     def seed(self, seed: int, campaign: int) -> np.random.SeedSequence:
         """Seed of a campaign: with and without its columns it is the same session."""
-        what = f"{self.case.design}/{self.what or 'nothing'}/{self.size:g}"
-        return np.random.SeedSequence([seed, zlib.crc32(what.encode()), campaign])
+        return np.random.SeedSequence([seed, zlib.crc32(self.session.encode()), campaign])
 
 
-def log_cells(config: RealNoiseConfig, log: Donor) -> Iterator[tuple[LogCell, int]]:
-    """All campaigns of a log; beside an effect of its own, single ones of other names."""
-    for number in range(config.nothing):
-        null = Case("null", log.name, "gravity", sigma_known=False)
-        yield LogCell(null, recorded=True if number else None), number
-    for effects in config.effects if log.redundancy >= FEWEST else ():
-        names = tuple(effects.split("+"))
-        if log.own and (len(names) > 1 or names[0] in log.own):
-            continue
-        there = {"time"} if log.timed else set()
-        lacking = {need for name in names for need in PUT[name].needs} - there
-        both = (True, False) if len(names) == 1 else (True,)
-        for size in config.sizes:
-            set_ = "one" if len(names) == 1 else "two"
-            case = Case(set_, log.name, "gravity", False, names, (size,) * len(names))
-            for recorded in both if lacking else (None,):
-                yield LogCell(case, recorded=recorded), 0
-
-
-def _course(duration: float, rng: np.random.Generator) -> Course:
-    """A temperature that rises to a limit, or wanders."""
-    time = np.linspace(0.0, duration, 60)
-    if rng.random() < 0.5:
-        slow = duration * rng.uniform(0.2, 1.0)
-        return Course(time, 21 + rng.uniform(4, 15) * -np.expm1(-time / slow))
-    turns, start = rng.uniform(0.4, 3.0, 3), rng.uniform(0, 2 * np.pi, 3)
-    waves = np.sin(2 * np.pi * np.outer(time / duration, turns) + start)
-    return Course(time, 24 + waves @ rng.uniform(1, 3, 3))
-
-
-def run_log(
-    config: RealNoiseConfig, name: str, output: str | Path, provenance: Mapping[str, Any]
-) -> None:
-    """Put effects into a log, have each campaign diagnosed, and write truths and answers."""
-    path, settings = public_file(name, config.public_folder), import_settings(name)
-    log = Donor.opened(name, path, settings, config.interval_s, config.logs[name].own)
-    write_table(output, log_table(config, log, log_cells(config, log)), provenance)
-
-
-def log_table(
-    config: RealNoiseConfig, log: Donor, campaigns: Iterable[tuple[LogCell, int]]
-) -> pd.DataFrame:
-    """Truths and answers of campaigns of a log, side by side."""
-
-    def make(cell: LogCell, k: int) -> Made:
-        return changed_log(config.seed, log, cell, k)
-
-    rows = diagnosed(campaigns, make, config.model_of(log.name), config.diagnosis_seed)
-    return rows_table(({**truth, **answer} for truth, answer, _ in rows), LOG_SCHEMA)
-
-
-def changed_log(seed: int, log: Donor, cell: LogCell, k: int) -> Made:
+def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> Made:
     """Put effects into a log, and import it."""
-    case, rng, course = cell.case, np.random.default_rng(cell.seed(seed, k)), None
+    rng, course, columns = np.random.default_rng(seed), None, dict[str, Array]()
     if any("course" in PUT[name].needs for name in case.effect) or not case.effect:
         course = _course(float(log.time[-1]), rng)
-    causes = [
-        put(name, lam, log, course, rng) for name, lam in zip(case.effect, case.lam, strict=True)
-    ]
-    columns: dict[str, Array] = {}
-    if cell.recorded and course is not None:
+    sizes = [*zip(case.effect, case.lam, strict=True)]
+    causes = [log.drawn(name, lam, course, rng) for name, lam in sizes]
+    if case.recorded and course is not None:
         columns["temperature"] = np.round(course.at(log.time), 1)
-    if cell.recorded and not log.timed:
+    if case.recorded and not log.timed:
         columns["time"] = log.time
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"{log.name}.parquet"
         campaign, report = import_log(path, log.write(path, causes, course, columns))
     spans = spans_of(campaign, report)
-    found = shown(log, spans, course, causes, campaign.forces)
+    found = Shown.all(log, spans, course, causes, campaign.forces)
     truth = Truth(
         effects=tuple(
             HiddenEffect(one.kind.name, one.settings, tuple(one.parameters[0].tolist()), lam)
@@ -200,29 +178,42 @@ def changed_log(seed: int, log: Donor, cell: LogCell, k: int) -> Made:
         truth = replace(truth, classes=classes, oracle=said)
     row: Row = {
         "sigma": "given" if campaign.sigma_force else "not given",
-        "recorded": cell.recorded,
+        "recorded": case.recorded,
     }
+    # Of two effects the numbers are those of the one that is less certain.
     if found:
-        row |= dict(zip(SIZES, max(one.f_test() for one in found), strict=False))
-    return Made(campaign, truth, row, lambda verdict: _sizes(log, found, verdict))
+        tests = ("p_known", "known_ratio", "known_sigma")
+        row |= dict(zip(tests, max(one.f_test() for one in found), strict=True))
+    return Made(campaign, truth, row, lambda verdict: _sizes(found, verdict))
 
 
-def _sizes(log: Donor, found: Sequence[Shown], verdict: Verdict) -> Row:
+def _course(duration: float, rng: np.random.Generator) -> Course:
+    """A temperature that rises to a limit, or wanders."""
+    time = np.linspace(0.0, duration, 60)
+    if rng.random() < 0.5:
+        slow = duration * rng.uniform(0.2, 1.0)
+        return Course(time, 21 + rng.uniform(4, 15) * -np.expm1(-time / slow))
+    turns, start = rng.uniform(0.4, 3.0, 3), rng.uniform(0, 2 * np.pi, 3)
+    waves = np.sin(2 * np.pi * np.outer(time / duration, turns) + start)
+    return Course(time, 24 + waves @ rng.uniform(1, 3, 3))
+
+
+def _sizes(found: Sequence[Shown], verdict: Verdict) -> Row:
     """Size of an effect as the diagnosis found it over the true size, the least certain one."""
     sizes = []
     for one in found:
         name = one.cause.kind.name
-        named = next((each for each in verdict.found if each.name == name), None)
-        if named is None or not named.parameters:
+        given = [list(each.parameters or ()) for each in verdict.found if each.name == name]
+        if not given or not given[0]:
             continue
         settings = next(each for each in verdict.extended.effects if each.name == name).settings
         # Some of its parameters may be zero, as the positions do not show them.
         names = [parameter.name for parameter in get_effect(name).parameters]
-        rows = [names.index(parameter) for parameter, *_ in named.parameters]
-        left = seen(log, one.spans, one.atlas, one.cause.kind, settings)[0][rows]
-        part = left @ one.true / float(one.true @ one.true)
-        columns = [verdict.extended.parameter_names.index(names[row]) for row in rows]
+        shown, values = zip(*((p[0], p[1]) for p in given[0]), strict=True)
+        left = one.log.left(one.cause.kind, settings, one.atlas, one.spans)[0]
+        part = left[[names.index(each) for each in shown]] @ one.true / float(one.true @ one.true)
+        columns = [verdict.extended.parameter_names.index(each) for each in shown]
         covariance = verdict.final.solution.cofactors[np.ix_(columns, columns)]
         sigma = float(np.sqrt(part @ covariance @ part * verdict.unit_variance))
-        sizes.append((sigma, float(np.array([p[1] for p in named.parameters]) @ part)))
+        sizes.append((sigma, float(np.array(values) @ part)))
     return dict(zip(("ratio_sigma", "ratio"), max(sizes, default=()), strict=False))

@@ -273,16 +273,12 @@ ANSWER = ("verdict", "specs", "positions", "posteriors", "place", "confirmed", "
 
 def hidden(folder, approach) -> Texts:
     """What the diagnosis says of hidden campaigns, a line each."""
-    from studies.hidden.campaigns import simulated
-    from studies.hidden.cells import study_cells
-    from studies.hidden.config import parse_hidden
-    from studies.hidden.diagnosing import diagnosed
+    from studies.hidden.campaigns import parse_hidden, rows_of
 
     config = parse_hidden(yaml.safe_load((GOLDEN / "hidden.yaml").read_text("utf-8")))
-    cells = [cell for cell in study_cells(config) if cell.case.approach == approach]
-    campaigns = [(cell, k) for cell in cells for k in range(cell.count)]
-    rows = diagnosed(campaigns, simulated(config.seed), config.model, config.diagnosis_seed)
-    yield "campaigns", "".join(answer(outcome) for _, outcome, _ in rows)
+    job = config.simulated(one for one in config.campaigns() if one[0].approach == approach)
+    rows = (rows_of(job._replace(baselines_every=0), *one) for one in job.campaigns)
+    yield "campaigns", "".join(answer(each["campaigns"][0]) for each in rows)
 
 
 def answer(row):

@@ -54,7 +54,8 @@ DRAWN = {
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
-    "hidden": ("make hidden-docs", "studies/hidden/scoring/figures.py"),
+    "hidden": ("make hidden-docs", "studies/hidden/scoring/figures.py",
+               "studies/hidden/scoring/score.yaml"),
     "speed": ("make benchmarks",
               *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.py"))),
 }  # fmt: skip

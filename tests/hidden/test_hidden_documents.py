@@ -8,15 +8,12 @@ import pytest
 from places import ROOT
 
 from accelstudy.files.reading import read_layer
-from accelstudy.files.tables import read_table
 from studies.hidden.baselines import METHODS
-from studies.hidden.campaigns import joined
-from studies.hidden.cells import Cell
-from studies.hidden.config import SETS, parse_hidden
-from studies.hidden.diagnosing import run_chunk
+from studies.hidden.campaigns import campaigns_of, parse_hidden
 from studies.hidden.physics.generate import Case
 from studies.hidden.scoring.figures import figures
-from studies.hidden.scoring.page import TABLES, markdown, sample_table
+from studies.hidden.scoring.page import markdown, sample_table
+from studies.hidden.study import SETS
 
 DOCS = ROOT / "docs"
 CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/hidden-effects.yaml"))
@@ -78,15 +75,12 @@ def test_the_score_is_that_of_the_study():
     assert not made.exists() or made.read_text(encoding="utf-8") == text
 
 
-def test_the_score_is_that_of_the_code(tmp_path):
+def test_the_score_is_that_of_the_code():
     """Of a sample of its campaigns a third, as the golden set has 400 more, gets the answers."""
     told = SCORE.tables.get("A sample", [])[::3]
     assert told, f"the score has no sample; {RENEWED}"
-    outputs = {name: tmp_path / f"{name}.parquet" for name in ("truths", "outcomes", "seconds")}
-    campaigns = [(cell_of(row["cell"]), int(row["campaign"])) for row in told]
-    run_chunk(CONFIG, campaigns, outputs, {"config_hash": CONFIG.fingerprint, "seed": CONFIG.seed})
-    answers = joined(read_table(outputs["truths"]), read_table(outputs["outcomes"]))
-    now = rows_of(markdown(sample_table(answers)))
+    asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
+    now = rows_of(markdown(sample_table(campaigns_of(CONFIG.simulated(asked)))))
     changed = [
         f"{old}\n  now {new}" for old, new in zip(told, now, strict=True) if not alike(old, new)
     ]
@@ -96,14 +90,14 @@ def test_the_score_is_that_of_the_code(tmp_path):
     )
 
 
-def cell_of(name):
-    """The cell of a name, with one campaign; the reverse of `Cell.name`."""
+def case_of(name):
+    """The case of a name; the reverse of `Case.name`."""
     set_, *hidden, design, approach, sigma = name.split("/")
     what, size = [*hidden, "", ""][:2]
     kinds = {set_: what} if set_ in ("noise", "gross") else {}
     effects = () if kinds or not what else tuple(what.split("+"))
     lam = (float(size),) * len(effects) if size else ()
-    return Cell(Case(set_, design, approach, sigma == "sigma given", effects, lam, **kinds), 1)
+    return Case(set_, design, approach, sigma == "sigma given", effects, lam, **kinds)
 
 
 def alike(old, new):
@@ -135,7 +129,7 @@ def test_another_answer_is_noticed(head, new, same):
 def test_the_documents_name_every_figure_set_and_method():
     text = (DOCS / "guides/hidden-effects.md").read_text(encoding="utf-8")
     make = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for name in (*figures({}), *SETS, *METHODS, *TABLES):
+    for name in (*figures({}), *SETS, *METHODS, *CONFIG.tables):
         assert f"| `{name}` |" in text
     assert f"for name in {' '.join(figures({}))};" in make
 

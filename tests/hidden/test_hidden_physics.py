@@ -32,8 +32,7 @@ from studies.hidden.physics.gross import visible_gross
 from studies.hidden.physics.kinds import COORDINATES, FACTORS, OF_ROBOT, OUTPUTS, Cause
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
 from studies.hidden.physics.oracle import oracle, visible_outside, visible_unforeseen
-from studies.hidden.physics.outside import OUTSIDE
-from studies.hidden.physics.unforeseen import UNFORESEEN
+from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -218,7 +217,7 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
                 assert 200 > one > two > 20, name
                 place = {**OUTSIDE, **UNFORESEEN}[name].place
                 recorded = place and (approach == "robot" or place[0] not in OF_ROBOT)
-                assert truth.place == (place if recorded else None), name
+                assert truth.true_place == (place if recorded else None), name
 
 
 # --- physics outside the catalogue ---------------------------------------------------------------

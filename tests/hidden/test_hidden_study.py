@@ -1,6 +1,9 @@
-"""The study of hidden effects: its configuration, its cells and seeds, and its jobs."""
+"""The study of hidden effects: its configuration, its campaigns and seeds, and its jobs."""
+
+from collections import Counter
 
 import numpy as np
+import pandas as pd
 import pytest
 from calling import refused
 from places import ROOT
@@ -9,13 +12,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.effects import effect_names, effects_without
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.tables import read_table
-from studies.hidden import campaigns, diagnosing
-from studies.hidden.baselines import METHODS, run_baselines
-from studies.hidden.campaigns import KEY
-from studies.hidden.cells import Cell, chunks, number_of_chunks, planned, study_cells, write_plan
-from studies.hidden.config import KINDS, parse_hidden
-from studies.hidden.diagnosing import run_chunk
+from studies.hidden import campaigns, study
+from studies.hidden.baselines import METHODS
+from studies.hidden.campaigns import COLUMNS, KEY, campaigns_of, parse_hidden, rows_of, run
 from studies.hidden.physics.generate import Case
+from studies.hidden.study import JOB, KINDS, removed
 
 TINY = {
     "study": "tiny",
@@ -27,18 +28,15 @@ TINY = {
     "removed": {"kinds": ["bias_drift"], "sizes": [400], "campaigns": 1},
 }
 PROVENANCE = {"config_hash": "0", "seed": 3}
+CONFIG = parse_hidden(TINY)
 
 
 @pytest.fixture(scope="module")
-def plan(tmp_path_factory):
-    """Configuration and campaigns of the tiny study."""
-    path, config = tmp_path_factory.mktemp("plan") / "plan.json", parse_hidden(TINY)
-    write_plan(config, path)
-    return config, list(planned(path, 0))
-
-
-def paths(folder):
-    return {name: folder / f"{name}.parquet" for name in ("truths", "outcomes", "seconds")}
+def job(tmp_path_factory):
+    """The campaigns of the tiny study, planned."""
+    path = tmp_path_factory.mktemp("plan") / "plan.json"
+    CONFIG.write_plan(path)
+    return CONFIG.job("0000", path)
 
 
 # --- the configuration ---------------------------------------------------------------------------
@@ -71,7 +69,7 @@ def test_a_kind_that_no_session_can_show():
     with pytest.raises(
         InputError, match=r"one\.kinds: no session of the study can show thermal_bias"
     ):
-        study_cells(config)
+        config.campaigns()
 
 
 def test_the_full_study():
@@ -80,23 +78,19 @@ def test_the_full_study():
     config = parse_hidden(
         {**content, "outside": None, "unforeseen": None, "two": None}
     )  # to plan them takes long
-    cells = study_cells(config)
-    null = [cell for cell in cells if cell.case.set == "null"]
-    assert sum(cell.count for cell in null) >= 12000
-    assert len({cell.case.design for cell in null}) >= 8
-    assert len(null) == len(config.places)
-    counts = {}
-    for cell in cells:
-        if cell.case.set == "one":
-            key = cell.what, cell.size
-            counts[key] = counts.get(key, 0) + cell.count
+    cases = [case for case, _ in config.campaigns()]
+    null = [case for case in cases if case.set == "null"]
+    assert len(null) >= 12000
+    assert len({case.design for case in null}) >= 8
+    assert len({*null}) == len(config.places)
+    counts = Counter((case.what, case.size) for case in cases if case.set == "one")
     assert set(counts.values()) == {30}
     assert {size for _, size in counts} == {6, 10.5, 16, 25, 40, 60, 100, 400}
     # Those that have a formula of their own for this study; gravity_error is invisible everywhere.
     visible = {*KINDS["one"][0]} - {"gravity_error"}
     assert len(visible) >= 23
     assert {what for what, _ in counts} >= visible
-    assert len({cell.name for cell in cells}) == len(cells)
+    assert len({case.name for case in cases}) == len({*cases})
 
 
 def test_the_small_study_overlays_the_full_one():
@@ -105,60 +99,46 @@ def test_the_small_study_overlays_the_full_one():
         read_layer(ROOT / "studies/hidden/config/hidden-smoke.yaml"),
     )
     config = parse_hidden(content)
-    assert config.campaigns < 40
-    assert number_of_chunks(config) == 1
+    assert config.most < 40
+    assert len(config.jobs) == 1
 
 
-# --- cells and seeds -----------------------------------------------------------------------------
+# --- campaigns and seeds --------------------------------------------------------------------------
 
 
-def entropy(cells):
-    return {
-        (cell.name, k): tuple(cell.seed(3, k).generate_state(4))
-        for cell in cells
-        for k in range(cell.count)
-    }
+def seeds(content):
+    campaigns = parse_hidden(content).campaigns()
+    return {(case.name, k): tuple(case.seed(3, k).generate_state(4)) for case, k in campaigns}
 
 
-def test_a_further_cell_and_further_campaigns_change_no_seed():
-    before = entropy(study_cells(parse_hidden(TINY)))
-    more = overlay(TINY, {"one": {"kinds": ["hysteresis", "settling"], "campaigns": 20},
-                          "nothing": {"campaigns": 4}})  # fmt: skip
-    after = entropy(study_cells(parse_hidden(more)))
+def test_a_further_kind_and_further_campaigns_change_no_seed():
+    before = seeds(TINY)
+    after = seeds(overlay(TINY, {"one": {"kinds": ["hysteresis", "settling"], "campaigns": 20},
+                                 "nothing": {"campaigns": 4}}))  # fmt: skip
     assert before.items() <= after.items()
     assert len(set(after.values())) == len(after) > len(before)
 
 
-def test_chunks_hold_each_campaign_once():
-    content = overlay(TINY, {"nothing": {"campaigns": 30}})
-    cells = study_cells(parse_hidden(content))
-    whole = {(cell.name, k) for cell in cells for k in range(cell.count)}
-    for number in (1, 2, 7):
-        parts = chunks(cells, number)
-        got = [
-            (Cell(Case(**case)).name, k)
-            for part in parts
-            for case, first, stop in part
-            for k in range(first, stop)
-        ]
-        assert len(got) == len(whole)
-        assert set(got) == whole
-        sizes = [sum(stop - first for _, first, stop in part) for part in parts]
-        assert max(sizes) - min(sizes) <= 1
+def test_jobs_hold_each_campaign_once():
+    config = parse_hidden(overlay(TINY, {"nothing": {"campaigns": 2 * JOB}}))
+    parts = config.plan().values()
+    assert [one for part in parts for one in part] == config.campaigns()
+    assert len(parts) == 3
+    assert max(map(len, parts)) - min(map(len, parts)) <= 1
 
 
 def test_two_effects_mean_different_things():
     config = parse_hidden({"study": "t", "seed": 1, "designs": "snub-24", "approaches": "robot",
                            "two": {"sizes": 40, "campaigns": 300}})  # fmt: skip
-    pairs = {frozenset(cell.case.effect) for cell in study_cells(config)}
+    pairs = {frozenset(case.effect) for case, _ in config.campaigns()}
     assert len(pairs) > 50
     assert frozenset(["cross_axis_misalignment", "mounting_rotation"]) not in pairs
 
 
 def test_a_family_that_is_taken_out():
-    cell = Cell(Case("removed", "spread-24", "robot", True, ("bias_drift",), (100.0,)), 1)
-    assert {"bias_drift", "warm_up"} <= set(cell.removed)
-    with effects_without(cell.removed):
+    case = Case("removed", "spread-24", "robot", True, ("bias_drift",), (100.0,))
+    assert {"bias_drift", "warm_up"} <= set(removed(case))
+    with effects_without(removed(case)):
         assert not {"bias_drift", "warm_up"} & set(effect_names())
     assert {"bias_drift", "warm_up"} <= set(effect_names())
 
@@ -167,87 +147,81 @@ def test_a_family_that_is_taken_out():
 
 
 @pytest.fixture(scope="module")
-def whole(plan, tmp_path_factory):
-    """The tiny study in one chunk."""
-    folder = tmp_path_factory.mktemp("whole")
-    run_chunk(*plan, paths(folder), PROVENANCE)
-    return folder
+def rows(job):
+    """Rows of the tiny study."""
+    return [rows_of(job, case, k) for case, k in job.campaigns]
 
 
-def test_truths_and_outcomes(whole):
-    truths, outcomes, seconds = (read_table(path) for path in paths(whole).values())
-    assert len(truths) == 3
-    pd_keys = [table[KEY].to_numpy().tolist() for table in (truths, outcomes, seconds)]
-    assert pd_keys[0] == pd_keys[1] == pd_keys[2]
-    assert set(outcomes["error"]) == {""}
-    one = outcomes[truths["set"] == "one"]
-    assert one["verdict"].tolist() == ["named", "named"]
-    assert one["found"].tolist() == ['["hysteresis"]'] * 2
-    (removed,) = outcomes[truths["set"] == "removed"].to_dict("records")
-    assert "bias_drift" not in removed["found"] + removed["credible_set"]
-    assert (seconds["seconds"] > 0).all()
+def of_table(name, rows):
+    return [row for each in rows for row in each[name]]
 
 
-def test_a_second_run_gives_the_same_bytes(plan, whole, tmp_path):
+def test_truths_and_answers(rows):
+    told = of_table("campaigns", rows)
+    assert [row["error"] for row in told] == [""] * 3
+    one = [row for row in told if row["set"] == "one"]
+    assert [(row["verdict"], row["found"]) for row in one] == [("named", '["hysteresis"]')] * 2
+    (family,) = (row for row in told if row["set"] == "removed")
+    assert "bias_drift" not in family["found"] + family["credible_set"]
+    assert all(row["seconds"] > 0 for row in of_table("seconds", rows))
+
+
+def test_a_second_run_writes_the_same(job, rows, tmp_path):
     """As a study that was broken off and goes on; only the times differ."""
-    run_chunk(*plan, paths(tmp_path), PROVENANCE)
-    for name in ("truths", "outcomes"):
-        assert paths(tmp_path)[name].read_bytes() == paths(whole)[name].read_bytes()
+    paths = {name: tmp_path / f"{name}.parquet" for name in COLUMNS}
+    run(job, paths, PROVENANCE)
+    for name in ("campaigns", "baselines"):
+        written = read_table(paths[name])
+        assert [*written] == COLUMNS[name]
+        pd.testing.assert_frame_equal(written, campaigns.table_of(name, rows))
+    assert read_table(paths["seconds"])[KEY].equals(read_table(paths["campaigns"])[KEY])
 
 
-def test_the_diagnosis_sees_the_campaign_only(plan, whole, monkeypatch, tmp_path):
+def test_the_diagnosis_sees_the_campaign_only(job, monkeypatch):
     seen = []
-    monkeypatch.setattr(diagnosing, "judge", lambda *given, **more: seen.append((given, more)))
-    run_chunk(*plan, paths(tmp_path), PROVENANCE)
-    truths = read_table(paths(whole)["truths"])
+    monkeypatch.setattr(campaigns, "judge", lambda *given, **more: seen.append((given, more)))
+    campaigns_of(job)
     for (campaign, _), more in seen:
         assert list(more) == ["seed"]
         for word in ("hysteresis", "bias_drift", "removed"):
             assert word not in repr(campaign)
-    assert len(seen) == len(truths)
+    assert len(seen) == 3
 
 
-def test_what_fails_is_a_row_with_its_error(plan, monkeypatch, tmp_path):
+def test_what_fails_is_a_row_with_its_error(job, monkeypatch):
     def refuse(campaign, *_, **__):
         raise InputError("too few positions") if campaign.angles is None else KeyError("x")
 
-    monkeypatch.setattr(diagnosing, "judge", refuse)
-    run_chunk(*plan, paths(tmp_path), PROVENANCE)
-    outcomes = read_table(paths(tmp_path)["outcomes"])
-    assert len(outcomes) == 3
-    assert set(outcomes["error"]) <= {"refused: too few positions", "KeyError: 'x'"}
-    assert (outcomes["error"] != "").all()
+    monkeypatch.setattr(campaigns, "judge", refuse)
+    errors = campaigns_of(job)["error"]
+    assert len(errors) == 3
+    assert set(errors) <= {"refused: too few positions", "KeyError: 'x'"}
 
 
-def test_what_cannot_be_made_is_a_row_with_its_error(plan, monkeypatch, tmp_path):
+def test_what_cannot_be_made_is_a_row_with_its_error(job, monkeypatch):
     def refuse(case, seed):
         raise InputError("cannot see it")
 
-    monkeypatch.setattr(campaigns, "generate", refuse)
-    run_chunk(*plan, paths(tmp_path), PROVENANCE)
-    run_baselines(*plan, tmp_path / "baselines.parquet", PROVENANCE)
-    answers = read_table(tmp_path / "baselines.parquet")
+    monkeypatch.setattr(study, "generate", refuse)
+    rows = [rows_of(job, case, k) for case, k in job.campaigns]
+    told, answers = of_table("campaigns", rows), of_table("baselines", rows)
+    assert [row["error"] for row in told] == ["refused: cannot see it"] * 3
+    assert [row["what"] for row in told].count("hysteresis") == 2
     assert len(answers) == 3 * len(METHODS)
-    assert not answers["detected"].any()
-    assert set(answers["error"]) == {"refused: cannot see it"}
-    truths, outcomes, _ = (read_table(path) for path in paths(tmp_path).values())
-    assert outcomes["error"].tolist() == ["refused: cannot see it"] * 3
-    assert truths["what"].tolist().count("hysteresis") == 2
+    assert not any(row["detected"] for row in answers)
+    assert {row["error"] for row in answers} == {"refused: cannot see it"}
 
 
-def test_simpler_methods(plan, tmp_path):
-    config, campaigns = plan
-    path = tmp_path / "baselines.parquet"
-    one = [(cell, k) for cell, k in campaigns if cell.case.set == "one"]
-    run_baselines(config, one[:1], path, PROVENANCE)
-    table = read_table(path).set_index("method")
-    assert set(table.index) == {"chi2 omnibus", "known sigma", "F test", "BIC forward", "lasso"}
-    assert table["detected"].all()  # λ = 100 is plain to all of them
-    named = table["found"].drop("chi2 omnibus")
-    assert named.str.startswith('["hysteresis"').all()
+def test_simpler_methods(rows):
+    """λ = 100 is plain to all of them."""
+    (first, *_) = (each["baselines"] for each in rows if each["campaigns"][0]["set"] == "one")
+    found = {row["method"]: row["found"] for row in first if row["detected"]}
+    assert set(found) == {*METHODS}
+    assert found.pop("chi2 omnibus") == "[]"
+    assert all(names.startswith('["hysteresis"') for names in found.values())
 
 
 def test_seeds_depend_on_the_seed_of_the_study():
-    cell = Cell(Case("null", "snub-24", "robot", True), 2)
-    states = [cell.seed(s, k).generate_state(2) for s in (1, 2) for k in (0, 1)]
+    case = Case("null", "snub-24", "robot", True)
+    states = [case.seed(s, k).generate_state(2) for s in (1, 2) for k in (0, 1)]
     assert len(np.unique(states, axis=0)) == 4

@@ -382,13 +382,7 @@ def rotated(vectors: Array, rotation: Array) -> Array:
     """Vectors (..., 3) rotated by rotation vectors (..., 3), rad (Rodrigues)."""
     vectors, rotation = np.broadcast_arrays(vectors, rotation)
     half = np.sqrt(np.sum(rotation**2, axis=-1, keepdims=True)) / (2 * np.pi)
-    along = _cross(rotation, vectors)
+    along = np.cross(rotation, vectors)
     # sin(a)/a and (1 - cos(a))/a², which are regular at 0.
-    return vectors + np.sinc(2 * half) * along + np.sinc(half) ** 2 / 2 * _cross(rotation, along)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    product = np.empty(a.shape)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        product[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return product
+    back = np.cross(rotation, along)
+    return vectors + np.sinc(2 * half) * along + np.sinc(half) ** 2 / 2 * back

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -18,10 +21,8 @@ from studies.hidden.physics.gross import GROSS
 from studies.hidden.physics.kinds import Cause, Kind, Place
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
 from studies.hidden.physics.oracle import Oracle, Verdict, oracle
-from studies.hidden.physics.outside import OUTSIDE
-from studies.hidden.physics.unforeseen import UNFORESEEN
+from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
 
-SETS = ("null", "noise", "one", "two", "removed", "outside", "unforeseen", "gross", "invisible")
 NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
 """Effects that are not in the catalogue, by name."""
 
@@ -37,7 +38,7 @@ class Case:
 
     Attributes
     ----------
-    set : str, of `SETS`
+    set : str, of the study, or null or lot
     design : str
     approach : str, "gravity" or "robot"
     sigma_known : bool, whether the campaign states its sigma
@@ -56,6 +57,42 @@ class Case:
     lam: tuple[float, ...] = ()
     noise: str | None = None
     gross: str | None = None
+
+    @property
+    def what(self) -> str:
+        """What is hidden: names of effects, kind of noise or gross error; empty for nothing."""
+        return self.noise or self.gross or "+".join(self.effect)
+
+    @property
+    def size(self) -> float:
+        """Noncentrality λ, of either effect; NaN where there is none."""
+        return self.lam[0] if self.lam else nan
+
+    @property
+    def sigma(self) -> str:
+        """Whether the campaigns state their sigma, in words."""
+        return "given" if self.sigma_known else "not given"
+
+    @property
+    def name(self) -> str:
+        """Name, unique within a study."""
+        size = f"{self.size:g}" if self.lam else ""
+        parts = self.set, self.what, size, self.design, self.approach, f"sigma {self.sigma}"
+        return "/".join(filter(None, parts))
+
+    def digest(self, *numbers: int) -> bytes:
+        """Hash of the case and of further numbers."""
+        text = json.dumps([asdict(self), *numbers], sort_keys=True)
+        return hashlib.sha256(text.encode()).digest()
+
+    def seed(self, seed: int, campaign: int) -> np.random.SeedSequence:
+        """Seed of a campaign.
+
+        It depends on the study's seed, the case and the number of the campaign only: no other case
+        or campaign changes it.
+        """
+        words = np.frombuffer(self.digest(), dtype="<u4").tolist()
+        return np.random.SeedSequence([seed, *words], spawn_key=(campaign,))
 
 
 @dataclass(frozen=True)
@@ -82,8 +119,8 @@ class Truth:
     sensor : dict with the parameters of the sensor
     left : of an effect outside the catalogue: how much of its noncentrality the best effect of the
         catalogue leaves, and the best two
-    place : coordinate and target of an effect outside the catalogue; None where it has none, or
-        where the campaign does not record its coordinate
+    true_place : coordinate and target of an effect outside the catalogue; None where it has
+        none, or where the campaign does not record its coordinate
     seed : entropy and spawn key
     """
 
@@ -94,7 +131,7 @@ class Truth:
     gross: dict[str, Any] = field(default_factory=lambda: {"name": "", "settings": {}})
     sensor: dict[str, list[float]] | None = None
     left: tuple[float, ...] = ()
-    place: Place | None = None
+    true_place: Place | None = None
     seed: tuple[int, ...] = ()
 
 
@@ -121,7 +158,7 @@ def generate(
     InputError
         If the design cannot see an effect that shall have a size.
     """
-    rng = np.random.default_rng(seed)
+    rng, entropy = np.random.default_rng(seed), np.asarray(seed.entropy)
     knowing = oracle(case.design, case.approach)
     planned = knowing.atlas.session
     # No joint comes to rest exactly where it was sent.
@@ -129,21 +166,36 @@ def generate(
     session = replace(planned, joints=arrived)
     sensor = Sensor.drawn(rng)
     conditions = Conditions.of(session, case.approach, sensor)
-    known: list[Known] = []
     sizes = case.lam or (0.0,) * len(case.effect)
-    for name, lam in zip(case.effect, sizes, strict=True):
-        of_lot = None if given is None else given.get(name)
-        known.append(of_lot or drawn(name, lam, session, conditions, knowing, rng))
+    known = [
+        (given or {}).get(name) or drawn(name, lam, session, conditions, knowing, rng)
+        for name, lam in zip(case.effect, sizes, strict=True)
+    ]
     causes = [cause for cause, _ in known]
     output, encoders = (part[0] for part in observe(session, sensor, causes))
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
-    campaign = _campaign(case, session, forces, reading)
-    campaign = _with_samples(campaign, session, noise, rng)
+    robot, sampled = conditions.robot, session.n_samples > 0
+    campaign = Campaign(
+        name=f"hidden {case.design}",
+        positions=np.arange(1, session.n + 1),
+        forces=forces,
+        gravity=GRAVITY,
+        sigma_force=session.sigma if case.sigma_known else None,
+        angles=reading if robot else None,
+        sigma_angle=session.sigma_angle if robot else None,
+        yaw=session.yaw if robot else None,
+        time=session.time,
+        temperature=session.temperature,
+        vibration=session.vibration,
+        full_range=session.full_range,
+        sd=noise.sds(session, rng) if sampled else None,
+        n_samples=np.full(session.n, session.n_samples) if sampled else None,
+    )
     settings: dict[str, float] = {}
     if case.gross is not None:
-        campaign, settings = GROSS[case.gross](campaign, session, conditions, rng)
+        campaign, settings = GROSS[case.gross](campaign, rng, session.sigma, conditions)
     strange = NOWHERE.get(case.effect[0]) if case.effect else None
     truth = Truth(
         effects=tuple(
@@ -160,8 +212,8 @@ def generate(
         gross={"name": case.gross or "", "settings": settings},
         sensor={name: value.tolist() for name, value in vars(sensor).items()},
         left=knowing.left(left_of(knowing.atlas, sensor, output, encoders)) if strange else (),
-        place=strange.place if strange and strange.has_place(conditions.robot) else None,
-        seed=_numbers(seed),
+        true_place=strange.place if strange and strange.has_place(conditions.robot) else None,
+        seed=(*np.ravel(entropy).tolist(), *seed.spawn_key),
     )
     return campaign, truth
 
@@ -170,43 +222,6 @@ def left_of(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> 
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
     return of_design.conditions.seen(corrected[None], reading[None])[0]
-
-
-def _campaign(case: Case, session: Session, forces: Array, reading: Array) -> Campaign:
-    """The campaign as it was recorded, without the samples within the holds."""
-    robot = case.approach == "robot"
-    return Campaign(
-        name=f"hidden {case.design}",
-        positions=np.arange(1, session.n + 1),
-        forces=forces,
-        gravity=GRAVITY,
-        sigma_force=session.sigma if case.sigma_known else None,
-        angles=reading if robot else None,
-        sigma_angle=session.sigma_angle if robot else None,
-        yaw=session.yaw if robot else None,
-        time=session.time,
-        temperature=session.temperature,
-        vibration=session.vibration,
-        full_range=session.full_range,
-    )
-
-
-def _with_samples(
-    campaign: Campaign, session: Session, noise: Noise, rng: np.random.Generator
-) -> Campaign:
-    """Add the statistics of the samples within the holds, where they were kept."""
-    if not session.n_samples:
-        return campaign
-    sd = noise.sds(session, rng)
-    n_samples = np.full(session.n, session.n_samples)
-    return replace(campaign, sd=sd, n_samples=n_samples)
-
-
-def _numbers(seed: np.random.SeedSequence) -> tuple[int, ...]:
-    """Entropy and spawn key of a seed."""
-    entropy = seed.entropy
-    words = () if entropy is None else (entropy,) if isinstance(entropy, int) else tuple(entropy)
-    return (*(int(word) for word in words), *(int(key) for key in seed.spawn_key))
 
 
 DRAWS = 200
@@ -244,7 +259,8 @@ def drawn(
     of_design = knowing.atlas
     effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
-        return _of_usual_size(effect, session, rng), (name,)
+        parameters = effect.typical * rng.standard_normal((1, effect.k))
+        return Cause(effect, effect.settings.draw(session, rng), parameters), (name,)
     if effect.shows(of_design.session):
         for _ in range(DRAWS):
             shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
@@ -258,11 +274,6 @@ def drawn(
         f"{of_design.session.name}, {approach}: cannot see {name} as such; "
         f"it sees {', '.join(of_design.visible)}"
     )
-
-
-def _of_usual_size(effect: Kind, session: Session, rng: np.random.Generator) -> Cause:
-    parameters = effect.typical * rng.standard_normal((1, effect.k))
-    return Cause(effect, effect.settings.draw(session, rng), parameters)
 
 
 def _scaled(

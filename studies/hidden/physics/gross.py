@@ -12,60 +12,49 @@ from numpy.typing import NDArray
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Conditions
-from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.designs import GRAVITY
 
 Array = NDArray[np.float64]
-Settings = dict[str, float]
+Random = np.random.Generator
+Changed = tuple[Campaign, dict[str, float]]
 
 LEAST = 100.0
 """Noncentrality of a bumped hold, at least."""
 FAR = 0.3 * GRAVITY
 """m/s², least difference of the forces of exchanged rows, or nothing would show."""
-PER_AXIS = ("forces", "sd")
-"""Columns with a value for each axis, that with a sign first."""
 
 # What a number in the file would be for one in its header's unit.
 FORCE_UNITS = (1 / STANDARD_GRAVITY, 1e3 / STANDARD_GRAVITY, STANDARD_GRAVITY)
 ANGLE_UNITS = (180 / np.pi * GON, GON)
 
-GrossError = Callable[
-    [Campaign, Session, Conditions, np.random.Generator], tuple[Campaign, Settings]
-]
+
+def _with_axes(campaign: Campaign, change: Callable[[Array], Array]) -> Campaign:
+    """Change all that has a value for each axis."""
+    sd = None if campaign.sd is None else change(campaign.sd)
+    return replace(campaign, forces=change(campaign.forces), sd=sd)
 
 
-def _axis_error(
-    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
-) -> tuple[Campaign, Settings]:
+def _axis_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
     """Exchange channels, or turn their signs: one of the 47 ways that are wrong."""
     ways = [(o, s) for o in permutations(range(3)) for s in product((1.0, -1.0), repeat=3)]
     order, signs = ways[1 + int(rng.integers(len(ways) - 1))]
-    changed = {}
-    for name in PER_AXIS:
-        values = getattr(campaign, name)
-        if values is not None:
-            turned = np.array(signs) if name == "forces" else 1.0
-            changed[name] = turned * values[:, order]
+    exchanged = _with_axes(campaign, lambda values: values[:, order])
     shown = [sign * (axis + 1) for axis, sign in zip(order, signs, strict=True)]
-    return replace(campaign, **changed), dict(zip("xyz", shown, strict=True))
+    forces = np.array(signs) * exchanged.forces
+    return replace(exchanged, forces=forces), dict(zip("xyz", shown, strict=True))
 
 
-def _unit_error(
-    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
-) -> tuple[Campaign, Settings]:
+def _unit_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
     """Write the forces, or the angles, in another unit than the header says."""
     if campaign.angles is not None and rng.random() < 0.5:
         factor = float(rng.choice(ANGLE_UNITS))
         yaw = None if campaign.yaw is None else campaign.yaw * factor
         return replace(campaign, angles=campaign.angles * factor, yaw=yaw), {"angle": factor}
     factor = float(rng.choice(FORCE_UNITS))
-    values = {name: getattr(campaign, name) for name in PER_AXIS}
-    changed = {name: value * factor for name, value in values.items() if value is not None}
-    return replace(campaign, **changed), {"force": factor}
+    return _with_axes(campaign, lambda values: values * factor), {"force": factor}
 
 
-def _row_order(
-    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
-) -> tuple[Campaign, Settings]:
+def _row_order(campaign: Campaign, rng: Random, *_: object) -> Changed:
     """Exchange the readings of two holds, of three in a ring, or reverse the order of some."""
     n = campaign.n_positions
     while True:
@@ -81,39 +70,35 @@ def _row_order(
         steps = campaign.forces[order[moved]] - campaign.forces[moved]
         if np.all(np.linalg.norm(steps, axis=1) > FAR):
             break
-    values = {name: getattr(campaign, name) for name in PER_AXIS}
-    changed = {name: value[order] for name, value in values.items() if value is not None}
     settings = {f"row_{row + 1}": float(order[row] + 1) for row in moved}
-    return replace(campaign, **changed), settings
+    return _with_axes(campaign, lambda values: values[order]), settings
 
 
 def _outlier_position(
-    campaign: Campaign, session: Session, conditions: Conditions, rng: np.random.Generator
-) -> tuple[Campaign, Settings]:
+    campaign: Campaign, rng: Random, sigma: float, conditions: Conditions
+) -> Changed:
     """Bump one hold, by much more than what could be detected."""
-    sigma = float(np.exp(rng.uniform(np.log(15.0), np.log(150.0))))
+    size = float(np.exp(rng.uniform(np.log(15.0), np.log(150.0))))
     while True:
         row = int(rng.integers(campaign.n_positions))
         direction = rng.standard_normal(3)
-        error = sigma * session.sigma * direction / np.linalg.norm(direction)
+        error = size * sigma * direction / np.linalg.norm(direction)
         change = np.zeros((1, campaign.n_positions, 3))
         change[0, row] = error
         lam = float(np.sum(conditions.left(conditions.changed(change)) ** 2))
         if lam > LEAST:
-            break
-    settings = {"position": row + 1.0, **dict(zip("xyz", error.tolist(), strict=True))}
-    settings["lam"] = lam
-    campaign = replace(campaign, forces=campaign.forces + change[0])
-    return campaign, settings
+            x, y, z = error.tolist()
+            settings = {"position": row + 1.0, "x": x, "y": y, "z": z, "lam": lam}
+            return replace(campaign, forces=campaign.forces + change[0]), settings
 
 
-GROSS: dict[str, GrossError] = {
+GROSS: dict[str, Callable[[Campaign, Random, float, Conditions], Changed]] = {
     "axis_error": _axis_error,
     "unit_error": _unit_error,
     "row_order": _row_order,
     "outlier_position": _outlier_position,
 }
-"""Name in the catalogue -> what it does."""
+"""Name in the catalogue -> what it does; sigma is that of a position mean, m/s²."""
 
 
 def visible_gross(design: str, approach: str) -> tuple[str, ...]:

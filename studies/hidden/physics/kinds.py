@@ -135,16 +135,21 @@ def factor(
     target: str,
     h: Callable[..., Array],
     settings: Settings = Settings(),
+    needs: tuple[str, ...] = (),
 ) -> Kind:
-    """Kind by a function h of forces f, settings s and session x, a factor of its parameters."""
+    """Kind by a function h of forces f, settings s and session x, a factor of its parameters.
+
+    It has a place if it is a function of one coordinate.
+    """
     of_rig, typical, change = FACTORS[target]
 
     def function(p: Array, f: Array, s: Mapping[str, float], x: Session) -> Array:
         values = h(f, s, x)
         return change(p, f, values[:, None] if values.ndim == 1 else values)
 
-    return Kind(name, of_rig, typical, function, COORDINATES[coordinate], settings,
-                (coordinate, target))  # fmt: skip
+    place = (coordinate, target) if coordinate else None
+    needs = needs or COORDINATES.get(coordinate, ())
+    return Kind(name, of_rig, typical, function, needs, settings, place)
 
 
 # --- forces ---------------------------------------------------------------------------------------

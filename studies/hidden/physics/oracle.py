@@ -19,8 +19,7 @@ from scipy.special import chdtrc, logsumexp, softmax
 
 from studies.hidden.physics.atlas import Atlas, Shape, atlas
 from studies.hidden.physics.kinds import Kind
-from studies.hidden.physics.outside import OUTSIDE
-from studies.hidden.physics.unforeseen import UNFORESEEN
+from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
 
 Array = NDArray[np.float64]
 Class = tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The tables of a score: shares of the judged campaigns, and what `targets.yaml` asks for."""
+"""The tables of a score: shares of the judged campaigns, and what `score.yaml` asks for."""
 
 from __future__ import annotations
 
@@ -13,21 +13,41 @@ import yaml
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.basics.wording import number, words
+from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
 from accelstudy.effects import get_effect
-from studies.hidden.scoring.judging import JUDGED, Row, all_true, same_effects
+from accelstudy.sensors.models import get_model
+from studies.hidden.campaigns import KEY
+from studies.hidden.physics.generate import Case, generate
+from studies.hidden.scoring.judging import all_true, judge, same_effects
+from studies.hidden.study import HiddenConfig, Row
 
 Array = NDArray[np.float64]
+Tables = Mapping[str, pd.DataFrame]
 
-TARGETS = yaml.safe_load((Path(__file__).parent / "targets.yaml").read_text(encoding="utf-8"))
+SCORE = yaml.safe_load((Path(__file__).parent / "score.yaml").read_text(encoding="utf-8"))
 
 
-def with_intervals(table: pd.DataFrame) -> pd.DataFrame:
-    """Add the share and its 95 % interval to a table of `count` and `n`."""
-    low, high = clopper_pearson(table["count"], table["n"])
-    share = table["count"] / table["n"].where(table["n"] > 0)
-    return table.assign(share=share, ci95_low=low, ci95_high=high)
+def score_tables(campaigns: pd.DataFrame, answers: pd.DataFrame, limits: pd.DataFrame) -> Tables:
+    """All tables of a score.
+
+    Parameters
+    ----------
+    campaigns : DataFrame, truths and outcomes side by side
+    answers : DataFrame, of the simpler methods
+    limits : DataFrame, of `study_limits`
+    """
+    judged = with_limits(judge(campaigns), limits)
+    return {
+        "campaigns": judged,
+        "targets": targets(judged),
+        "confusion": confusion(judged),
+        "calibration": calibration(judged),
+        "baselines": baseline_table(judged, answers),
+        "limits": limit_table(judged, limits),
+    }
 
 
 def shares(judged: pd.DataFrame, question: str, *by: str) -> pd.DataFrame:
@@ -44,13 +64,22 @@ def shares(judged: pd.DataFrame, question: str, *by: str) -> pd.DataFrame:
     DataFrame
         `by`, count, n, share, ci95_low, ci95_high
     """
-    asked = judged[judged[question].notna()]
-    groups = asked.assign(yes=asked[question].astype(bool)).groupby([*by])["yes"]
-    return with_intervals(groups.agg(count="sum", n="size").reset_index())
+    asked = judged[judged[question].notna()].astype({question: int})
+    return with_intervals(asked.groupby([*by])[question].agg(count="sum", n="size").reset_index())
+
+
+def with_intervals(table: pd.DataFrame) -> pd.DataFrame:
+    """Add the share and its 95 % interval to a table of `count` and `n`."""
+    low, high = clopper_pearson(table["count"], table["n"])
+    share = table["count"] / table["n"].where(table["n"] > 0)
+    return table.assign(share=share, ci95_low=low, ci95_high=high)
+
+
+# --- what is wanted -------------------------------------------------------------------------------
 
 
 def targets(judged: pd.DataFrame) -> pd.DataFrame:
-    """What `targets.yaml` asks for, a row each.
+    """What `score.yaml` asks for, a row each.
 
     Returns
     -------
@@ -59,80 +88,64 @@ def targets(judged: pd.DataFrame) -> pd.DataFrame:
         met: "yes", "no", or "–" if nothing was measured; no target is wanted of what explains them
     """
     told = judged.astype({name: object for name in ("set", "sigma", "approach")})
-    for name in (*JUDGED, "confirmed"):
-        if told[name].dtype != float:
-            told[name] = told[name].eq(True).fillna(value=False).astype(bool)
-    return pd.DataFrame([row for line in TARGETS for row in _rows(line, told)])
+    yes = told.select_dtypes("boolean").fillna(value=False).astype(bool)
+    told[yes.columns] = yes
+    return pd.DataFrame([row for line in SCORE["targets"] for row in _lines(line, told)])
 
 
-def _rows(line: Mapping[str, Any], judged: pd.DataFrame) -> Iterator[Row]:
-    """Rows of a line of the table: one, or some for each λ."""
-    lines = line.get("together", [line])
-    of_set = judged if "set" not in lines[0] else judged[judged["set"] == lines[0]["set"]]
+def _lines(line: Mapping[str, Any], judged: pd.DataFrame) -> Iterator[Row]:
+    """Rows of a line: one, or some for each λ."""
+    together = line.get("together", [line])
+    of_set = judged if "set" not in together[0] else judged[judged["set"] == together[0]["set"]]
     by_size = "together" in line or "each" in line
     for size in sorted(of_set["size"].unique()) if by_size else [np.nan]:
         part = of_set[of_set["size"] == size] if by_size else of_set
-        for one in lines:
+        for one in together:
             chosen = part.query(one["filter"], engine="python") if "filter" in one else part
-            least, most, said = _bounds(one, chosen, size)
+            row = _line(one, chosen, size)
             # A line whose bounds are of some λ only leaves out the others.
-            if least is not None or most is not None or not {"least", "most"} & one.keys():
-                yield _row(one, chosen, size, least, most, said)
+            if row["wanted"] or not {"least", "most"} & one.keys():
+                yield row
 
 
-def _bounds(
-    line: Mapping[str, Any], part: pd.DataFrame, size: float
-) -> tuple[float | None, float | None, str]:
-    """Least and most that is wanted, and what the oracle has."""
+def _line(line: Mapping[str, Any], part: pd.DataFrame, size: float) -> Row:
+    """What was measured of some campaigns, beside what is wanted."""
+    n, fewest = len(part), line.get("n", 0)
+    values: Any = part.eval(line["of"], engine="python") if n else []
+    measured, low, high = _measured(line.get("statistic", "share"), np.array(values, dtype=float))
     least, most = (
         bound.get(size) if isinstance(bound, dict) else bound
         for bound in (line.get("least"), line.get("most"))
     )
+    oracle = wanted = met = ""
     if "beside" in line:
-        return least, most, f" (oracle {part[line['beside']].mean():.1f})"
-    if "below_oracle" not in line:
-        return least, most, ""
-    best, below = part["oracle_right"].mean(), line["below_oracle"]
-    if least is not None:
-        return least, most, f" (oracle {best:.2f})"
-    return best - below, most, f" (oracle {best:.2f} − {below:.2f})"
-
-
-def _row(
-    line: Mapping[str, Any],
-    part: pd.DataFrame,
-    size: float,
-    least: float | None,
-    most: float | None,
-    said: str,
-) -> Row:
-    """What was measured of some campaigns, beside what is wanted."""
-    n = len(part)
-    values: Any = part.eval(line["of"], engine="python") if n else []
-    measured, low, high = _measured(line.get("statistic", "share"), np.array(values, dtype=float))
-    row = {"figure": line["figure"], "cases": line["campaigns"].format(size=size), "wanted": "",
-           "least": least, "most": most, "measured": measured, "ci95_low": low, "ci95_high": high,
-           "n": n, "met": ""}  # fmt: skip
+        oracle = f" (oracle {part[line['beside']].mean():.1f})"
+    elif "below_oracle" in line:
+        best, below = part["oracle_right"].mean(), line["below_oracle"]
+        oracle = f" (oracle {best:.2f})" if least else f" (oracle {best:.2f} − {below:.2f})"
+        least = least or best - below
     if least is not None or most is not None:
-        fewest = line.get("n", 0)
-        row["wanted"] = _wanted(least, most, said, fewest) if n or not said else "–"
-        above = least is None or least - 1e-9 <= measured
-        within = above and (most is None or measured <= most + 1e-9) and n >= fewest
-        row["met"] = "–" if np.isnan(measured) else "yes" if within else "no"
-    return row
+        wanted = "–"
+        if n or not oracle:
+            wanted = _wanted(least, most, oracle) + (f", n ≥ {fewest}" if fewest else "")
+        within = (least or 0) - 1e-9 <= measured <= (np.inf if most is None else most) + 1e-9
+        met = "–" if np.isnan(measured) else "yes" if within and n >= fewest else "no"
+    return {
+        **{"figure": line["figure"], "cases": line["campaigns"].format(size=size)},
+        **{"wanted": wanted, "least": least, "most": most, "measured": measured},
+        **{"ci95_low": low, "ci95_high": high, "n": n, "met": met},
+    }
 
 
-def _wanted(least: float | None, most: float | None, said: str, n: int) -> str:
+def _wanted(least: float | None, most: float | None, oracle: str) -> str:
     """Say what is wanted."""
-    if least is None and most is not None:
-        text = f"≤ {number(most) if said else f'{most:g}'}"
-    elif most is None or least is None:
-        text = f"≥ {least:.2f}"
-    elif least == most:
-        text = f"{most:.2f}"
-    else:
-        text = f"{(least + most) / 2:.2f} ± {(most - least) / 2:.2f}"
-    return text + said + (f", n ≥ {n}" if n else "")
+    if most is None:
+        return f"≥ {least:.2f}{oracle}"
+    if least is None:
+        return f"≤ {number(most)}{oracle}" if oracle else f"≤ {most:g}"
+    if least == most:
+        return f"{most:.2f}"
+    return f"{(least + most) / 2:.2f} ± {(most - least) / 2:.2f}"
 
 
 def _measured(statistic: str, values: Array) -> tuple[float, float, float]:
@@ -161,24 +174,24 @@ BINS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
 """Bounds of the classes of stated probabilities."""
 
 
-def family_name(name: str) -> str:
-    """Return the family of an effect or, where it has none, its name, in plain words."""
-    return get_effect(name).family or words(name)
-
-
 def confusion(judged: pd.DataFrame) -> pd.DataFrame:
     """What single effects of each family are taken for: truth, answer, count, n and share.
 
     The answer is the family of the effect that is given first, or the verdict that gives none.
     """
-    one = judged[(judged["set"] == "one") & judged["ok"].eq(True)]
-    answers = [
+    one = judged[(judged["set"] == "one") & judged["ok"]]
+    first = [
         NAMELESS.get(verdict) or family_name(json.loads(found)[0])
         for verdict, found in zip(one["verdict"], one["found"], strict=True)
     ]
-    table = pd.DataFrame({"truth": [family_name(name) for name in one["what"]], "answer": answers})
-    counts = table.groupby(["truth", "answer"]).size().rename("count").reset_index()
+    table = pd.DataFrame({"truth": one["what"].map(family_name), "answer": first})
+    counts = table.value_counts(sort=False).reset_index()
     return with_intervals(counts.assign(n=counts.groupby("truth")["count"].transform("sum")))
+
+
+def family_name(name: str) -> str:
+    """Return the family of an effect or, where it has none, its name, in plain words."""
+    return get_effect(name).family or words(name)
 
 
 def calibration(judged: pd.DataFrame) -> pd.DataFrame:
@@ -192,16 +205,17 @@ def calibration(judged: pd.DataFrame) -> pd.DataFrame:
         of ("explanation": the most probable one, "set": one of the credible set), from and to
         (bounds of the stated probability), stated (mean), count, n, share, ci95_low, ci95_high
     """
-    hidden = judged[judged["set"].isin(["one", "two"]) & judged["set_given"].eq(True)]
+    hidden = judged[judged["set"].isin(["one", "two"]) & judged["set_given"]]
     kinds = {"explanation": ("top_posterior", "top_right"), "set": ("set_posterior", "set_holds")}
     tables = []
     for kind, (stated, true) in kinds.items():
         bin_ = np.clip(np.digitize(hidden[stated], BINS) - 1, 0, len(BINS) - 2)
-        groups = hidden.assign(yes=hidden[true].astype(bool)).groupby(bin_)
-        counts = groups.agg(stated=(stated, "mean"), count=("yes", "sum"), n=("yes", "size"))
-        low, high = (np.array(BINS)[counts.index + up] for up in (0, 1))
-        tables.append(counts.assign(of=kind, **{"from": low, "to": high}))
-    table = pd.concat(tables, ignore_index=True)
+        groups = hidden.groupby(bin_).agg(
+            stated=(stated, "mean"), count=(true, "sum"), n=(true, "size")
+        )
+        low, high = (np.array(BINS)[groups.index + up] for up in (0, 1))
+        tables.append(groups.assign(of=kind, **{"from": low, "to": high}))
+    table = pd.concat(tables, ignore_index=True).astype({"count": int})
     return with_intervals(table[["of", "from", "to", "stated", "count", "n"]])
 
 
@@ -219,35 +233,115 @@ def baseline_table(judged: pd.DataFrame, answers: pd.DataFrame) -> pd.DataFrame:
         method, set, size (NaN: all), quantity ("detected", "right": all names and no other,
         "first right": the strongest name, "wrong": some name), count, n, share, ci95_low, ci95_high
     """
-    key = ["cell", "campaign"]
-    same = judged.merge(answers[key].drop_duplicates(), on=key)
-    named = same["found"].where(same["answered"].astype(bool), "[]")
-    of_diagnosis = same.assign(method="diagnosis", detected=same["alarm"], found=named)
-    known = same[same["oracle_detected"].notna()]
-    of_oracle = known.assign(
-        method="oracle", detected=known["oracle_detected"], found=known["oracle_best"]
-    )
-    told = answers.merge(judged[[*key, "set", "size", "classes"]], on=key)
-    rows = []
-    for row in pd.concat([told, of_diagnosis, of_oracle])[
-        ["method", "set", "size", "detected", "found", "classes"]
-    ].to_dict("records"):
-        true = json.loads(row["classes"])
-        names = [[one] if isinstance(one, str) else one for one in json.loads(row["found"])]
-        rows.append({
-            **row,
-            "detected": bool(row["detected"]),
-            "right": same_effects(names, true),
-            "first right": all_true(names[:1], true),
-            "wrong": bool(names) and not all_true(names, true),
-        })  # fmt: skip
-    asked = ["detected", "right", "first right", "wrong"]
-    long = pd.DataFrame(rows, columns=["method", "set", "size", *asked]).melt(
-        ["method", "set", "size"], var_name="quantity", value_name="yes"
-    )
-    by = ["method", "set", "quantity"]
-    counted = [
-        long.groupby(keys)["yes"].agg(count="sum", n="size").reset_index()
-        for keys in ([*by[:2], "size", by[2]], by)
+    same = judged.merge(answers[KEY].drop_duplicates(), on=KEY)
+    oracle = {"detected": same["oracle_detected"], "found": same["oracle_best"]}
+    named = same["found"].where(same["answered"], "[]")
+    table = pd.concat([
+        answers.merge(judged[[*KEY, "set", "size", "classes"]], on=KEY),
+        same.assign(method="diagnosis", detected=same["alarm"], found=named),
+        same.assign(method="oracle", **oracle)[same["oracle_detected"].notna()],
+    ])  # fmt: skip
+    pairs = [
+        ([[one] if isinstance(one, str) else one for one in json.loads(found)], json.loads(classes))
+        for found, classes in zip(table["found"], table["classes"], strict=True)
     ]
-    return with_intervals(pd.concat(counted, ignore_index=True))
+    table["right"] = [same_effects(given, true) for given, true in pairs]
+    table["first right"] = [all_true(given[:1], true) for given, true in pairs]
+    table["wrong"] = [bool(given) and not all_true(given, true) for given, true in pairs]
+    return pd.concat(
+        [
+            shares(table, quantity, *by).assign(quantity=quantity)
+            for by in (("method", "set", "size"), ("method", "set"))
+            for quantity in ("detected", "right", "first right", "wrong")
+        ],
+        ignore_index=True,
+    )
+
+
+# --- the smallest size that a design should show --------------------------------------------------
+
+ALPHA = 0.001
+"""Level of the tests for which the minimal detectable and identifiable sizes are computed."""
+EDGES = (0.4, 0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0, 4.5, 7.0)
+"""Bounds of the classes of sizes relative to a limit."""
+PLACE = ["what", "design", "approach"]
+
+
+def study_limits(config: HiddenConfig) -> pd.DataFrame:
+    """Limits of all effects in each design and approach, from a campaign without any effect.
+
+    The minimal detectable and identifiable sizes are also given as noncentralities λ, which do not
+    depend on parameters and units. λ of the MDB is that of a test of one parameter. λ of the MIB is
+    larger by (MIB/MDB)², since the nearest rival has to be excluded as well.
+    """
+    model, rows = get_model(config.model), []
+    for design, approach in dict.fromkeys(place[:2] for place in config.places):
+        case = Case("null", design, approach, sigma_known=True)
+        campaign, _ = generate(case, case.seed(config.seed, 0))
+        rows += [
+            {"what": row.name, "design": design, "approach": approach, "mdb": row.mdb,
+             "mib": row.mib, "unit": row.unit, "nearest": next(iter(row.confused), ("",))[0]}
+            for row in visibilities(examine_campaign(campaign, model), ALPHA)
+            if row.status == "visible" and np.isfinite(row.mdb)
+        ]  # fmt: skip
+    limits, least = pd.DataFrame(rows), noncentrality(1, ALPHA, POWER)
+    ratio = limits["mib"] / limits["mdb"]
+    return limits.assign(lambda_mdb=least, lambda_mib=least * ratio**2)
+
+
+def with_limits(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
+    """Add by_mdb and by_mib, the sizes of single effects as multiples of their limits.
+
+    detected and identified say whether something is found from the MDB on, and the right name from
+    the MIB on; both should be so in 0.8 of the campaigns at least.
+    """
+    table = judged.merge(limits[[*PLACE, "lambda_mdb", "lambda_mib"]], on=PLACE, how="left")
+    one = table["set"] == "one"
+    for limit, answer, question in (("mdb", "alarm", "detected"), ("mib", "right", "identified")):
+        size = table["size"].where(one) / table.pop(f"lambda_{limit}")
+        table[f"by_{limit}"] = np.sqrt(size)
+        table[question] = table[answer].where(table[f"by_{limit}"] >= 1)
+    return table
+
+
+def limit_table(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
+    """Limits of each effect in each design, beside the power that the study finds there.
+
+    Parameters
+    ----------
+    judged : DataFrame, of `with_limits`
+    limits : DataFrame, of `study_limits`
+
+    Returns
+    -------
+    DataFrame
+        A row per effect, design, approach and noise: the columns of `limits`, and above_mdb,
+        detected, above_mib, right: campaigns from the limit on, and the share of them in which
+        something is found, or the name is right
+    """
+    one = judged[judged["by_mdb"].notna()]
+    counted = one.groupby([*PLACE, "sigma"]).agg(
+        above_mdb=("detected", "count"), detected=("detected", "mean"),
+        above_mib=("identified", "count"), right=("identified", "mean"),
+    )  # fmt: skip
+    return limits.merge(counted.reset_index(), on=PLACE)
+
+
+def power_over(judged: pd.DataFrame, limit: str, answer: str) -> pd.DataFrame:
+    """Share of campaigns with an answer, over their size beside a limit.
+
+    Parameters
+    ----------
+    judged : DataFrame, of `with_limits`
+    limit : str, "by_mdb" or "by_mib"
+    answer : str, a column of `judged`
+
+    Returns
+    -------
+    DataFrame
+        beside (geometric mean), count, n, share, ci95_low, ci95_high
+    """
+    class_ = pd.cut(judged[limit], EDGES, labels=False)
+    table = shares(judged.assign(class_=class_), answer, "class_")
+    beside = np.exp(np.log(judged[limit]).groupby(class_).mean())
+    return table.assign(beside=table["class_"].map(beside))

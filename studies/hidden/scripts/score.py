@@ -1,5 +1,5 @@
 from accelstudy.jobs import job, lists
-from studies.hidden.config import parse_hidden
+from studies.hidden.campaigns import parse_hidden
 from studies.hidden.scoring.page import write_score
 
 with job(snakemake) as provenance:

@@ -1,0 +1,305 @@
+"""The study of hidden effects: its configuration, and the campaigns that this means.
+
+A campaign has a case and a number. The campaigns of a kind and size are spread over all sessions
+that can show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from itertools import combinations, product
+from math import ceil
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, TypeAdapter, model_validator
+
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.campaign.session import Campaign
+from accelstudy.config_names import ModelName
+from accelstudy.diagnosis.result import Verdict
+from accelstudy.effects import effect_names, get_effect
+from accelstudy.files.outputs import whole_file
+from accelstudy.files.reading import config_hash
+from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, Seed
+from accelstudy.sensors.models import get_model
+from studies.hidden.physics import oracle
+from studies.hidden.physics.atlas import atlas, invisible_effects, visible_effects
+from studies.hidden.physics.designs import APPROACHES, DESIGNS
+from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.generate import Case, Truth, generate
+from studies.hidden.physics.gross import GROSS, visible_gross
+from studies.hidden.physics.measuring import NOISES
+from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
+
+Known = Annotated[ModelName, AfterValidator(lambda name: get_model(name) and name)]
+Names = OneOrMore[str]
+Sizes = OneOrMore[Positive]
+Numbered = tuple[Case, int]
+"""A case, and the number of the campaign among those of the case."""
+PLAN = TypeAdapter(dict[str, list[Numbered]])
+"""Campaigns of each job."""
+
+CAMPAIGNS = Range(1, 1_000_000)
+"""Campaigns of a study; the most take days of computing."""
+JOB = 800
+"""Campaigns in one job: minutes of work, so that starting Python does not matter."""
+
+_EFFECTS = tuple(name for name in EFFECTS if name in effect_names())
+KINDS: Mapping[str, tuple[Sequence[str], Callable[[str, str], Collection[str]]]] = {
+    "noise": (tuple(NOISES), lambda design, approach: NOISES),
+    "one": (_EFFECTS, visible_effects),
+    "removed": (_EFFECTS, visible_effects),
+    "outside": (tuple(OUTSIDE), oracle.visible_outside),
+    "unforeseen": (tuple(UNFORESEEN), oracle.visible_unforeseen),
+    "gross": (tuple(GROSS), visible_gross),
+    "invisible": (_EFFECTS, invisible_effects),
+}
+"""Kinds that each set may have, and those that make sense in a design by an approach."""
+SETS = ("nothing", "two", *KINDS)
+"""Blocks of campaigns."""
+
+
+Row = dict[str, Any]
+
+
+class Made(NamedTuple):
+    """A campaign and its truth, with further columns of its row and of that of its diagnosis."""
+
+    campaign: Campaign
+    truth: Truth
+    columns: Row = {}  # noqa: RUF012, nobody changes it
+    of_answer: Callable[[Verdict], Row] = lambda verdict: {}
+
+
+class Job(NamedTuple):
+    """What a job works on: campaigns, how each is made, and how it is diagnosed.
+
+    Attributes
+    ----------
+    campaigns : cases and numbers
+    make : makes a campaign
+    model : str, name of the model that is diagnosed
+    seed : int, of each diagnosis
+    baselines_every : int, the simpler methods get one in so many campaigns; 0 for none
+    """
+
+    campaigns: Iterable[Numbered]
+    make: Callable[[Any, int], Made]
+    model: str
+    seed: int
+    baselines_every: int = 0
+
+
+class Nothing(Block):
+    """Campaigns in which nothing is missing."""
+
+    campaigns: Replicates = Field(description="in all")
+
+
+class Kinds(Block):
+    """Campaigns with one thing each that has no size: wrong noise, gross or invisible."""
+
+    kinds: Names = Field(["all"], description="names, or all")
+    campaigns: Replicates = Field(description="of each kind")
+
+
+class Sized(Block):
+    """Campaigns with one thing each, in several sizes."""
+
+    kinds: Names = Field(["all"], description="names, or all")
+    sizes: Sizes = Field(description="noncentralities λ")
+    campaigns: Replicates = Field(description="of each kind and size")
+
+
+class Pairs(Block):
+    """Campaigns with two effects each."""
+
+    sizes: Sizes = Field(description="noncentralities λ, of either effect")
+    campaigns: Replicates = Field(description="of each size, each with two effects at random")
+
+
+class Study(Block):
+    """What both studies have."""
+
+    study: PathName = Field(description="name; results go to results/<study>/")
+    seed: Seed = Field(description="of all that is random")
+    model: Known = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
+    diagnosis_seed: Seed = Field(1, description="of each diagnosis, as the option --seed")
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of all that the numbers depend on, defaults included."""
+        return config_hash(self.model_dump(mode="json", exclude={"public_folder"}))
+
+
+class HiddenConfig(Study):
+    """A study of hidden effects; results go to ``results/<study>``."""
+
+    tables: ClassVar = ("campaigns", "targets", "confusion", "calibration", "baselines", "limits")
+    """Tables of its score."""
+
+    designs: Names = Field(["all"], description="sessions that are simulated, or all")
+    approaches: Names = Field(["all"], description="gravity, robot, or all")
+    sigma: OneOrMore[Literal["given", "not given"]] = Field(
+        default=["given", "not given"], description="whether a campaign says how large its noise is"
+    )
+    baselines_every: Annotated[int, Field(ge=1)] = Field(
+        20, description="of each kind and size every so many campaigns get to the simpler methods"
+    )
+    nothing: Nothing | None = Field(None, description="nothing is missing")
+    noise: Kinds | None = Field(None, description="only the noise is not as it is said to be")
+    one: Sized | None = Field(None, description="one effect of the catalogue")
+    two: Pairs | None = Field(None, description="two effects of the catalogue")
+    removed: Sized | None = Field(
+        None, description="one effect whose family the diagnosis does not know"
+    )
+    outside: Sized | None = Field(None, description="physics that was never in the catalogue")
+    unforeseen: Sized | None = Field(
+        None, description="the same, invented when what can be learned was fixed"
+    )
+    gross: Kinds | None = Field(None, description="gross errors")
+    invisible: Kinds | None = Field(None, description="effects that the session cannot show")
+
+    @model_validator(mode="after")
+    def _names_exist(self) -> Self:
+        _known("designs", "design", self.designs, DESIGNS)
+        _known("approaches", "approach", self.approaches, APPROACHES)
+        for set_, block in self._blocks():
+            _known(f"{set_}.kinds", "kind", block.kinds, KINDS[set_][0])
+        if not self.most:
+            raise InputError(f"no campaigns; give at least one of {', '.join(SETS)}")
+        CAMPAIGNS.check_key("campaigns in all", self.most)
+        return self
+
+    @property
+    def places(self) -> list[tuple[str, str, bool]]:
+        """Combinations of design, approach and whether sigma is given."""
+        designs = DESIGNS if self.designs == ["all"] else self.designs
+        approaches = APPROACHES if self.approaches == ["all"] else self.approaches
+        given = [one == "given" for one in self.sigma]
+        return [*product(designs, approaches, given)]
+
+    @property
+    def most(self) -> int:
+        """Number of campaigns, at most: fewer where no session can show a kind."""
+        return sum(count for *_, count in self._wanted())
+
+    @property
+    def jobs(self) -> list[str]:
+        """Names of the jobs among which the campaigns are divided."""
+        return [f"{i:04d}" for i in range(ceil(self.most / JOB))]
+
+    def campaigns(self) -> list[Numbered]:
+        """All campaigns, in an order in which those of one session follow each other.
+
+        Raises
+        ------
+        InputError
+            If no session of the study can show a kind that the configuration names.
+        """
+        counted = [pair for cases, count in self._cases() for pair in _spread(cases, count)]
+        places = self.places
+
+        def session(pair: tuple[Case, int]) -> tuple[tuple[str, ...], int]:
+            case = pair[0]
+            return removed(case), places.index((case.design, case.approach, case.sigma_known))
+
+        return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
+
+    def plan(self) -> dict[str, list[Numbered]]:
+        """Campaigns of each job, as equal in number as they can be."""
+        campaigns, jobs = self.campaigns(), self.jobs
+        ends = np.linspace(0, len(campaigns), len(jobs) + 1).round().astype(int).tolist()
+        return {job: campaigns[ends[i] : ends[i + 1]] for i, job in enumerate(jobs)}
+
+    def write_plan(self, path: str | Path) -> None:
+        """Write the plan, so that the jobs need not plan the study again."""
+        with whole_file(path) as temporary:
+            temporary.write_bytes(PLAN.dump_json(self.plan()))
+
+    def job(self, name: str, plan: str | Path) -> Job:
+        """Job by its name, as `write_plan` wrote it."""
+        return self.simulated(PLAN.validate_json(Path(plan).read_bytes())[name])
+
+    def simulated(self, campaigns: Iterable[Numbered]) -> Job:
+        """Campaigns by the physics of the study."""
+        return Job(
+            campaigns,
+            lambda case, k: Made(*generate(case, case.seed(self.seed, k))),
+            self.model,
+            self.diagnosis_seed,
+            self.baselines_every,
+        )
+
+    def _blocks(self) -> Iterator[tuple[str, Kinds | Sized]]:
+        """Sets of one thing each that are given, and their blocks."""
+        blocks = ((name, getattr(self, name)) for name in KINDS)
+        return ((name, block) for name, block in blocks if block is not None)
+
+    def _wanted(self) -> Iterator[tuple[str, str, float | None, int]]:
+        """Set, kind, size and number of the campaigns that are wanted."""
+        if self.nothing is not None:
+            yield "null", "", None, self.nothing.campaigns
+        for set_, block in self._blocks():
+            for kind in KINDS[set_][0] if block.kinds == ["all"] else block.kinds:
+                for size in getattr(block, "sizes", [None]):
+                    yield set_, kind, size, block.campaigns
+        for size in self.two.sizes if self.two else ():
+            yield "two", "", size, self.two.campaigns if self.two else 0
+
+    def _cases(self) -> Iterator[tuple[list[Case], int]]:
+        """Cases among which the campaigns of each kind and size are spread, and how many."""
+        for set_, kind, size, count in self._wanted():
+            lam = () if size is None else (size,)
+            able = [p for p in self.places if not kind or kind in KINDS[set_][1](*p[:2])]
+            if not able and getattr(self, set_).kinds != ["all"]:
+                raise InputError(f"{set_}.kinds: no session of the study can show {kind}")
+            hidden: dict[str, Any] = {"effect": (kind,) if kind else ()}
+            if set_ in ("noise", "gross"):
+                hidden = {set_: kind}
+            if set_ == "two":
+                pairs = [(place, pair) for place in able for pair in distinct_pairs(*place[:2])]
+                yield [Case(set_, *place, pair, 2 * lam) for place, pair in pairs], count
+            else:
+                yield [Case(set_, *place, lam=lam, **hidden) for place in able], count
+
+
+def _spread(cases: Sequence[Case], count: int) -> Iterator[Numbered]:
+    """Spread campaigns over cases; which cases get one more is as good as random."""
+    each, more = divmod(count, max(len(cases), 1))
+    for i, case in enumerate(sorted(cases, key=Case.digest)):
+        if number := each + (i < more):
+            yield case, number
+
+
+@cache
+def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
+    """All two effects that a session can show, and that do not mean the same in it."""
+    seen = atlas(design, approach)
+    alike: dict[str, set[str]] = {name: set() for name in seen.visible}
+    for shape in seen.shapes:
+        alike[shape.effect.name].update(seen.same_as(shape))
+    return tuple(pair for pair in combinations(seen.visible, 2) if pair[1] not in alike[pair[0]])
+
+
+@cache
+def family_of(name: str) -> tuple[str, ...]:
+    """Effects of the family of an effect, itself included."""
+    family = get_effect(name).family
+    return tuple(one for one in effect_names() if get_effect(one).family == family)
+
+
+def removed(case: Case) -> tuple[str, ...]:
+    """Effects that the diagnosis does not know: those of the family of what is hidden."""
+    return family_of(case.effect[0]) if case.set == "removed" else ()
+
+
+def _known(key: str, kind: str, names: Sequence[str], choices: Sequence[str]) -> None:
+    """Check that names are known, or the one word all."""
+    for name in names:
+        if list(names) != ["all"] and name not in choices:
+            raise InputError(f"{key}: {UnknownNameError(kind, name, ('all', *choices))}")
