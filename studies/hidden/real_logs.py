@@ -84,9 +84,10 @@ class Donor:
     ) -> Donor:
         """Read a log, and find its holds; without times one position takes an interval, s."""
         campaign, report = import_log(path, settings)
-        samples = None if settings.means else read_log(path, settings).samples
+        untimed = settings.block is not None
+        samples = None if settings.means else read_log(path, settings, untimed=untimed).samples
         forces = campaign.forces if samples is None else samples.forces
-        timed = samples is not None and settings.block is None
+        timed = samples is not None and not untimed
         time: Array = interval / (settings.block or 1) * (np.arange(len(forces), dtype=float) + 0.5)
         if samples is not None and timed:
             time = samples.time
