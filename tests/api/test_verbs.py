@@ -51,7 +51,7 @@ def results(folder, calibrations):
         one.save(folder / f"calibrated-{i}")
     dates = ("2025-01-01", "2025-07-01", "2026-01-01")
     files = [folder / f"calibrated-{i}/calibration.json" for i in range(3)]
-    three = [folder / f"sensor-{i}" for i in (1, 2, 3)]
+    two = [folder / f"sensor-{i}" for i in (1, 2)]
     return {
         "calibrate": (calibrations[0], ["calibrate", folder / "sensor-0"]),
         "diagnose": (
@@ -64,7 +64,7 @@ def results(folder, calibrations):
             ["history", *files, *(word for d in dates for word in ("--date", d)),
              "--tilt-accuracy", "50mgon"],
         ),
-        "lot": (acs.lot(three), ["lot", *three, "--cores", 2]),  # in one process, and in two
+        "lot": (acs.lot(two), ["lot", *two, "--cores", 2]),  # in one process, and in two
     }  # fmt: skip
 
 

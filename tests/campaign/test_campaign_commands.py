@@ -10,7 +10,7 @@ import pytest
 from calling import call, refusal, succeed
 from campaign_helpers import GRAVITY, NINE, simulated_campaign
 from page_helpers import assert_sound, text_of
-from stand_ins import drawn
+from stand_ins import composed
 
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -39,7 +39,7 @@ def calibrations(campaign, tmp_path_factory):
     made = {}
     for approach in ("gravity", "robot"):
         out = tmp_path_factory.mktemp("calibrated") / approach
-        with drawn():
+        with composed():
             made[approach] = (
                 succeed("calibrate", campaign, "--approach", approach, "--out", out), out,
             )  # fmt: skip

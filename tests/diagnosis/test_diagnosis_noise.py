@@ -85,11 +85,6 @@ def test_shape_tests_do_not_look_at_the_level(white, approach):
 
 
 @BOTH
-def test_p_values_of_the_level_are_uniform(white, approach):
-    assert_uniform(np.array([level_test(r).p_value for r in white[approach.name]]))
-
-
-@BOTH
 def test_white_noise_within_the_holds_explains_white_noise(white, approach):
     """F with r and 3 Σ (n_i − 1) degrees of freedom, here few enough that the latter matter."""
     rng = np.random.default_rng(5)
@@ -171,31 +166,6 @@ def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigm
 
 
 # --- something is wrong --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("name", "effect", "approach", "scheme"), [
-    ("axis", "axis_noise(kappa_z=9)", ROBOT, "mclaren-24"),
-    ("axis", "axis_noise(kappa_z=9)", GRAVITY, "fibonacci-96"),
-    ("colour", "coloured_noise(share=0.9, tau=8)", ROBOT, "mclaren-24"),
-    ("colour", "coloured_noise(share=0.9, tau=8)", GRAVITY, "fibonacci-96"),
-    ("tail", "heavy_tails(nu=2.1)", ROBOT, "fibonacci-96"),
-    ("tail", "heavy_tails(nu=2.1)", GRAVITY, "fibonacci-96"),
-])  # fmt: skip
-def test_what_is_large_is_found(name, effect, approach, scheme):
-    """At 1 % in more than 80 % of the sessions."""
-    residuals, _ = sessions(approach, effect, seed=12, scheme=scheme, runs=50)
-    assert np.sum(p_values(SHAPE_TESTS[name], residuals) <= 0.01) >= least(50, 0.8, RARE)
-
-
-def test_a_wrong_level_is_found_as_often_as_theory_says():
-    """Power of the chi-square test for κ = 1.5 in closed form."""
-    kappa = 1.5
-    residuals, _ = sessions(GRAVITY, f"noise_level(kappa={kappa})", seed=13, scheme="fibonacci-50")
-    chi2 = stats.chi2(residuals[0].redundancy)
-    low, high = chi2.ppf([0.025, 0.975])
-    power = chi2.cdf(low / kappa) + chi2.sf(high / kappa)
-    count = sum(level_test(r).p_value < 0.05 for r in residuals)
-    assert least(RUNS, power, RARE) <= count <= most(RUNS, power, RARE)
 
 
 @BOTH

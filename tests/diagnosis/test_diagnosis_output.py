@@ -87,8 +87,7 @@ def simulated(case, folder):
     return campaign
 
 
-RENDERED = {"named": ("residuals", "gap"), "unknown": ("evidence", "location"),
-            "learned": ("shape",)}  # fmt: skip
+RENDERED = {"named": ("residuals", "gap"), "learned": ("shape",)}
 """Figures that are rendered, by case; all others are only composed, which takes far less time."""
 
 

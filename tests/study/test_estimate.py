@@ -13,8 +13,8 @@ from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import TILT, simulated_statistics
 
 STANDARD_ERRORS = 4.5
-OFTEN = 120
-"""Samples over which errors are compared with the scatter, to 6 % each."""
+OFTEN = 200
+"""Samples over which errors are compared with the scatter, to 5 %."""
 
 
 def cell_of(sigma=0.002, approach="gravity", replicates=1000, **keys):

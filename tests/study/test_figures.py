@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,12 @@ def texts(drawn: Figure) -> list[str]:
     return [text for text in (*own, drawn.get_supxlabel(), drawn.get_suptitle()) if text]
 
 
+@pytest.fixture(scope="module")
+def figure_of(tables, paper):
+    """Function that draws a figure of the study of the paper, each once."""
+    return cache(lambda name: draw(name, tables, paper))
+
+
 ALL = figure_names(parse_study(PAPER))
 OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS)]
 
@@ -135,8 +142,8 @@ def test_a_figure_is_written_with_its_caption_in_the_same_bytes_each_time(
 
 
 @pytest.mark.parametrize("name", sorted(set(ALL) - {"figure-8", "closed-forms"}))
-def test_labels_have_units(name, tables, paper):
-    quantities = texts(draw(name, tables, paper))
+def test_labels_have_units(name, figure_of):
+    quantities = texts(figure_of(name))
     assert any(
         unit in text for text in quantities for unit in ("mgon", " gon", "ppm", "mm/s²", "share")
     )
@@ -178,8 +185,8 @@ def test_figure_4_shows_sobol_over_linear_theory_and_marks_what_does_not_vary(ta
     draw("figure-5", {"sensitivity": table}, paper)
 
 
-def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, paper):
-    drawn = draw("figure-5", tables, paper)
+def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, figure_of):
+    drawn = figure_of("figure-5")
     labels = {text.get_text(): text.get_color() for ax in drawn.axes for text in ax.texts}
     assert {"$f_y$", "$f_z$", r"$\alpha_{zx}$", "$b_y$"} <= labels.keys()
     assert labels["$b_y$"] == style.group_colour("bias")
@@ -195,8 +202,8 @@ def test_total_effects_are_labelled_and_their_lines_go_through_zero(tables, pape
 
 
 @pytest.mark.parametrize("name", ["figure-5", "figure-6", "figure-6-robot", "shapley"])
-def test_a_panel_has_the_lines_of_one_group_each_with_its_symbol(name, tables, paper):
-    for ax in draw(name, tables, paper).axes:
+def test_a_panel_has_the_lines_of_one_group_each_with_its_symbol(name, figure_of):
+    for ax in figure_of(name).axes:
         lines = {line.get_color() for line in ax.get_lines() if line.get_linestyle() == "-"}
         symbols = [text.get_text() for text in ax.texts]
         assert len(lines - {style.INK}) <= 1
@@ -240,7 +247,7 @@ def test_shapley_effects_name_what_overtakes(tables, paper):
     assert rings == [(50, pytest.approx(gained))]
 
 
-def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):
+def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, figure_of):
     cell = f"{NINE}/fibonacci-36/robot"
     place = [(p.model, p.scheme) for p in PRESETS].index((NINE, "fibonacci-36"))
     rows = preset_table(tables, ["gravity", "robot"])
@@ -251,12 +258,12 @@ def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):
     assert value["bias"] == pytest.approx(biases["sd_empirical"].mean())
     tilt = tables["leveling"].set_index("cell")["roll_rms_mgon"][cell]
     assert value["tilt"] == pytest.approx(tilt)
-    written = {text.get_text() for ax in draw("table-1", tables, paper).axes for text in ax.texts}
+    written = {text.get_text() for ax in figure_of("table-1").axes for text in ax.texts}
     assert f"{tilt:.1f}" in written
 
 
-def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, paper):
-    drawn = draw("leveling-overview", tables, paper)
+def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, figure_of):
+    drawn = figure_of("leveling-overview")
     row = tables["leveling"].set_index("cell").loc[f"{NINE}/mclaren-24/gravity"]
     written = {text.get_text() for text in drawn.axes[0].texts}
     assert {f"{row['roll_rms_mgon']:.1f}", f"{row['both_rms_q95_mgon']:.1f}"} <= written
@@ -266,7 +273,9 @@ def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables,
     assert "at tilts up to 50 gon" in drawn.axes[-1].get_ylabel()
 
 
-def test_figure_7_has_the_first_simulation_the_middle_of_all_and_the_mean_sd(tables, paper):
+def test_figure_7_has_the_first_simulation_the_middle_of_all_and_the_mean_sd(
+    tables, paper, figure_of
+):
     runs = single_runs(tables, paper).query("approach == 'gravity' and parameter == 'b_x'")
     errors, sds = (rows.iloc[0] for _, rows in runs.groupby("quantity"))
     of_cell = (
@@ -281,7 +290,7 @@ def test_figure_7_has_the_first_simulation_the_middle_of_all_and_the_mean_sd(tab
     np.testing.assert_allclose(errors[["low", "high"]].astype(float), found)
     mean = summary.set_index("parameter")["sd_posteriori_mean"]["b_x"]
     assert sds["mean"] == pytest.approx(mean)
-    axes = draw("figure-7", tables, paper).axes
+    axes = figure_of("figure-7").axes
     assert sds["mean"] == pytest.approx(axes[1].patches[0].get_height())
 
 
@@ -293,12 +302,12 @@ def test_figure_8_has_no_diagonal(tables):
     assert matrix[3, 4] == pytest.approx(0.25, abs=0.01)  # of the scales, in an isotropic scheme
 
 
-def test_what_cannot_be_estimated_is_marked(tables, paper):
-    overview = draw("leveling-overview", tables, paper)
+def test_what_cannot_be_estimated_is_marked(figure_of):
+    overview = figure_of("leveling-overview")
     assert sum(len(ax.patches) for ax in overview.axes[:4]) > 0
     crosses = [
         y
-        for ax in draw("table-1", tables, paper).axes
+        for ax in figure_of("table-1").axes
         for line in ax.get_lines()
         if line.get_marker() == "x"
         for y in line.get_ydata()
@@ -406,14 +415,12 @@ def test_parameters_of_one_colour_differ_in_line_and_marker():
     assert len(set(styles)) == len(names)
 
 
-def test_colours_are_the_same_in_every_figure(tables, paper):
+def test_colours_are_the_same_in_every_figure(figure_of):
     robot = style.approach_colour("robot")
     for name in ("figure-7", "table-1", "closed-forms"):
-        lines = draw(name, tables, paper).findobj(lambda artist: hasattr(artist, "get_marker"))
+        lines = figure_of(name).findobj(lambda artist: hasattr(artist, "get_marker"))
         assert robot in {line.get_color() for line in lines}
-    colours = {
-        ax.get_ylabel(): ax.yaxis.label.get_color() for ax in draw("figure-5", tables, paper).axes
-    }
+    colours = {ax.get_ylabel(): ax.yaxis.label.get_color() for ax in figure_of("figure-5").axes}
     for group in ("force", "bias", "scale"):
         assert colours[group] == style.group_colour(group)
 
