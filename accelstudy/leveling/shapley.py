@@ -10,25 +10,22 @@ function they are the classic Sobol indices.
 A linear function of normal inputs has them in closed form, since v(u) = g_uᵀ Σ_uu⁻¹ g_u with
 g = Cov(X, Y) (Owen & Prieur 2017; Iooss & Prieur 2019). Groups of inputs
 that are independent of each other can be treated one by one (Broto et al. 2019), so the effort
-depends on the largest group of correlated inputs. A function that is not linear is sampled in
-random orders (Song, Nelson & Staum 2016).
+depends on the largest group of correlated inputs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
-from accelstudy.basics.shares import Z95
-
 Array = NDArray[np.float64]
 
 CHUNK = 1024
-"""Sets of inputs, or random orders, that are computed at once."""
+"""Sets of inputs that are computed at once."""
 SINGULAR = 1e-12
 """Eigenvalues of a correlation matrix below this share of the largest one count as zero."""
 
@@ -94,82 +91,3 @@ def _sets(p: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
         for size in np.unique(sizes):
             _, members = np.nonzero(inside[sizes == size])
             yield int(size), members.reshape(-1, size)
-
-
-def sampled_shapley(
-    function: Callable[[Array], Array],
-    mean: ArrayLike,
-    covariance: ArrayLike,
-    slope: ArrayLike,
-    orders: int,
-    rng: np.random.Generator,
-) -> tuple[Array, Array, Array]:
-    """Shapley effects of normal inputs on the outputs of any function, by Monte Carlo.
-
-    In each random order the inputs become known one after another, and those not yet known are
-    drawn again. Half the mean square of the change of the output is the variance that is left. With
-    the Cholesky factor of the inputs in that order, the first j inputs depend on the first j normal
-    numbers only. The linear function, whose shares are known exactly, is evaluated with the same
-    numbers as a control variate.
-
-    Parameters
-    ----------
-    function : takes (N, d), returns (N, k)
-    mean, covariance : (d,) and (d, d) arrays, of the inputs
-    slope : (k, d) array, derivatives of the function at the mean; zeros if it has none
-    orders : int, random orders
-    rng : Generator
-
-    Returns
-    -------
-    shares : (k, d) array, each row sums to 1; NaN where an output has no variance
-    ci95 : (k, d) array, half width of the 95 % confidence interval
-    variance : (k,) array, of the outputs
-    """
-    mean, covariance = np.asarray(mean, float), np.asarray(covariance, float)
-    slope = np.atleast_2d(np.asarray(slope, float))
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    sizes = [min(CHUNK, orders - start) for start in range(0, orders, CHUNK)]
-    chunks = [_gains(function, mean, root, slope, size, rng) for size in sizes]
-    gained, linear = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
-
-    shares, variance = linear_shapley(slope, covariance)
-    expected = np.where(variance > 0, shares.T * variance, 0.0)
-    scatter = linear - linear.mean(axis=0)
-    squares = np.sum(scatter**2, axis=(0, 1))
-    common = np.sum(scatter * gained, axis=(0, 1)) / np.where(squares > 0, squares, 1.0)
-    gained = gained - common * (linear - expected)
-    variance = gained.sum(axis=1).mean(axis=0)
-    shares = gained.mean(axis=0) / np.where(variance > 0, variance, np.nan)
-    apart = gained - shares * gained.sum(axis=1, keepdims=True)
-    ci95 = Z95 * apart.std(axis=0, ddof=1) / np.sqrt(orders) / variance
-    return shares.T, ci95.T, variance
-
-
-def _gains(
-    function: Callable[[Array], Array],
-    mean: Array,
-    root: Array,
-    slope: Array,
-    orders: int,
-    rng: np.random.Generator,
-) -> tuple[Array, Array]:
-    """Variance that each input adds in each order, (orders, d, k): of the function, and linear."""
-    d = len(mean)
-    order = rng.permuted(np.tile(np.arange(d), (orders, 1)), axis=1)
-    fixed, drawn = rng.standard_normal((2, orders, 1, d))
-    factor = np.linalg.qr(np.swapaxes(root[order], 1, 2), mode="r")
-    is_known = np.arange(d) < np.arange(d + 1)[:, None]
-    in_order = np.where(is_known, fixed, drawn) @ factor
-    inputs = np.empty_like(in_order)
-    np.put_along_axis(inputs, order[:, None, :], in_order, axis=2)
-
-    def gains(outputs: Array) -> Array:
-        left = (outputs - outputs[:, -1:]) ** 2 / 2
-        result = np.empty((orders, d, outputs.shape[2]))
-        np.put_along_axis(result, order[:, :, None], left[:, :-1] - left[:, 1:], axis=1)
-        return result
-
-    outputs = function((mean + inputs).reshape(-1, d)).reshape(orders, d + 1, -1)
-    return gains(outputs), gains(inputs @ slope.T)

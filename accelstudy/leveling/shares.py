@@ -17,22 +17,15 @@ from numpy.typing import NDArray
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
-from accelstudy.leveling.sensitivity import (
-    FORCES,
-    NEGLIGIBLE_VARIANCE,
-    OUTPUTS,
-    leveled,
-    total_effects,
-)
-from accelstudy.leveling.shapley import linear_shapley, sampled_shapley
+from accelstudy.leveling.sensitivity import FORCES, NEGLIGIBLE_VARIANCE, OUTPUTS
+from accelstudy.leveling.shapley import linear_shapley
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 LINEAR_UP_TO = 0.01
-"""Sd of roll and pitch, rad, up to which linear theory gives their variance to 3e-4 of it."""
-ORDERS = 8192
-"""Random orders of the Monte Carlo beyond that."""
+"""Sd of roll and pitch, rad, up to which linear theory gives their variance to 3e-4 of it. Beyond,
+near the roll pole, the shares are not defined."""
 NOTABLE = 0.01
 """Share below which it does not matter which of two inputs is the larger."""
 TIED = 0.02
@@ -68,14 +61,9 @@ def leveling_shares(
     model: SensorModel,
     parameters: Array,
     covariance: Array,
-    base_samples: int,
-    seed: int,
     g: float = STANDARD_GRAVITY,
 ) -> pd.DataFrame:
-    """Shapley effects on roll and pitch over a grid of attitudes.
-
-    They are exact where leveling is linear within the errors. Near the roll pole it is not, and
-    they are sampled.
+    """Shapley effects on roll and pitch over a grid of attitudes, where leveling is linear.
 
     Parameters
     ----------
@@ -83,15 +71,14 @@ def leveling_shares(
     sigma_force : float, m/s², of each component of the sensor's output
     model, parameters : sensor model with its (u,) parameters, SI
     covariance : (u, u) array, SI, of the parameters
-    base_samples, seed : as in `accelstudy.leveling.sensitivity.total_effects`, for what is sampled
     g : float, m/s²
 
     Returns
     -------
     DataFrame
-        output, roll_gon, pitch_gon, input, shapley_effect, ci95 (0 where exact), total_effect (of
-        the inputs taken as independent), sd_output_mgon, method (linear or Monte Carlo), defined;
-        where the output has no variance the effects are NaN and `defined` False.
+        output, roll_gon, pitch_gon, input, shapley_effect, total_effect (of the inputs taken as
+        independent), sd_output_mgon, defined; where the output has no variance, or leveling is
+        not linear within the errors, the effects are NaN and `defined` False.
     """
     names = [*FORCES, *model.parameter_names]
     whole = np.zeros((len(names), len(names)))
@@ -104,21 +91,11 @@ def leveling_shares(
     slopes = leveling_slope(model, parameters, f_s, g)
     shares, variance = linear_shapley(slopes.reshape(-1, len(names)), whole)
     shares, variance = shares.reshape(slopes.shape), variance.reshape(slopes.shape[:2])
-    ci95 = np.zeros_like(shares)
     total = (slopes * sigma) ** 2
     total /= np.maximum(total.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
-    sampled = (variance > LINEAR_UP_TO**2).any(axis=1)
-    for i in np.flatnonzero(sampled):
-        function, mean = leveled(attitudes[i], model, g), np.concatenate([f_s[i], parameters])
-        rng = np.random.default_rng(seed)
-        shares[i], ci95[i], variance[i] = sampled_shapley(
-            function, mean, whole, slopes[i], ORDERS, rng
-        )
-        total[i], _, _ = total_effects(function, mean, sigma, base_samples, 2, seed)
-
-    defined = variance > NEGLIGIBLE_VARIANCE
-    for values in (shares, ci95, total):
-        values[~defined] = np.nan
+    linear = (variance <= LINEAR_UP_TO**2).all(axis=1, keepdims=True)
+    defined = linear & (variance > NEGLIGIBLE_VARIANCE)
+    shares[~defined] = total[~defined] = np.nan
     labels = pd.MultiIndex.from_product(
         [list(product(map(float, roll_gon), map(float, pitch_gon))), OUTPUTS, names],
         names=["attitude", "output", "input"],
@@ -130,10 +107,8 @@ def leveling_shares(
             "pitch_gon": labels["attitude"].str[1],
             "input": labels["input"],
             "shapley_effect": shares.ravel(),
-            "ci95": ci95.ravel(),
             "total_effect": total.ravel(),
             "sd_output_mgon": np.repeat(np.sqrt(variance).ravel() / MGON, len(names)),
-            "method": np.repeat(np.where(sampled, "Monte Carlo", "linear"), 2 * len(names)),
             "defined": np.repeat(defined.ravel(), len(names)),
         }
     )

@@ -80,8 +80,6 @@ def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFram
             model,
             truth,
             matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
-            settings.base_samples,
-            study.seed,
             study.gravity_mps2,
         )
         table.insert(0, "analysis", approach)
