@@ -8,7 +8,7 @@ effects and the diagnosis of the project.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -25,12 +25,11 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.designs import ANGLE_SIGMA, GRAVITY, Course, Session, joints_of
+from studies.hidden.physics.designs import ANGLE_SIGMA, GRAVITY, Array, Course, Session, joints_of
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Settings
 from studies.hidden.physics.measuring import Sensor
 
-Array = NDArray[np.float64]
 Spans = NDArray[np.int_]
 """First sample of each hold, and the one after its last, (n, 2)."""
 
@@ -122,13 +121,12 @@ class Donor:
             time=(self.time[starts] + self.time[ends - 1]) / 2,
             course=course,
         )
-        atlas = Atlas(session, Conditions.of(session, "gravity", self.sensor))
-        if not self.own:
-            return atlas
-        shape, conditions = atlas.shape(EFFECTS[self.own[0]], {}), atlas.conditions
-        assert shape is not None
-        absorbed = np.linalg.qr(np.concatenate([conditions.absorbed, shape.basis], axis=1))[0]
-        return Atlas(session, replace(conditions, absorbed=absorbed))
+        atlas = Atlas(session, Conditions(session, "gravity", self.sensor))
+        for name in self.own[:1]:
+            shape = atlas.shape(EFFECTS[name], {})
+            assert shape is not None
+            atlas.conditions.absorb(shape.basis)
+        return atlas
 
     @cached_property
     def sigma(self) -> float:

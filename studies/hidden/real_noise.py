@@ -23,13 +23,12 @@ from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.config_names import ModelName
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import get_effect
-from accelstudy.files.outputs import whole_file
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates
 from studies.hidden.physics.designs import Array, Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.oracle import Oracle
 from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, spans_of
-from studies.hidden.study import Job, Made, Row, Study
+from studies.hidden.study import Job, Made, Plan, Row, Study
 
 FEWEST = 5
 """Redundancy of a log, below which nothing is put into it."""
@@ -77,10 +76,9 @@ class RealNoiseConfig(Study):
         """Names of the jobs, one for each log."""
         return [*self.logs]
 
-    def write_plan(self, path: str | Path) -> None:
-        """Write an empty plan: what can be put into a log shows when it is read."""
-        with whole_file(path) as temporary:
-            temporary.write_text("{}", encoding="utf-8")
+    def plan(self) -> Plan:
+        """Nothing, as what can be put into a log shows when it is read."""
+        return {}
 
     def job(self, name: str, plan: str | Path) -> Job:
         """Campaigns of a log."""

@@ -6,6 +6,7 @@ that can show it.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import combinations, product
@@ -40,8 +41,8 @@ Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]
 Numbered = tuple[Case, int]
 """A case, and the number of the campaign among those of the case."""
-PLAN = TypeAdapter(dict[str, list[Numbered]])
-"""Campaigns of each job."""
+Plan = dict[str, list[Numbered]]
+PLAN = TypeAdapter(Plan)
 
 CAMPAIGNS = Range(1, 1_000_000)
 """Campaigns of a study; the most take days of computing."""
@@ -135,6 +136,15 @@ class Study(Block):
         """Hash of all that the numbers depend on, defaults included."""
         return config_hash(self.model_dump(mode="json", exclude={"public_folder"}))
 
+    @abstractmethod
+    def plan(self) -> Plan:
+        """Campaigns of each job."""
+
+    def write_plan(self, path: str | Path) -> None:
+        """Write the plan, so that the jobs need not plan the study again."""
+        with whole_file(path) as temporary:
+            temporary.write_bytes(PLAN.dump_json(self.plan()))
+
 
 class HiddenConfig(Study):
     """A study of hidden effects; results go to ``results/<study>``."""
@@ -210,16 +220,11 @@ class HiddenConfig(Study):
 
         return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
 
-    def plan(self) -> dict[str, list[Numbered]]:
+    def plan(self) -> Plan:
         """Campaigns of each job, as equal in number as they can be."""
         campaigns, jobs = self.campaigns(), self.jobs
         ends = np.linspace(0, len(campaigns), len(jobs) + 1).round().astype(int).tolist()
         return {job: campaigns[ends[i] : ends[i + 1]] for i, job in enumerate(jobs)}
-
-    def write_plan(self, path: str | Path) -> None:
-        """Write the plan, so that the jobs need not plan the study again."""
-        with whole_file(path) as temporary:
-            temporary.write_bytes(PLAN.dump_json(self.plan()))
 
     def job(self, name: str, plan: str | Path) -> Job:
         """Job by its name, as `write_plan` wrote it."""

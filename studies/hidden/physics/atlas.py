@@ -9,63 +9,52 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Session, session
+from studies.hidden.physics.designs import GRAVITY, Array, Session, session
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.kinds import Cause, Kind
 from studies.hidden.physics.measuring import Sensor, level_force, observe
-
-Array = NDArray[np.float64]
 
 STEP = 1e-5
 """rad, of numerical derivatives by the angles."""
 TRIANGLE = tuple((i, j) for i in range(3) for j in range(i, 3))
 
 
-@dataclass(frozen=True)
 class Conditions:
-    """Misclosures of a session that is calibrated with the true parameters of a sensor.
+    """Misclosures of a session, without any effect, that is calibrated by the true sensor.
 
     Attributes
     ----------
     sensor : Sensor
     robot : bool, whether the readings of the encoders are used; else the norm of gravity is
-    root : (n, c, c) array, inverse of a lower root of the covariance matrix of the misclosures
     directions : (n, 3) array, unit vectors along the specific force
     absorbed : (m, 9) array, orthonormal, what the nine parameters of a calibration absorb
     """
 
-    sensor: Sensor
-    robot: bool
-    root: Array
-    directions: Array
-    absorbed: Array
-
-    @classmethod
-    def of(cls, session: Session, approach: str, sensor: Sensor) -> Conditions:
-        """Conditions of a session without any effect, at the truth."""
-        robot = approach == "robot"
+    def __init__(self, session: Session, approach: str, sensor: Sensor) -> None:
+        self.sensor, self.robot = sensor, approach == "robot"
         output, joints = (part[0] for part in observe(session, sensor, ()))
         correction = sensor.correction
-        calibrated = (output - sensor.bias) @ correction.T
-        directions = calibrated / GRAVITY
+        self.directions = (output - sensor.bias) @ correction.T / GRAVITY
         noise = session.sigma**2 * correction @ correction.T
-        if robot:
+        if self.robot:
             turned = np.stack([STEP * np.eye(2), -STEP * np.eye(2)])
             ahead, back = level_force(joints[:, None, :] + turned[:, None])
             by_angles = (ahead - back) / (2 * STEP)
             angles = session.sigma_angle**2 * np.swapaxes(by_angles, 1, 2) @ by_angles
-            root = np.linalg.inv(np.linalg.cholesky(noise + angles))
+            self._root = np.linalg.inv(np.linalg.cholesky(noise + angles))
         else:
-            variance = np.sum((directions @ noise) * directions, axis=1)
-            root = 1 / np.sqrt(variance)[:, None, None]
+            variance = np.sum((self.directions @ noise) * self.directions, axis=1)
+            self._root = 1 / np.sqrt(variance)[:, None, None]
         # A calibrated force is an upper triangular matrix times the output less its bias.
         columns = np.zeros((len(output), 3, 9))
         for column, (i, j) in enumerate(TRIANGLE):
             columns[:, i, column] = output[:, j] - sensor.bias[j]
         columns[:, :, 6:] = correction
-        at_truth = cls(sensor, robot, root, directions, np.zeros((0, 9)))
-        rows = at_truth._white(columns.transpose(2, 0, 1)).T
-        return cls(sensor, robot, root, directions, np.linalg.qr(rows)[0])
+        self.absorbed = np.linalg.qr(self._white(columns.transpose(2, 0, 1)).T)[0]
+
+    def absorb(self, basis: Array) -> None:
+        """Let a calibration absorb what lies in a basis (m, d), too."""
+        self.absorbed = np.linalg.qr(np.concatenate([self.absorbed, basis], axis=1))[0]
 
     def misclosures(self, output: Array, reading: Array) -> Array:
         """Misclosures (B, m) of unit weight of outputs (B, n, 3) and readings (B, n, 2)."""
@@ -73,7 +62,7 @@ class Conditions:
         if self.robot:
             return self._white(calibrated - level_force(reading))
         norms = np.sqrt(np.sum(calibrated**2, axis=-1)) - GRAVITY
-        return np.asarray(norms * self.root[:, 0, 0])
+        return np.asarray(norms * self._root[:, 0, 0])
 
     def changed(self, forces: Array) -> Array:
         """Misclosures (B, m) that small changes (B, n, 3) of the outputs make."""
@@ -90,8 +79,8 @@ class Conditions:
     def _white(self, forces: Array) -> Array:
         """Conditions (B, m) of unit weight of changes of forces (B, n, 3)."""
         if not self.robot:
-            return np.asarray(np.sum(forces * self.directions, axis=-1) * self.root[:, 0, 0])
-        white = np.matmul(self.root, forces[..., None])[..., 0]
+            return np.asarray(np.sum(forces * self.directions, axis=-1) * self._root[:, 0, 0])
+        white = np.matmul(self._root, forces[..., None])[..., 0]
         return np.asarray(white.reshape(len(forces), -1))
 
 
@@ -225,7 +214,7 @@ class Atlas:
 def atlas(design: str, approach: str) -> Atlas:
     """The atlas of a design by an approach."""
     ideal = session(design)
-    return Atlas(ideal, Conditions.of(ideal, approach, Sensor()))
+    return Atlas(ideal, Conditions(ideal, approach, Sensor()))
 
 
 def visible_effects(design: str, approach: str) -> tuple[str, ...]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.designs import GRAVITY, Array, Session
 from studies.hidden.physics.kinds import (
     KNEE,
     LAG,
@@ -23,7 +22,6 @@ from studies.hidden.physics.kinds import (
     tilted,
 )
 
-Array = NDArray[np.float64]
 TIMED, WARM = ("time",), ("time", "course")
 
 

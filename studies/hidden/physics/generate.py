@@ -10,12 +10,11 @@ from math import nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.designs import GRAVITY, Array, Session
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.gross import GROSS
 from studies.hidden.physics.kinds import Cause, Kind, Place
@@ -135,7 +134,6 @@ class Truth:
     seed: tuple[int, ...] = ()
 
 
-Array = NDArray[np.float64]
 ARRIVAL = 5e-4
 """rad, sd of the joints about the attitudes of the design."""
 Known = tuple[Cause, tuple[str, ...]]
@@ -165,7 +163,7 @@ def generate(
     arrived = planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape)
     session = replace(planned, joints=arrived)
     sensor = Sensor.drawn(rng)
-    conditions = Conditions.of(session, case.approach, sensor)
+    conditions = Conditions(session, case.approach, sensor)
     sizes = case.lam or (0.0,) * len(case.effect)
     known = [
         (given or {}).get(name) or drawn(name, lam, session, conditions, knowing, rng)

@@ -7,14 +7,12 @@ from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Conditions
-from studies.hidden.physics.designs import GRAVITY
+from studies.hidden.physics.designs import GRAVITY, Array
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 Changed = tuple[Campaign, dict[str, float]]
 

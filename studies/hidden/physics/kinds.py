@@ -6,11 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.designs import GRAVITY, Array, Session
 
-Array = NDArray[np.float64]
 Place = tuple[str, str]
 """Coordinate and target of a function."""
 

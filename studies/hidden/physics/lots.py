@@ -109,7 +109,7 @@ def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:
     """Effects of the type with their typical parameters; sudden events have none."""
     knowing = oracle(case.design, case.approach)
     session = knowing.atlas.session
-    conditions = Conditions.of(session, case.approach, Sensor())
+    conditions = Conditions(session, case.approach, Sensor())
     known = {
         name: drawn(name, case.lam, session, conditions, knowing, rng)
         for name, share in zip(case.effects, case.shares, strict=True)

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Session, in_turned_frame, rotated
+from studies.hidden.physics.designs import GRAVITY, Array, Session, in_turned_frame, rotated
 from studies.hidden.physics.kinds import OUTPUTS, RIG, Cause
-
-Array = NDArray[np.float64]
 
 
 def flange_force(

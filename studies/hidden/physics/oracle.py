@@ -15,13 +15,13 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, logsumexp, softmax
+from scipy.special import chdtrc, softmax
 
-from studies.hidden.physics.atlas import Atlas, Shape, atlas
+from studies.hidden.physics.atlas import Atlas, atlas
+from studies.hidden.physics.designs import Array
 from studies.hidden.physics.kinds import Kind
 from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
 
-Array = NDArray[np.float64]
 Class = tuple[str, ...]
 
 OUTSIDE_SHARE = 0.15
@@ -71,7 +71,7 @@ class Oracle:
     @cached_property
     def pairs(self) -> Pairs:
         """All pairs of shapes of different effects."""
-        return Pairs.of(self.atlas)
+        return Pairs(self.atlas)
 
     @cached_property
     def classes(self) -> tuple[Class, ...]:
@@ -108,106 +108,73 @@ class Oracle:
 
     def _one(self, z: Array, sizes: Sequence[float]) -> tuple[tuple[Class, ...], int]:
         # Where nothing is missing, or nothing of the catalogue, any usual size will do.
-        size = sizes[0] if sizes else 25.0
-        evidence = _evidence(self.atlas.parts(z), self.atlas.dims, size)
-        names = [shape.effect.name for shape in self.atlas.shapes]
-        by_name: dict[str, list[int]] = {}
-        for i, name in enumerate(names):
-            by_name.setdefault(name, []).append(i)
-        logs = {
-            name: logsumexp(evidence[indices]) - float(np.log(len(indices)))
-            for name, indices in by_name.items()
-        }
-        best = by_name[max(logs, key=lambda name: logs[name])]
-        told = self.classes[max(best, key=lambda i: evidence[i])]
+        atlas, size = self.atlas, sizes[0] if sizes else 25.0
+        names = [shape.effect.name for shape in atlas.shapes]
+        starts = np.array([i for i, name in enumerate(names) if i == 0 or name != names[i - 1]])
+        logs, best = _most_probable(_evidence(atlas.parts(z), atlas.dims, size), starts)
         by_class: dict[Class, float] = {}
-        for name, log in logs.items():
-            alike = self.classes[by_name[name][0]]
+        for i, log in zip(starts, logs, strict=True):
+            alike = self.classes[i]
             by_class[alike] = float(np.logaddexp(by_class.get(alike, -np.inf), log))
         p = np.sort(softmax([*by_class.values()]))[::-1]
-        return (told,), int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
+        return (self.classes[best],), int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
 
     def _two(self, z: Array, size: float) -> tuple[Class, ...]:
         pairs = self.pairs
-        evidence = _evidence(pairs.parts(z), pairs.dims, size)
-        top = np.maximum.reduceat(evidence, pairs.starts)
-        counts = np.diff(np.append(pairs.starts, len(evidence)))
-        sums = np.add.reduceat(np.exp(evidence - np.repeat(top, counts)), pairs.starts)
-        group = int(np.argmax(top + np.log(sums / counts)))
-        start = pairs.starts[group]
-        best = start + int(np.argmax(evidence[start : start + counts[group]]))
+        _, best = _most_probable(_evidence(pairs.parts(z), pairs.dims, size), pairs.starts)
         return (self.classes[pairs.first[best]], self.classes[pairs.second[best]])
 
 
-@dataclass(frozen=True)
 class Pairs:
-    """Pairs of shapes, those of the same two effects next to each other.
+    """Pairs of shapes of different effects, those of the same two next to each other.
 
     Attributes
     ----------
-    atlas : Atlas
     first, second : (q,) int arrays, shapes
     dims : (q,) array, dimensions of both together
     starts : (g,) int array, first pair of each two effects
-    cross : (q, d, d) array, products of the two bases, filled up with zeros
-    inverse : (q, d, d) array, of what the first leaves of the second
     """
 
-    atlas: Atlas
-    first: NDArray[np.int_]
-    second: NDArray[np.int_]
-    dims: Array
-    starts: NDArray[np.int_]
-    cross: Array
-    inverse: Array
-
-    @classmethod
-    def of(cls, atlas: Atlas) -> Pairs:
-        """All pairs of shapes of different effects."""
-        shapes = atlas.shapes
+    def __init__(self, atlas: Atlas) -> None:
         order = {name: i for i, name in enumerate(atlas.visible)}
-        effect = np.array([order[shape.effect.name] for shape in shapes])
+        effect = np.array([order[shape.effect.name] for shape in atlas.shapes])
         first, second = np.nonzero(effect[:, None] < effect[None, :])
         group = effect[first] * len(order) + effect[second]
         sorted_ = np.argsort(group, kind="stable")
         first, second, group = first[sorted_], second[sorted_], group[sorted_]
-        padded = _padded(shapes)
-        d = padded.shape[2]
-        flat = padded.transpose(1, 0, 2).reshape(padded.shape[1], -1)
-        products = (flat.T @ flat).reshape(len(shapes), d, len(shapes), d)
-        cross = products[first, :, second, :]
-        rest = products[second, :, second, :] - np.swapaxes(cross, 1, 2) @ cross
+        # Bases with columns of zeros, so that all are equally wide, (s, m, d).
+        d = int(atlas.dims.max())
+        self._bases = np.stack([np.pad(s.basis, ((0, 0), (0, d - s.dim))) for s in atlas.shapes])
+        flat = self._bases.transpose(1, 0, 2).reshape(self._bases.shape[1], -1)
+        products = (flat.T @ flat).reshape(len(effect), d, len(effect), d)
+        # Of the second basis, what the first leaves.
+        self._cross = products[first, :, second, :]
+        rest = products[second, :, second, :] - np.swapaxes(self._cross, 1, 2) @ self._cross
         values, vectors = np.linalg.eigh(rest)
         kept = values > 1e-4
         weights = np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
-        inverse = (vectors * weights[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-        return cls(
-            atlas,
-            first,
-            second,
-            np.asarray(atlas.dims[first] + np.sum(kept, axis=1), dtype=float),
-            np.flatnonzero(np.diff(group, prepend=-1)),
-            cross,
-            inverse,
-        )
+        self._inverse = (vectors * weights[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+        self.first, self.second = first, second
+        self.dims = np.asarray(atlas.dims[first] + np.sum(kept, axis=1), dtype=float)
+        self.starts = np.flatnonzero(np.diff(group, prepend=-1))
 
     def parts(self, z: Array) -> Array:
         """Squares of what misclosures (m,) have in each pair, (q,)."""
         components = np.einsum("smd,m->sd", self._bases, z)
         one, two = components[self.first], components[self.second]
-        rest = two - np.matmul(one[:, None, :], self.cross)[:, 0]
-        gained = np.sum(np.matmul(rest[:, None, :], self.inverse)[:, 0] * rest, axis=1)
+        rest = two - np.matmul(one[:, None, :], self._cross)[:, 0]
+        gained = np.sum(np.matmul(rest[:, None, :], self._inverse)[:, 0] * rest, axis=1)
         return np.asarray(np.sum(one**2, axis=1) + gained)
 
-    @cached_property
-    def _bases(self) -> Array:
-        return _padded(self.atlas.shapes)
 
-
-def _padded(shapes: Sequence[Shape]) -> Array:
-    """Bases with columns of zeros, so that all are equally wide, (s, m, d)."""
-    widest = max(shape.dim for shape in shapes)
-    return np.stack([np.pad(s.basis, ((0, 0), (0, widest - s.dim))) for s in shapes])
+def _most_probable(evidence: Array, starts: NDArray[np.int_]) -> tuple[Array, int]:
+    """Log evidence of groups, that of their members on average, and the best member of the best."""
+    counts = np.diff(np.append(starts, len(evidence)))
+    top = np.maximum.reduceat(evidence, starts)
+    sums = np.add.reduceat(np.exp(evidence - np.repeat(top, counts)), starts)
+    logs = top + np.log(sums / counts)
+    start, count = (int(each[np.argmax(logs)]) for each in (starts, counts))
+    return logs, start + int(np.argmax(evidence[start : start + count]))
 
 
 def _evidence(parts: Array, dims: Array | NDArray[np.int_], size: float) -> Array:

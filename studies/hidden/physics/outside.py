@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Session
+from studies.hidden.physics.designs import GRAVITY, Array, Session
 from studies.hidden.physics.kinds import (
     PHASE,
     SEED,
@@ -31,7 +30,6 @@ from studies.hidden.physics.kinds import (
 )
 from studies.hidden.physics.measuring import flange_force
 
-Array = NDArray[np.float64]
 Drawn = Mapping[str, float]
 TIMED, SHAKEN, WARM = ("time",), ("vibration",), ("course",)
 
