@@ -60,8 +60,8 @@ from accelstudy.sensors.sensor import SensorModel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SIGMA = Given("m/s^2", "", "Noise of a reading.")
-TILT = Given("rad", "", "Largest tilt.", 1e-3, np.pi / 2)
+SIGMA = Given("m/s^2")
+TILT = Given("rad", "", 1e-3, np.pi / 2)
 
 
 class Calibration(Result):

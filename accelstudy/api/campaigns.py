@@ -25,9 +25,9 @@ from accelstudy.planning.quantities import QUANTITIES
 
 _QUANTITIES = {
     "sigma": QUANTITIES["sigma"],
-    "sigma_angle": Given("rad", "", "Noise of the robot's angles."),
+    "sigma_angle": Given("rad"),
     "gravity": GRAVITY,
-    "interval": Given("s", "", "Time between holds."),
+    "interval": Given("s"),
 }
 _NAMES = ("effects", "noise_effects", "gross_errors")
 _TYPES = get_type_hints(CampaignSettings)

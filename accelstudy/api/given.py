@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-GRAVITY = Given("m/s^2", "", "Local gravity.", bounds.GRAVITY.least, bounds.GRAVITY.most)
+GRAVITY = Given("m/s^2", "", bounds.GRAVITY.least, bounds.GRAVITY.most)
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 _KEYWORDS = {"range": "range_mps2", "threshold": "threshold_mps2"}
 """Options whose keywords have other names."""

@@ -256,17 +256,13 @@ class Given:
     ----------
     unit : str, SI
     usual : str, with its unit; empty if there is none
-    help : str
     least, most : float, SI, both allowed
-    section : str, of the help text
     """
 
     unit: str
-    usual: str
-    help: str
+    usual: str = ""
     least: float = 0.0
     most: float = math.inf
-    section: str = ""
 
     def read(self, text: str) -> float:
         """Value of a text with its unit, SI; raises `InputError` if it is not one."""

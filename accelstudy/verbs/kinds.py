@@ -71,8 +71,8 @@ File = Annotated[str | PathLike[str], FileOrFolder()]
 Seed = Annotated[int, bounds.SEED]
 Quantity = float | str
 """A number in SI, or a text with a unit."""
-Accuracy = Annotated[Quantity, Given("rad", "", "", 1e-9, math.pi / 2)]
-Tilt = Annotated[Quantity, Given("rad", "", "", 1e-3, math.pi / 2)]
+Accuracy = Annotated[Quantity, Given("rad", "", 1e-9, math.pi / 2)]
+Tilt = Annotated[Quantity, Given("rad", "", 1e-3, math.pi / 2)]
 
 
 @dataclass(frozen=True)

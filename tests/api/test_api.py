@@ -106,7 +106,7 @@ def test_the_unit_of_angles_is_that_of_the_environment(guide, monkeypatch):
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_quantity_is_a_number_in_si_or_a_text_with_its_unit(unit):
     """Also where the unit begins with a digit, as 1/K does."""
-    given = Given(unit, "", "", -np.inf)
+    given = Given(unit, "", -np.inf)
     for number in (0.25, 2e-4, -3, np.float64(1e-9)):
         assert quantity("x", number, given) == number
     for name, size in UNITS[unit].items():

@@ -7,7 +7,6 @@ import logging
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
@@ -113,12 +112,10 @@ def _read(task: Task) -> Campaign:
 def _measured(task: Task, folder: Path, record: str | Path | None) -> Campaign:
     if task.settings is None:
         return _read(task)
-    path = task.source if record is None else _recorded(record)
+    path = task.source
+    if record is not None:
+        told = read_record(record)
+        if told["error"] is not None:
+            raise InputError(told["error"])
+        path = told["file"]
     return import_to(folder, path, task.settings)[0]
-
-
-def _recorded(path: str | Path) -> str:
-    record: dict[str, Any] = read_record(path)
-    if record["error"] is not None:
-        raise InputError(record["error"])
-    return record["file"]

@@ -15,7 +15,6 @@ from accelstudy.campaign.calibration.applying import FORCES
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
@@ -53,7 +52,9 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         else {"file": campaign.of_type.file, "sensors": campaign.of_type.sensors},
         "axes": FRD.name,
         "unit": campaign.unit,
-        "nominal": _nominal(fit),
+        "nominal": None
+        if (nominal := campaign.nominal) is None
+        else {"scale": nominal.scale.tolist(), "offset": nominal.offset.tolist()},
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
@@ -62,7 +63,10 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "sigma_position_mps2": json_number(fit.sigma_position),
         "sigma_position_priori_mps2": json_number(campaign.sigma_force),
         "sigma_position_posteriori_mps2": json_number(fit.sigma_position_posteriori),
-        "sigma_reading_mps2": _sigma_reading(campaign),
+        # of a single reading, from the samples within the holds
+        "sigma_reading_mps2": None
+        if campaign.sd is None
+        else json_number(np.sqrt(np.mean(campaign.sd**2))),
         "parameters": [
             {
                 "name": parameter.name,
@@ -82,8 +86,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
             }
             for i, parameter in enumerate(fit.model.parameters)
         ],
-        "covariance": _numbers(covariance),
-        "correlation": _numbers(correlation),
+        "covariance": _without_nan(covariance.tolist()),
+        "correlation": _without_nan(correlation.tolist()),
         "condition": json_number(fit.estimability.condition),
         "redundancy": adjustment.redundancy,
         "variance_of_unit_weight": json_number(adjustment.variance_posteriori[0]),
@@ -251,18 +255,6 @@ def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
     }
 
 
-def _sigma_reading(campaign: Campaign) -> float | None:
-    """Noise of a single reading, m/s², from the samples within the holds."""
-    return None if campaign.sd is None else json_number(np.sqrt(np.mean(campaign.sd**2)))
-
-
-def _nominal(fit: CampaignFit) -> dict[str, list[float]] | None:
-    nominal = fit.campaign.nominal
-    if nominal is None:
-        return None
-    return {"scale": nominal.scale.tolist(), "offset": nominal.offset.tolist()}
-
-
 def _affine(fit: CampaignFit) -> dict[str, Any] | None:
     form = affine_form(fit.model, fit.parameters)
     if form is None:
@@ -273,10 +265,6 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
         "bias_mps2": bias.tolist(),
         "gauges": {gauge: in_gauge(matrix, gauge).tolist() for gauge in GAUGES},
     }
-
-
-def _numbers(matrix: np.ndarray) -> list[list[float | None]]:
-    return [[json_number(value) for value in row] for row in matrix]
 
 
 def json_number(value: Any) -> float | None:

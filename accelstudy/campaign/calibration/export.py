@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
@@ -121,7 +121,8 @@ def export(calibration: Mapping[str, Any], form: str) -> str:
     if form in RETIRED:
         raise InputError(f"form {form}: no longer a form; {RETIRED[form]}")
     if form == "matrix":
-        return "\n".join(_row(row, " ") for row in device_matrix(calibration)) + "\n"
+        rows = device_matrix(calibration)
+        return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
     if form == "c":
         return c_header(*_of_device(calibration))
     if form == "px4":
@@ -196,7 +197,8 @@ def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
     notes = ["acts last: on f_a + Σ output of all other effects"] if effect.last else []
     if effect.part == "rig":
         notes.append("belongs to the rig: do not apply it to readings away from the rig")
-    notes += _notes(effect)
+    if effect.drifts:
+        notes.append("known within the session only: limit time to ranges.time_s")
     return {
         "spec": effect.spec,
         "part": effect.part,
@@ -208,15 +210,6 @@ def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
     }
 
 
-def _notes(effect: Effect) -> list[str]:
-    """What somebody who applies an effect has to know."""
-    return ["known within the session only: limit time to ranges.time_s"] if effect.drifts else []
-
-
 def _unit(calibration: Mapping[str, Any]) -> str:
     log = calibration.get("log")
     return str(calibration["unit"] if log is None else log["unit"])
-
-
-def _row(values: ArrayLike, separator: str) -> str:
-    return separator.join(f"{value: .12e}" for value in np.asarray(values))

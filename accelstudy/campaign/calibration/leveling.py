@@ -23,6 +23,7 @@ from accelstudy.basics.units import (
 )
 from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.applying import FORCES, MARGIN, Calibration, noise_of_reading
+from accelstudy.campaign.calibration.device import KNOWN
 from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
 from accelstudy.campaign.checks import Remedies, check_norm
@@ -119,11 +120,12 @@ def readings_of(
     """
     given = dict(given or {})
     needed = {condition for _, condition in calibration.needs}
+    ranged = {key for key in CONDITIONS if KNOWN[key] in calibration.ranges}
     opened = read_log(
         log,
         checked(LogLayout, given, "options"),
         like=calibration.usual_layout,
-        conditions=[*({"time"} & needed), *CONDITIONS],
+        conditions=[key for key in OPTIONS if key in {*needed, *ranged, *given.get("columns", ())}],
         untimed=True,
     )
     timed = "time" if opened.layout.rate_hz is not None else ""

@@ -27,7 +27,7 @@ from accelstudy.campaign.importing.allan import (
 from accelstudy.campaign.importing.recording import Samples
 from accelstudy.campaign.importing.resolution import rounding_of_mean
 from accelstudy.campaign.importing.segments import Envelope, Segment, Segmentation
-from accelstudy.campaign.importing.settings import ImportSettings, Selection
+from accelstudy.campaign.importing.settings import ImportSettings, Span, Which
 from accelstudy.campaign.importing.windows import RESTLESS, Threshold, usual_window
 from accelstudy.leveling.angles import usual_norm
 
@@ -226,8 +226,8 @@ def detected_holds(
             f"{threshold.sd:.3g} m/s²)" + "".join(f"; {warning}" for warning in warnings)
         )
     warnings += _too_short(segmentation.short, window, trim, shortest)
-    segments = _joined(segmentation.segments, settings.selection, threshold.sd, log.samples)
-    left_out = {**segmentation.left_out, **_left_out(segments, settings.selection)}
+    segments = _joined(segmentation.segments, settings.joined, threshold.sd, log.samples)
+    left_out = {**segmentation.left_out, **_left_out(segments, settings.left_out)}
     used = [segment for number, segment in segments.items() if number not in left_out]
     if not used:
         why = f"exclude: no {'hold' if segmentation.size is None else 'block'} is left"
@@ -269,14 +269,14 @@ def _too_short(rests: Sequence[float], window: float, trim: float, shortest: flo
 
 
 def _joined(
-    segments: Mapping[int, Segment], selection: Selection, alike: float, samples: Samples
+    segments: Mapping[int, Segment], joined: Sequence[Which], alike: float, samples: Samples
 ) -> dict[int, Segment]:
     """Join holds; they keep the number of the first.
 
     Parameters
     ----------
     segments : mapping of int to Segment
-    selection : Selection
+    joined : sequence of Which
     alike : float, m/s², by which the means of holds in one attitude may differ
     samples : Samples, of the log
 
@@ -287,14 +287,10 @@ def _joined(
         their attitudes differ.
     """
     holds = dict(segments)
-    groups = list(selection.joined)
-    for start, end in selection.joined_spans:
-        groups.append(tuple(_within(holds, start, end)))
-        if len(groups[-1]) < 2:
-            raise InputError(f"join: {start:g}s-{end:g}s: fewer than two holds lie there")
-    for group in groups:
-        for number in group:
-            _check(number, holds, "join")
+    for which in joined:
+        group = _chosen(holds, which, "join")
+        if len(group) < 2:
+            raise InputError(f"join: {which}: fewer than two holds lie there")
         between = [n for n in holds if group[0] < n < group[-1] and n not in group]
         if between:
             raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
@@ -310,33 +306,33 @@ def _joined(
     return holds
 
 
-def _left_out(holds: Mapping[int, Segment], selection: Selection) -> dict[int, str]:
-    """Holds that are left out, with the reason.
+def _left_out(
+    holds: Mapping[int, Segment], left_out: Sequence[tuple[Which, str]]
+) -> dict[int, str]:
+    """Holds that are left out, with the reason; one by its number counts before one by its time.
 
     Raises
     ------
     InputError
         If there is no such hold, or none in a span of time.
     """
-    for number in selection.numbers:
-        _check(number, holds, "exclude")
-    reasons = dict(selection.numbers)
-    for start, end, reason in selection.spans:
-        inside = _within(holds, start, end)
-        if not inside:
-            raise InputError(f"exclude: {start:g}s-{end:g}s: no hold lies there")
-        reasons |= {n: reason for n in inside if n not in reasons}
+    reasons: dict[int, str] = {}
+    for which, why in sorted(left_out, key=lambda each: not isinstance(each[0], Span)):
+        numbers = _chosen(holds, which, "exclude")
+        if not numbers:
+            raise InputError(f"exclude: {which}: no hold lies there")
+        reasons |= dict.fromkeys(numbers, why)
     return reasons
 
 
-def _within(holds: Mapping[int, Segment], start: float, end: float) -> list[int]:
-    """Numbers of the holds that lie in a span of time, if only in part."""
-    return sorted(n for n, hold in holds.items() if hold.t0 <= end and hold.t1 >= start)
-
-
-def _check(number: int, holds: Mapping[int, Segment], key: str) -> None:
-    if number not in holds:
-        raise InputError(f"{key}: there is no hold {number}; they are {_names(list(holds))}")
+def _chosen(holds: Mapping[int, Segment], which: Which, key: str) -> list[int]:
+    """Numbers of holds: those given, or those that lie in a span of time, if only in part."""
+    if isinstance(which, Span):
+        return sorted(n for n, h in holds.items() if h.t0 <= which.end and h.t1 >= which.start)
+    for number in which:
+        if number not in holds:
+            raise InputError(f"{key}: there is no hold {number}; they are {_names(list(holds))}")
+    return [*which]
 
 
 def _names(numbers: Sequence[int]) -> str:

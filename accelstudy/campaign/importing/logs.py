@@ -15,7 +15,7 @@ from accelstudy.campaign.importing.making import ImportReport, campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import AXES, Recording, read_log
 from accelstudy.campaign.importing.segments import segment_logs
-from accelstudy.campaign.importing.settings import ImportSettings, named_after
+from accelstudy.campaign.importing.settings import ImportSettings, Span, named_after
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.importing.windows import Windows, samples_in, usual_window
 from accelstudy.campaign.session import Campaign
@@ -27,30 +27,9 @@ if TYPE_CHECKING:
 def import_log(
     path: LogFile, settings: ImportSettings | None = None
 ) -> tuple[Campaign, ImportReport]:
-    """Import a log of one sensor or, if the settings say so, a table of means; see `import_all`."""
-    ((campaign, report),) = import_all([path], settings or ImportSettings()).values()
+    """Import a log of one sensor or a table of means; see `import_sensors`."""
+    ((campaign, report),) = import_sensors([path], settings or ImportSettings()).values()
     return campaign, report
-
-
-def import_all(
-    paths: Sequence[LogFile],
-    settings: ImportSettings,
-    beside: Beside | None = None,
-) -> dict[str, tuple[Campaign, ImportReport]]:
-    """Import a table of means, or find the static holds of logs; see `import_sensors`."""
-    if not settings.means:
-        return import_sensors(paths, settings, beside)
-    if beside is not None:
-        raise InputError(
-            "a table of means (--means) has no holds in time: leave out --reference-log"
-        )
-    if len(paths) > 1 or settings.sensors:
-        raise InputError("a table of means is one file of one sensor")
-    if settings.block is not None:
-        raise InputError(
-            "a table of means (--means) has a row for each position, no block (--block)"
-        )
-    return {"": import_means(paths[0], settings)}
 
 
 def import_sensors(
@@ -59,6 +38,8 @@ def import_sensors(
     beside: Beside | None = None,
 ) -> dict[str, tuple[Campaign, ImportReport]]:
     """Find the static holds of the sensors in a log, or in logs of one position each.
+
+    If the settings say so, it is a table of means instead.
 
     Parameters
     ----------
@@ -81,6 +62,8 @@ def import_sensors(
     InputError
         If a log cannot be read or has no static hold.
     """
+    if settings.means:
+        return {"": _import_means(paths, settings, beside)}
     chosen = _settings_of_sensors(named_after(settings, paths))
     if beside is not None and (settings.block is not None or len(paths) > 1):
         raise InputError(
@@ -104,6 +87,22 @@ def import_sensors(
     return result
 
 
+def _import_means(
+    paths: Sequence[LogFile], settings: ImportSettings, beside: Beside | None
+) -> tuple[Campaign, ImportReport]:
+    if beside is not None:
+        raise InputError(
+            "a table of means (--means) has no holds in time: leave out --reference-log"
+        )
+    if len(paths) > 1 or settings.sensors:
+        raise InputError("a table of means is one file of one sensor")
+    if settings.block is not None:
+        raise InputError(
+            "a table of means (--means) has a row for each position, no block (--block)"
+        )
+    return import_means(paths[0], settings)
+
+
 def _import_blocks(
     paths: Sequence[LogFile], chosen: Mapping[str, ImportSettings]
 ) -> dict[str, tuple[Campaign, ImportReport]]:
@@ -111,8 +110,8 @@ def _import_blocks(
     result = {}
     for name, each in chosen.items():
         log = _recording(paths, each)
-        timed = "time" in log.first.places
-        if not timed and (each.selection.spans or each.selection.joined_spans):
+        named = [*(which for which, _ in each.left_out), *each.joined]
+        if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
             raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
         result[name] = campaign_of_holds(log, detected_holds(segment_blocks(log, each), each))
     return result
@@ -189,7 +188,7 @@ def import_each(
     InputError
         If a file cannot be read or makes no campaign, or a folder cannot be written.
     """
-    campaigns = import_all(paths, settings, beside)
+    campaigns = import_sensors(paths, settings, beside)
     for name, (campaign, report) in campaigns.items():
         write_campaign(campaign, folders[name])
         if figure and report.holds is not None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
 from accelstudy.campaign.checks import OPPOSITE, better_angles
 from accelstudy.campaign.header import LogLayout
@@ -16,19 +17,17 @@ from accelstudy.campaign.importing.making import (
     far_from_gravity,
     imported_campaign,
 )
-from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.recording import AXES, locate
+from accelstudy.campaign.importing.recording import Log, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
+from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
-from accelstudy.sensors.conversion import LARGEST, conversion_of
 
 Array = NDArray[np.float64]
 
 SDS = ("sd_fx", "sd_fy", "sd_fz")
 ANGLES = ("roll", "pitch")
-MEANS = (*AXES, "n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
-"""Columns that a table of means may have, besides its time."""
+MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
+"""Columns that a table of means may have, besides its forces and its time."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 
 
@@ -42,9 +41,9 @@ def import_means(
     path : anything that `open_source` opens; a MATLAB array may have a column for each
         position instead
     settings : ImportSettings, optional
-        Its `columns` are those of `MEANS`. Settings of the detector do not matter. With `robot`
-        the columns roll, pitch and perhaps yaw are the robot's angles, in the convention of the
-        frame.
+        Its `columns` are the forces and those of `MEANS`. Settings of the detector do not matter.
+        With `robot` the columns roll, pitch and perhaps yaw are the robot's angles, in the
+        convention of the frame.
 
     Returns
     -------
@@ -59,10 +58,11 @@ def import_means(
         If the table cannot be read.
     """
     settings = named_after(settings or ImportSettings(), [path])
-    conversion = conversion_of(settings.unit, settings.scale, settings.offset)
-    source = open_source(path, settings.variable)
-    values, warnings = _columns(source, settings)
-    frame = settings.axes
+    wanted = [*(["time"] if settings.time is not None else []), *MEANS]
+    log = read_log(path, settings, conditions=wanted, untimed=True)
+    settings, frame = cast(ImportSettings, log.layout), log.layout.axes
+    values, warnings = _values(log, settings)
+    forces, scale = log.rows.forces, abs(log.conversion.scale)
 
     n_samples = None
     if "n_samples" in values:
@@ -71,14 +71,13 @@ def import_means(
             raise InputError(f"{path}: column n_samples: must be positive")
     sd = None
     if all(key in values for key in SDS):
-        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * abs(conversion.scale))
+        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * scale)
         if np.any(sd < 0):
             raise InputError(f"{path}: columns sd_fx, sd_fy, sd_fz: must not be negative")
     sigma: float | None = None
     if sd is not None and n_samples is not None and np.any(sd > 0):
         sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
         warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
-    forces = frame.to_frd(conversion.to_si(np.column_stack([values[axis] for axis in AXES])))
     warnings += far_from_gravity(settings, forces)
     campaign = imported_campaign(
         path,
@@ -120,54 +119,33 @@ def _layout(settings: ImportSettings) -> LogLayout:
     )
 
 
-def _columns(source: Source, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
-    """Columns by their keys, and warnings about columns that are not used."""
-    given = settings.columns
-    for key in given:
-        if key not in MEANS:
-            raise UnknownNameError("column", key, MEANS)
-
-    def places_of(keys: tuple[str, ...], needed: bool = False) -> dict[str, int]:
-        return locate(source, {k: given[k] for k in keys if k in given}, keys, needed)
-
-    places = places_of(AXES, needed=True)
-    places |= places_of(("n_samples", *SDS, "temperature", "vibration"))
-    warnings = []
-    angles = places_of((*ANGLES, "yaw"))
+def _values(log: Log, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+    """Columns besides the forces by their keys, and warnings about columns that are not used."""
+    rows, warnings = log.rows, []
+    values = dict(rows.conditions)
+    angles = [key for key in (*ANGLES, "yaw") if key in values]
     if settings.robot is not None:
-        missing = [key for key in ANGLES if key not in angles]
-        if missing:
+        for missing in (key for key in ANGLES if key not in angles):
             raise InputError(
-                f"{source.path}: which column is the robot's {missing[0]}? Name it by "
-                f"--columns {missing[0]}=..."
+                f"{log.path}: which column is the robot's {missing}? Name it by "
+                f"--columns {missing}=..."
             )
-        places |= angles
-    elif {*angles} & {*given}:
+    elif {*angles} & {*settings.columns}:
         raise InputError(
-            f"{source.path}: columns {', '.join(angles)}: give the standard deviation of the "
+            f"{log.path}: columns {', '.join(angles)}: give the standard deviation of the "
             "robot's angles (--robot-sigma)"
         )
     elif angles:
         warnings.append(
             f"columns {', '.join(angles)} are left out; --robot-sigma takes them for the robot's"
         )
-    if settings.time is not None:
-        places |= locate(source, {"time": settings.time}, ("time",))
-    columns = source.numbers([*places.values()])
-    if not len(columns[0]):
-        raise InputError(f"{source.path}: no row of numbers")
-    values = {}
-    for key, column in zip(places, columns, strict=True):
-        bad = ~np.isfinite(column) if key == "time" else ~(np.abs(column) <= LARGEST)
+        values = {key: column for key, column in values.items() if key not in angles}
+    if not len(rows.forces):
+        raise InputError(f"{log.path}: no row of numbers")
+    for key, bad in {**rows.lost, **{k: np.isnan(v) for k, v in values.items()}}.items():
         if bad.any():
-            where, cell = source.look_up(int(np.argmax(bad)), places[key])
-            raise InputError(
-                f"{source.path}: {where}, column {source.names[places[key]]} ({key}): "
-                f"{cell}, not a usable number"
-            )
-        values[key] = column.astype(float)
-    if "time" in places:
-        factor = 1e-9 if places["time"] in source.dates else UNITS["s"][settings.time_unit]
-        time, first = counted_from_first(columns[[*places].index("time")])
-        values["time"] = (time + (first if abs(first * factor) < _YEARS else 0.0)) * factor
+            what = log.describe(int(np.argmax(bad)), key)
+            raise InputError(f"{log.path}: {what}, not a usable number")
+    if "time" in log.places and rows.time is not None:
+        values["time"] = rows.time + (rows.start if abs(rows.start) < _YEARS else 0.0)
     return values, warnings

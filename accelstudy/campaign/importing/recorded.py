@@ -95,13 +95,15 @@ def open_bag(path: Path, topic: str | None = None) -> TableSource:
     if len(measured):
         rows = np.column_stack([rows, np.interp(rows[:, 0], *measured.T)])
         columns["temperature"] = "temperature"
-    layout = {
-        "columns": columns,
-        "time": "time",
-        "unit": "m/s^2",
-        "time_unit": "s",
-        "frame": "frd" if frame.endswith("_ned") else "flu",
-    }
+    return _source(path, rows, columns, "frd" if frame.endswith("_ned") else "flu", warnings)
+
+
+def _source(
+    path: Path, rows: Array, columns: Mapping[str, str], frame: str, warnings: Sequence[str]
+) -> TableSource:
+    """Times, s, forces, m/s², and perhaps temperatures as a table."""
+    si = {"unit": "m/s^2", "time_unit": "s"}
+    layout = {"columns": columns, "time": "time", "frame": frame, **si}
     return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
 
 
@@ -212,13 +214,6 @@ def open_ulog(path: Path, instance: str | None = None) -> TableSource:
     time = time if np.any(time) else values["timestamp"]
     fields = {key: field for key, field in _FIELDS.items() if field in values}
     columns = {key: f"{_SENSOR}.{field}" for key, field in fields.items()}
-    layout = {
-        "columns": columns,
-        "time": "time",
-        "unit": "m/s^2",
-        "time_unit": "s",
-        "frame": "frd",
-    }
     with np.errstate(invalid="ignore"):  # of damaged numbers
         rows = np.column_stack([1e-6 * time, *(values[field] for field in fields.values())])
     warnings = []
@@ -232,7 +227,7 @@ def open_ulog(path: Path, instance: str | None = None) -> TableSource:
             f"the flight log ends early or is damaged: its samples are whole up to {whole:.1f} s, "
             f"and end at {rows[-1, 0] - rows[0, 0]:.1f} s"
         )
-    return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
+    return _source(path, rows, columns, "frd", warnings)
 
 
 class _ToTheEnd(BufferedReader):

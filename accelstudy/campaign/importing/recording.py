@@ -99,7 +99,8 @@ def read_log(
     path : anything that `open_source` opens
     layout : LogLayout, of which the keys that were given count
     like : LogLayout, how another log of the sensor was read
-    conditions : names of what to look for beside the forces; time and `CONDITIONS` by default
+    conditions : names of what to look for beside the forces; time and `CONDITIONS` by default,
+        columns of a table of means as well
     untimed : bool, whether a log may have neither a time nor a rate; its times are numbers of
         samples then
 
@@ -165,8 +166,8 @@ def _places(
     """Places of the columns of a log; those of another log of the sensor may be missing."""
     columns = dict(layout.columns)
     for key in columns:
-        if key not in (*AXES, *CONDITIONS):
-            raise UnknownNameError("column", key, (*AXES, *CONDITIONS))
+        if key not in (known := dict.fromkeys((*AXES, *CONDITIONS, *conditions))):
+            raise UnknownNameError("column", key, [each for each in known if each != "time"])
     places = locate(source, {k: v for k, v in columns.items() if k in AXES}, AXES)
     if layout.time is not None:
         columns["time"] = layout.time
@@ -379,8 +380,8 @@ class Log:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """Which of `CONDITIONS` the log has."""
-        return tuple(key for key in CONDITIONS if key in self.places)
+        """What the log has besides forces and time."""
+        return tuple(key for key in self.places if key not in (*AXES, "time", "nanoseconds"))
 
     @cached_property
     def table(self) -> pa.Table:

@@ -9,7 +9,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
@@ -48,33 +47,23 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
         if holds.size is None:
             label = f"threshold {holds.threshold.sd:.2g} m/s²"
             below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
-        for ax in (above, below):
-            for shaded, look in ((holds.used, {"color": _SHADE}), (~holds.used, _LEFT_OUT)):
-                spans = np.column_stack([holds.t0, holds.t1 - holds.t0])[shaded]
+        kind = "static hold" if holds.size is None else "block"
+        kept, lost = counted(int(holds.used.sum()), kind), f"{len(holds.left_out)} left out"
+        looks = [(holds.used, kept, {"color": _SHADE}), (~holds.used, lost, _LEFT_OUT)]
+        for shaded, label, look in looks[: 2 if holds.left_out else 1]:
+            spans = np.column_stack([holds.t0, holds.t1 - holds.t0])[shaded]
+            for ax, shown in ((above, label), (below, None)):
                 whole = ax.get_xaxis_transform()
-                ax.broken_barh(spans, (0, 1), transform=whole, linewidth=0, zorder=0.5, **look)
+                ax.broken_barh(
+                    spans, (0, 1), transform=whole, linewidth=0, zorder=0.5, label=shown, **look
+                )
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         what = "time / s" if holds.size is None else "sample"
         below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
         below.set_xlim(0, edges[-1])
         below.yaxis.set_minor_locator(NullLocator())
-        handles, labels = above.get_legend_handles_labels()
-        lines, texts = below.get_legend_handles_labels()
-        shades = [
-            (
-                Patch(color=_SHADE),
-                counted(int(holds.used.sum()), "static hold" if holds.size is None else "block"),
-            )
-        ]
-        if holds.left_out:
-            shades.append((Patch(linewidth=0, **_LEFT_OUT), f"{len(holds.left_out)} left out"))
-        figure.legend(
-            [*handles, *(patch for patch, _ in shades), *lines],
-            [*labels, *(text for _, text in shades), *texts],
-            loc="outside upper center",
-            ncols=6,
-        )
+        figure.legend(loc="outside upper center", ncols=6)
         figure.align_ylabels()
     return figure
 

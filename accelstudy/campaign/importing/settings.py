@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -28,9 +27,21 @@ from accelstudy.files.validation import (
 
 _LARGE = Field(le=1e6)
 
-_BY_NUMBER = re.compile(r"\s*(\d{1,9})\s*:\s*(\S.*?)\s*")
 _SPAN = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*")
-_BY_TIME = re.compile(_SPAN.pattern + r":\s*(\S.*?)\s*")
+
+
+class Span(NamedTuple):
+    """A span of time since the start of the log, s, for the holds that lie in it."""
+
+    start: float
+    end: float
+
+    def __str__(self) -> str:
+        return f"{self.start:g}s-{self.end:g}s"
+
+
+Which = Span | tuple[int, ...]
+"""Holds by a span of time, or by the numbers that the detector gave them."""
 
 
 class GravitySettings(BaseModel):
@@ -89,16 +100,48 @@ class ImportSettings(LogLayout):
         return self.range_mps2
 
     @property
-    def selection(self) -> Selection:
-        """Holds to leave out and to join."""
-        return parse_selection(self.exclude, self.join)
+    def left_out(self) -> list[tuple[Which, str]]:
+        """Holds to leave out, with the reason: ``13:moved`` or ``120s-135s:moved``."""
+        chosen = []
+        for text in self.exclude:
+            holds, _, why = text.partition(":")
+            if (which := _which(holds)) is None or not why.strip():
+                raise InputError(
+                    "exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
+                    f"not {text!r}"
+                )
+            chosen.append((which, why.strip()))
+        return chosen
+
+    @property
+    def joined(self) -> list[Which]:
+        """Holds that are one: ``4,5`` or ``120s-135s``."""
+        chosen = []
+        for text in self.join:
+            if (which := _which(text)) is None or len(which) < 2:
+                raise InputError(
+                    f"join: expected numbers of holds or a time, as 4,5 or 120s-135s, not {text!r}"
+                )
+            chosen.append(which)
+        return chosen
+
+
+def _which(text: str) -> Which | None:
+    """Holds by their numbers or their time; None if it is neither."""
+    if match := _SPAN.fullmatch(text):
+        span = Span(float(match[1]), float(match[2]))
+        return span if span.start < span.end else None
+    numbers = [part.strip() for part in text.split(",")]
+    if not all(re.fullmatch(r"\d{1,9}", number) for number in numbers):
+        return None
+    return tuple(sorted({int(number) for number in numbers}))
 
 
 def parse_settings(content: Mapping[str, Any], source: str = "settings") -> ImportSettings:
     """Check settings; raise `InputError` with one line that names the source and the key."""
     settings = checked(ImportSettings, content, source)
     try:
-        parse_selection(settings.exclude, settings.join)
+        _ = settings.left_out, settings.joined
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     return settings
@@ -124,55 +167,3 @@ def named_after(settings: ImportSettings, paths: Sequence[LogFile]) -> ImportSet
     if len(paths) > 1:
         name = path.absolute().parent.name or path.stem
     return settings.model_copy(update={"name": name})
-
-
-@dataclass(frozen=True)
-class Selection:
-    """Holds to leave out and to join, by the numbers that the detector gave them.
-
-    Attributes
-    ----------
-    numbers : mapping of int to str, holds that are left out, with the reason
-    spans : tuple of (from, to, reason), s since the start of the log; holds in them are left out
-    joined : tuple of tuples of int, holds that are one hold
-    joined_spans : tuple of (from, to), s since the start of the log; holds in one are one hold
-    """
-
-    numbers: Mapping[int, str] = field(default_factory=dict)
-    spans: tuple[tuple[float, float, str], ...] = ()
-    joined: tuple[tuple[int, ...], ...] = ()
-    joined_spans: tuple[tuple[float, float], ...] = ()
-
-
-def parse_selection(exclude: Sequence[str], join: Sequence[str]) -> Selection:
-    """Selection from ``13:moved`` or ``120s-135s:moved``, and from ``4,5`` or ``120s-135s``.
-
-    Raises
-    ------
-    InputError
-        If something is neither.
-    """
-    numbers: dict[int, str] = {}
-    spans = []
-    for text in exclude:
-        if match := _BY_NUMBER.fullmatch(text):
-            numbers[int(match[1])] = match[2]
-        elif (match := _BY_TIME.fullmatch(text)) and float(match[1]) < float(match[2]):
-            spans.append((float(match[1]), float(match[2]), match[3]))
-        else:
-            raise InputError(
-                f"exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
-                f"not {text!r}"
-            )
-    joined, joined_spans = [], []
-    for text in join:
-        if (match := _SPAN.fullmatch(text)) and float(match[1]) < float(match[2]):
-            joined_spans.append((float(match[1]), float(match[2])))
-            continue
-        parts = [part.strip() for part in text.split(",")]
-        if len(parts) < 2 or not all(re.fullmatch(r"\d{1,9}", part) for part in parts):
-            raise InputError(
-                f"join: expected numbers of holds or a time, as 4,5 or 120s-135s, not {text!r}"
-            )
-        joined.append(tuple(sorted({int(part) for part in parts})))
-    return Selection(numbers, tuple(spans), tuple(joined), tuple(joined_spans))
