@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from time import process_time
@@ -21,7 +21,6 @@ from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.files.validation import checked
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 from studies.hidden.baselines import METHODS, answers
 from studies.hidden.physics.generate import Case, Truth
 from studies.hidden.real_noise import RealNoiseConfig
@@ -31,20 +30,14 @@ KEY = ["cell", "campaign"]
 _TYPES = {
     "string": "cell set what design approach sigma classes effects noise gross gross_name "
     "oracle_best oracle_told left true_place sensor seed verdict found specs found_classes "
-    "positions posteriors credible_set place fits statement reason error method",
-    "boolean": "oracle_detected confirmed recorded detected",
+    "positions posteriors credible_set place fits statement reason methods error",
+    "boolean": "oracle_detected confirmed recorded",
     "Int64": "campaign oracle_alternatives redundancy positions_used",
-    "float64": "size held_out_z sigma0_before sigma0_after p_size seconds p_known known_ratio "
+    "float64": "size held_out_z sigma0_before sigma0_after p_size p_known known_ratio "
     "known_sigma ratio ratio_sigma",
 }
 TYPES = {name: kind for kind, names in _TYPES.items() for name in names.split()}
-"""Type of each column; lists and mappings are JSON."""
-COLUMNS = {
-    "campaigns": [name for name in TYPES if name not in ("method", "detected", "seconds")],
-    "seconds": [*KEY, "seconds"],
-    "baselines": [*KEY, "method", "detected", "found", "error"],
-}
-"""Columns of the tables that a job writes; the times stand apart, as they differ in every run."""
+"""Type of each column of a campaign; lists and mappings are JSON."""
 
 
 def parse_hidden(
@@ -57,26 +50,23 @@ def parse_hidden(
 
 
 def run(job: Job, outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]) -> None:
-    """Make and diagnose the campaigns of a job, and write the tables of `COLUMNS` to paths."""
-    rows = [rows_of(job, case, k) for case, k in job.campaigns]
-    for name in COLUMNS:
-        write_table(outputs[name], table_of(name, rows), provenance)
+    """Make and diagnose the campaigns of a job, and write them, and the seconds that each took.
+
+    The seconds stand apart, as they differ in every run.
+    """
+    rows, seconds = zip(*(row_of(job, *one) for one in job.campaigns), strict=True)
+    table = table_of(rows)
+    write_table(outputs["campaigns"], table, provenance)
+    write_table(outputs["seconds"], table[KEY].assign(seconds=seconds), provenance)
 
 
-def campaigns_of(job: Job) -> pd.DataFrame:
-    """Truths and answers of the campaigns of a job."""
-    return table_of("campaigns", [rows_of(job, case, k) for case, k in job.campaigns])
+def table_of(rows: Iterable[Row]) -> pd.DataFrame:
+    """Truths and answers of campaigns."""
+    return pd.DataFrame(rows, columns=[*TYPES]).astype(TYPES)
 
 
-def table_of(name: str, rows: list[dict[str, list[Row]]]) -> pd.DataFrame:
-    """One of the tables of `COLUMNS`."""
-    content = [row for each in rows for row in each[name]]
-    table = pd.DataFrame(content, columns=COLUMNS[name])
-    return table.astype({column: TYPES[column] for column in COLUMNS[name]})
-
-
-def rows_of(job: Job, case: Case, k: int) -> dict[str, list[Row]]:
-    """Rows of a campaign, for each table of `COLUMNS`.
+def row_of(job: Job, case: Case, k: int) -> tuple[Row, float]:
+    """Truth and answer of a campaign, and the seconds that the diagnosis took.
 
     The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
     """
@@ -87,19 +77,17 @@ def rows_of(job: Job, case: Case, k: int) -> dict[str, list[Row]]:
         verdict = judge(made.campaign, model, seed=job.seed)
         return outcome(verdict) | made.of_answer(verdict)
 
-    key, simpler = {"cell": case.name, "campaign": k}, []
+    methods = None
     with effects_without(removed(case)):
         start = process_time()
         answer, error = tried(diagnosed, what, failed)
         seconds = process_time() - start
         if job.baselines_every and int.from_bytes(case.digest(k)[:8]) % job.baselines_every == 0:
-            simpler = simpler_rows(made, model, what, failed)
-    truth = truth_row(case, made) | (made.columns if made else {})
-    return {
-        "campaigns": [key | truth | (answer or {}) | {"error": error}],
-        "seconds": [key | {"seconds": seconds}],
-        "baselines": [key | row for row in simpler],
-    }
+            told, _ = tried(lambda: dict(answers(made.campaign, model)), what, failed)
+            # Where the model cannot be fitted, no method can work: each finds nothing.
+            methods = told or dict.fromkeys(METHODS, (False, []))
+    row = {"cell": case.name, "campaign": k} | truth_row(case, made) | (answer or {})
+    return row | {"methods": json.dumps(methods), "error": error}, seconds
 
 
 def truth_row(case: Case, made: Made | None) -> Row:
@@ -120,17 +108,8 @@ def truth_row(case: Case, made: Made | None) -> Row:
         "oracle_best": json.dumps(oracle.get("best", [])),
         "oracle_told": json.dumps(oracle.get("told", [])),
         "oracle_alternatives": oracle.get("alternatives"),
+        **(made.columns if made else {}),
     }
-
-
-def simpler_rows(made: Made | None, model: SensorModel, what: str, failed: str) -> list[Row]:
-    """What the simpler methods say; where the model cannot be fitted, each finds nothing."""
-    told, error = tried(lambda: [*answers(made.campaign, model)] if made else [], what, failed)
-    told = told or [(method, (False, [])) for method in METHODS]
-    return [
-        {"method": method, "detected": detected, "found": json.dumps(names), "error": error}
-        for method, (detected, names) in told
-    ]
 
 
 def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, str]:

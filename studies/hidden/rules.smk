@@ -1,5 +1,5 @@
 # The rules of both studies: their jobs make and diagnose campaigns, and a score judges the answers.
-from studies.hidden.campaigns import COLUMNS, parse_hidden
+from studies.hidden.campaigns import parse_hidden
 
 
 include: "../../workflow/rules/start.smk"
@@ -17,7 +17,7 @@ DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "public_folder"})
 SCORED = {table: f"{RESULTS}/{table}.parquet" for table in STUDY.tables}
 if "targets" in SCORED:
     SCORED["figures"] = directory(f"{RESULTS}/figures")
-PARTS = {part: f"{RESULTS}/{part}/{{job}}.parquet" for part in COLUMNS}
+PARTS = {part: f"{RESULTS}/{part}/{{job}}.parquet" for part in ("campaigns", "seconds")}
 
 
 wildcard_constraints:

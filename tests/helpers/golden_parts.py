@@ -273,12 +273,12 @@ ANSWER = ("verdict", "specs", "positions", "posteriors", "place", "confirmed", "
 
 def hidden(folder, approach) -> Texts:
     """What the diagnosis says of hidden campaigns, a line each."""
-    from studies.hidden.campaigns import parse_hidden, rows_of
+    from studies.hidden.campaigns import parse_hidden, row_of
 
     config = parse_hidden(yaml.safe_load((GOLDEN / "hidden.yaml").read_text("utf-8")))
     job = config.simulated(one for one in config.campaigns() if one[0].approach == approach)
-    rows = (rows_of(job._replace(baselines_every=0), *one) for one in job.campaigns)
-    yield "campaigns", "".join(answer(each["campaigns"][0]) for each in rows)
+    rows = (row_of(job._replace(baselines_every=0), *one) for one in job.campaigns)
+    yield "campaigns", "".join(answer(row) for row, _ in rows)
 
 
 def answer(row):

@@ -36,7 +36,8 @@ def truth(set_, classes=(), size=np.nan, oracle=None, **more):
         "gross_name": "", "oracle_detected": None if oracle is None else oracle != "nothing",
         "oracle_best": json.dumps(list(best)), "oracle_told": json.dumps(list(classes)),
         "oracle_alternatives": 1,
-        "left": "[]", "true_place": "null", "sensor": "null", "seed": "[]", **more,
+        "left": "[]", "true_place": "null", "sensor": "null", "seed": "[]",
+        "methods": '{"F test": [true, ["bias_drift"]]}' if set_ == "one" else "null", **more,
     }  # fmt: skip
 
 
@@ -126,14 +127,10 @@ def campaigns():
 
 @pytest.fixture(scope="module")
 def tables(campaigns):
-    one = campaigns.query("set == 'one'")
-    answers = one[["cell", "campaign"]].assign(
-        method="F test", detected=True, found='["bias_drift"]'
-    )
     limit = {"design": "spread-24", "approach": "robot", "mdb": 1.0, "mib": 2.0, "unit": "m/s^2",
              "nearest": "warm_up", "lambda_mdb": 15.0, "lambda_mib": 50.0}  # fmt: skip
     known = [{"what": what, **limit} for what in ("bias_drift", "quadratic_scale")]
-    return score_tables(campaigns, answers, pd.DataFrame(known))
+    return score_tables(campaigns, pd.DataFrame(known))
 
 
 ORIGIN = {"seed": 5, "version": "1.2", "commit": "abcdef012345+"}
@@ -197,12 +194,11 @@ def test_targets(tables, figure, cases, wanted, measured, n, met):
 
 
 def test_what_was_not_measured_is_not_met(campaigns):
-    table = score_tables(campaigns.query("set == 'one'"), NO_ANSWERS, NO_LIMITS)
+    table = score_tables(campaigns.query("set == 'one'"), NO_LIMITS)
     row = table["targets"].query("figure == 'recognised'").iloc[0]
     assert (row["met"], row["ci95_low"], row["ci95_high"]) == ("–", 0, 1)
 
 
-NO_ANSWERS = pd.DataFrame(columns=["cell", "campaign", "method", "detected", "found"])
 NO_LIMITS = pd.DataFrame(
     [{"what": "none", "design": "none", "approach": "none", "lambda_mdb": 1.0, "lambda_mib": 1.0}]
 )

@@ -15,7 +15,7 @@ from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
-from studies.hidden.campaigns import campaigns_of, parse_hidden
+from studies.hidden.campaigns import parse_hidden, row_of, table_of
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.kinds import Cause
 from studies.hidden.real_logs import BUMPED, PUT, Donor
@@ -110,7 +110,7 @@ def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
 
 @pytest.fixture(scope="module")
 def campaigns(log):
-    return campaigns_of(OURS.of_log(log))
+    return of_job(OURS.of_log(log))
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +118,14 @@ def table(campaigns):
     return judge(campaigns)
 
 
+def of_job(job):
+    """Truths and answers of the campaigns of a job."""
+    return table_of(row_of(job, case, k)[0] for case, k in job.campaigns)
+
+
 def of_log(log, *campaigns, config=OURS):
-    """Rows of campaigns of a log."""
-    return campaigns_of(config.of_log(log)._replace(campaigns=campaigns))
+    """Those of campaigns of a log."""
+    return of_job(config.of_log(log)._replace(campaigns=campaigns))
 
 
 def test_plain_effects_in_white_noise_are_found(table):
@@ -235,7 +240,7 @@ def test_two_cases_of_a_real_log(tmp_path):
         {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
          "effects": ["warm_up"]}
     )  # fmt: skip
-    judged = judge(campaigns_of(config.job("mpu9150-2", tmp_path)))
+    judged = judge(of_job(config.job("mpu9150-2", tmp_path)))
     nothing, warm = judged.to_dict("records")
     assert nothing["said"] == "nothing"
     assert warm["said"] == "right name"

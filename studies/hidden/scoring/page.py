@@ -16,7 +16,7 @@ from accelstudy.basics.wording import number, words
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import origin, read_table, write_table
-from studies.hidden.campaigns import COLUMNS, KEY
+from studies.hidden.campaigns import KEY
 from studies.hidden.physics.generate import place_of
 from studies.hidden.real_noise import RealNoiseConfig
 from studies.hidden.scoring.figures import figures
@@ -42,18 +42,18 @@ def write_score(
     Parameters
     ----------
     config : HiddenConfig or RealNoiseConfig
-    inputs : paths of the tables of all jobs, by the names in `COLUMNS`
+    inputs : paths of the tables of all jobs, campaigns and seconds
     outputs : paths of the tables of the score by name, of the page, and of the folder `figures`
     provenance : see `accelstudy.files.tables.origin`
     """
-    campaigns, seconds, answers = (read_table([*inputs[name]]) for name in COLUMNS)
+    campaigns, seconds = (read_table([*inputs[name]]) for name in ("campaigns", "seconds"))
     made = {"origin": origin(provenance), "fingerprint": config.fingerprint}
     tables: Tables
     if isinstance(config, RealNoiseConfig):
         tables = {"campaigns": judge(campaigns, {k: log.own for k, log in config.logs.items()})}
         page = real_page(config, tables["campaigns"], made)
     else:
-        tables = score_tables(campaigns, answers, study_limits(config))
+        tables = score_tables(campaigns, study_limits(config))
         page = score_page(tables, seconds["seconds"], made)
         folder = Path(outputs["figures"])
         folder.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,6 @@ from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
-from studies.hidden.campaigns import KEY
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.scoring.judging import all_true, judge, same_effects
 from studies.hidden.study import HiddenConfig, Row
@@ -30,13 +29,12 @@ Tables = Mapping[str, pd.DataFrame]
 SCORE = yaml.safe_load((Path(__file__).parent / "score.yaml").read_text(encoding="utf-8"))
 
 
-def score_tables(campaigns: pd.DataFrame, answers: pd.DataFrame, limits: pd.DataFrame) -> Tables:
+def score_tables(campaigns: pd.DataFrame, limits: pd.DataFrame) -> Tables:
     """All tables of a score.
 
     Parameters
     ----------
     campaigns : DataFrame, truths and outcomes side by side
-    answers : DataFrame, of the simpler methods
     limits : DataFrame, of `study_limits`
     """
     judged = with_limits(judge(campaigns), limits)
@@ -45,7 +43,7 @@ def score_tables(campaigns: pd.DataFrame, answers: pd.DataFrame, limits: pd.Data
         "targets": targets(judged),
         "confusion": confusion(judged),
         "calibration": calibration(judged),
-        "baselines": baseline_table(judged, answers),
+        "baselines": baseline_table(judged),
         "limits": limit_table(judged, limits),
     }
 
@@ -219,13 +217,8 @@ def calibration(judged: pd.DataFrame) -> pd.DataFrame:
     return with_intervals(table[["of", "from", "to", "stated", "count", "n"]])
 
 
-def baseline_table(judged: pd.DataFrame, answers: pd.DataFrame) -> pd.DataFrame:
+def baseline_table(judged: pd.DataFrame) -> pd.DataFrame:
     """The simpler methods, the diagnosis and the oracle on the same campaigns.
-
-    Parameters
-    ----------
-    judged : DataFrame, of `judge`
-    answers : DataFrame, of the methods: cell, campaign, method, detected, found
 
     Returns
     -------
@@ -233,26 +226,25 @@ def baseline_table(judged: pd.DataFrame, answers: pd.DataFrame) -> pd.DataFrame:
         method, set, size (NaN: all), quantity ("detected", "right": all names and no other,
         "first right": the strongest name, "wrong": some name), count, n, share, ci95_low, ci95_high
     """
-    same = judged.merge(answers[KEY].drop_duplicates(), on=KEY)
-    oracle = {"detected": same["oracle_detected"], "found": same["oracle_best"]}
-    named = same["found"].where(same["answered"], "[]")
-    table = pd.concat([
-        answers.merge(judged[[*KEY, "set", "size", "classes"]], on=KEY),
-        same.assign(method="diagnosis", detected=same["alarm"], found=named),
-        same.assign(method="oracle", **oracle)[same["oracle_detected"].notna()],
-    ])  # fmt: skip
-    pairs = [
-        ([[one] if isinstance(one, str) else one for one in json.loads(found)], json.loads(classes))
-        for found, classes in zip(table["found"], table["classes"], strict=True)
-    ]
-    table["right"] = [same_effects(given, true) for given, true in pairs]
-    table["first right"] = [all_true(given[:1], true) for given, true in pairs]
-    table["wrong"] = [bool(given) and not all_true(given, true) for given, true in pairs]
+    rows = []
+    for row in judged[judged["methods"] != "null"].to_dict("records"):
+        told = json.loads(row["methods"])
+        told["diagnosis"] = row["alarm"], json.loads(row["found"]) if row["answered"] else []
+        if not pd.isna(row["oracle_detected"]):
+            told["oracle"] = row["oracle_detected"], json.loads(row["oracle_best"])
+        true = json.loads(row["classes"])
+        for method, (detected, found) in told.items():
+            names = [[one] if isinstance(one, str) else one for one in found]
+            said = (bool(detected), same_effects(names, true), all_true(names[:1], true),
+                    bool(names) and not all_true(names, true))  # fmt: skip
+            rows.append((method, row["set"], row["size"], *said))
+    quantities = ("detected", "right", "first right", "wrong")
+    table = pd.DataFrame(rows, columns=["method", "set", "size", *quantities])
     return pd.concat(
         [
             shares(table, quantity, *by).assign(quantity=quantity)
             for by in (("method", "set", "size"), ("method", "set"))
-            for quantity in ("detected", "right", "first right", "wrong")
+            for quantity in quantities
         ],
         ignore_index=True,
     )
