@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -34,35 +34,27 @@ Answer = tuple[bool, list[str]]
 """Whether something is missing, and the names that are given, strongest first."""
 
 
-@dataclass(frozen=True)
 class Problem:
-    """Residuals and the shapes of all effects of the catalogue.
+    """Residuals of a campaign and the shapes of all effects of the catalogue.
 
     Attributes
     ----------
     z : (m,) array; redundancy : int
     shapes : list of Hypothesis
-    sigma_known : bool
+    sigma_known : bool; an unknown sigma is that of the residuals
     """
 
-    z: Array
-    redundancy: int
-    shapes: list[Hypothesis]
-    sigma_known: bool
-
-    @classmethod
-    def of(cls, campaign: Campaign, model: SensorModel) -> Problem:
-        """Problem of a campaign; an unknown sigma is that of the residuals."""
-        approach, sigma_known = usual_approach(campaign), campaign.sigma_force is not None
+    def __init__(self, campaign: Campaign, model: SensorModel) -> None:
+        approach, self.sigma_known = usual_approach(campaign), campaign.sigma_force is not None
         fit = fit_campaign(campaign, model, approach)
-        for _ in range(0 if sigma_known else 2):
+        for _ in range(0 if self.sigma_known else 2):
             weighted = replace(campaign, sigma_force=fit.sigma_position_posteriori)
             fit = fit_campaign(weighted, model, approach)
         examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
         candidates = examined.candidates.items()
-        shapes = [h for name, hypotheses in candidates if name != OUTLIER for h in hypotheses]
+        self.shapes = [h for name, shapes in candidates if name != OUTLIER for h in shapes]
         residuals = examined.frame.residuals
-        return cls(residuals.z, residuals.redundancy, shapes, sigma_known)
+        self.z, self.redundancy = residuals.z, residuals.redundancy
 
     @cached_property
     def dims(self) -> NDArray[np.int_]:
@@ -165,6 +157,6 @@ METHODS: Mapping[str, Callable[[Problem], Answer | None]] = {
 
 def answers(campaign: Campaign, model: SensorModel) -> Iterator[tuple[str, Answer]]:
     """Answers of all methods that apply to a campaign."""
-    problem = Problem.of(campaign, model)
+    problem = Problem(campaign, model)
     told = ((name, method(problem)) for name, method in METHODS.items())
     return ((name, answer) for name, answer in told if answer is not None)

@@ -8,7 +8,6 @@ effects and the diagnosis of the project.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -49,48 +48,35 @@ BY_HOLD = ("hysteresis", "settling", BUMPED)
 """Effects that act from hold to hold, or in one; a single reading does not tell them."""
 
 
-@dataclass(frozen=True, eq=False)
 class Donor:
     """A public log as a sensor made it.
 
     Attributes
     ----------
-    name : str
-    settings : ImportSettings
     forces : (N, 3) array, m/s², readings, or means where the log has no others
-    time : (N,) array, s
+    time : (N,) array, s; without times one position takes an interval, s
     timed : bool, whether the log itself gives the time
     spans : Spans
     own : tuple of str, an effect that it has by itself, by any of these names
     """
 
-    name: str
-    settings: ImportSettings
-    forces: Array
-    time: Array
-    timed: bool
-    spans: Spans
-    own: Sequence[str]
-
-    @classmethod
-    def opened(
-        cls,
+    def __init__(
+        self,
         name: str,
         path: Path,
         settings: ImportSettings,
         interval: float,
         own: Sequence[str] = (),
-    ) -> Donor:
-        """Read a log, and find its holds; without times one position takes an interval, s."""
+    ) -> None:
+        self.name, self.settings, self.own = name, settings, own
         campaign, report = import_log(path, settings)
-        untimed = settings.block is not None
-        samples = None if settings.means else read_log(path, settings, untimed=untimed).samples
-        forces = campaign.forces if samples is None else samples.forces
-        timed = samples is not None and not untimed
-        time: Array = interval / (settings.block or 1) * (np.arange(len(forces), dtype=float) + 0.5)
-        if samples is not None and timed:
-            time = samples.time
-        return cls(name, settings, forces, time, timed, spans_of(campaign, report), own)
+        self.spans, self.forces = spans_of(campaign, report), campaign.forces
+        self.timed = not settings.means and settings.block is None
+        if not settings.means:
+            samples = read_log(path, settings, untimed=not self.timed).samples
+            self.forces = samples.forces
+        middles = np.arange(len(self.forces), dtype=float) + 0.5
+        self.time = samples.time if self.timed else interval / (settings.block or 1) * middles
 
     @cached_property
     def sensor(self) -> Sensor:
@@ -228,58 +214,29 @@ def residuals(atlas: Atlas, forces: Array) -> Array:
     return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
-@dataclass(frozen=True)
 class Shown:
     """An effect in the holds of a log that was imported with it, all of unit weight.
 
     Attributes
     ----------
-    log : Donor
-    cause : Cause
-    spans : Spans, of the holds
     atlas : Atlas, of the holds
     whole : (m,) array, residuals of a calibration
     shape : Shape
     left : (k, m) array, what each parameter leaves
     beside : (m, d) array, orthonormal, what the other effects take up
+
+    Raises
+    ------
+    InputError
+        If the holds cannot show it.
     """
 
-    log: Donor
-    cause: Cause
-    spans: Spans
-    atlas: Atlas
-    whole: Array
-    shape: Shape
-    left: Array
-    beside: Array
-
-    @classmethod
-    def all(
-        cls, log: Donor, spans: Spans, course: Course | None, causes: Sequence[Cause], forces: Array
-    ) -> list[Shown]:
-        """Show each of some effects beside the others.
-
-        Raises
-        ------
-        InputError
-            If the holds cannot show one.
-        """
-        if not causes:
-            return []
-        atlas = log.atlas(spans, course, log.sigma)
-        whole, found = residuals(atlas, forces), []
-        for cause in causes:
-            left, shape = log.left(cause.kind, cause.settings, atlas, spans)
-            if shape is None:
-                raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
-            found.append((cause, left, shape))
-        nothing = np.zeros((len(whole), 0))
-        return [
-            cls(log, cause, spans, atlas, whole, shape, left, np.concatenate(
-                [nothing, *(other.basis for *_, other in found if other is not shape)], axis=1
-            ))
-            for cause, left, shape in found
-        ]  # fmt: skip
+    def __init__(self, log: Donor, cause: Cause, spans: Spans, atlas: Atlas, whole: Array) -> None:
+        self.log, self.cause, self.spans, self.atlas, self.whole = log, cause, spans, atlas, whole
+        self.left, shape = log.left(cause.kind, cause.settings, atlas, spans)
+        if shape is None:
+            raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
+        self.shape, self.beside = shape, np.zeros((len(whole), 0))
 
     def without(self, rows: Array) -> Array:
         """Residuals (..., m) without what the other effects take up."""
@@ -301,3 +258,18 @@ class Shown:
         p = float(special.fdtrc(d, dof, gain / d / variance))
         size = float(true @ true)
         return p, float(z @ true) / size, float(np.sqrt(variance / size))
+
+
+def shown(
+    log: Donor, spans: Spans, course: Course | None, causes: Sequence[Cause], forces: Array
+) -> list[Shown]:
+    """Show each of some effects beside the others in holds with forces (n, 3)."""
+    if not causes:
+        return []
+    atlas = log.atlas(spans, course, log.sigma)
+    whole = residuals(atlas, forces)
+    found = [Shown(log, cause, spans, atlas, whole) for cause in causes]
+    for one in found:
+        others = [other.shape.basis for other in found if other is not one]
+        one.beside = np.concatenate([one.beside, *others], axis=1)
+    return found

@@ -27,7 +27,7 @@ from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Re
 from studies.hidden.physics.designs import Array, Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.oracle import Oracle
-from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, spans_of
+from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, shown, spans_of
 from studies.hidden.study import Job, Made, Plan, Row, Study
 
 FEWEST = 5
@@ -83,7 +83,7 @@ class RealNoiseConfig(Study):
     def job(self, name: str, plan: str | Path) -> Job:
         """Campaigns of a log."""
         path, settings = public_file(name, self.public_folder), import_settings(name)
-        return self.of_log(Donor.opened(name, path, settings, self.interval_s, self.logs[name].own))
+        return self.of_log(Donor(name, path, settings, self.interval_s, self.logs[name].own))
 
     def of_log(self, log: Donor) -> Job:
         """Campaigns of a log that is open."""
@@ -156,13 +156,8 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> Made
         path = Path(folder) / f"{log.name}.parquet"
         campaign, report = import_log(path, log.write(path, causes, course, columns))
     spans = spans_of(campaign, report)
-    found = Shown.all(log, spans, course, causes, campaign.forces)
-    truth = Truth(
-        effects=tuple(
-            HiddenEffect(one.kind.name, one.settings, tuple(one.parameters[0].tolist()), lam)
-            for one, lam in zip(causes, case.lam, strict=True)
-        )
-    )
+    found = shown(log, spans, course, causes, campaign.forces)
+    truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
     if BUMPED in case.effect:
         # The hold in which the bumped one lies, whatever its number became.
         middle = np.mean(log.spans[int(causes[0].settings["row"])])
@@ -207,10 +202,10 @@ def _sizes(found: Sequence[Shown], verdict: Verdict) -> Row:
         settings = next(each for each in verdict.extended.effects if each.name == name).settings
         # Some of its parameters may be zero, as the positions do not show them.
         names = [parameter.name for parameter in get_effect(name).parameters]
-        shown, values = zip(*((p[0], p[1]) for p in given[0]), strict=True)
+        told, values = zip(*((p[0], p[1]) for p in given[0]), strict=True)
         left = one.log.left(one.cause.kind, settings, one.atlas, one.spans)[0]
-        part = left[[names.index(each) for each in shown]] @ one.true / float(one.true @ one.true)
-        columns = [verdict.extended.parameter_names.index(each) for each in shown]
+        part = left[[names.index(each) for each in told]] @ one.true / float(one.true @ one.true)
+        columns = [verdict.extended.parameter_names.index(each) for each in told]
         covariance = verdict.final.solution.cofactors[np.ix_(columns, columns)]
         sigma = float(np.sqrt(part @ covariance @ part * verdict.unit_variance))
         sizes.append((sigma, float(np.array(values) @ part)))

@@ -51,7 +51,7 @@ def log(tmp_path_factory):
     samples = np.repeat(output, SIZE, axis=0) + SIGMA * rng.standard_normal((COUNT * SIZE, 3))
     path = tmp_path_factory.mktemp("log") / "log.csv"
     pd.DataFrame(samples, columns=["fx", "fy", "fz"]).to_csv(path, index=False)
-    return Donor.opened(NAME, path, ImportSettings(block=SIZE), 30.0)
+    return Donor(NAME, path, ImportSettings(block=SIZE), 30.0)
 
 
 def test_the_sensor_of_a_log_is_found(log):
@@ -253,7 +253,7 @@ def test_what_is_beside_a_large_effect_has_an_answer():
     """It is found in what the refit leaves, whose slopes tell otherwise than those of the fit."""
     name = "mpu9150-2"
     path, settings = public_file(name, DATA), import_settings(name)
-    log = Donor.opened(name, path, settings, CONFIG.interval_s)
+    log = Donor(name, path, settings, CONFIG.interval_s)
     case = LogCase("two", name, effect=("thermal_bias", "cubic_scale"), lam=(400.0, 400.0),
                    recorded=True)  # fmt: skip
     (row,) = of_log(log, (case, 4), config=CONFIG).to_dict("records")

@@ -103,6 +103,11 @@ class HiddenEffect:
     parameters: tuple[float, ...]
     lam: float
 
+    @classmethod
+    def of(cls, cause: Cause, lam: float) -> HiddenEffect:
+        """Effect of a cause."""
+        return cls(cause.kind.name, cause.settings, tuple(cause.parameters[0].tolist()), lam)
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -196,10 +201,7 @@ def generate(
         campaign, settings = GROSS[case.gross](campaign, rng, session.sigma, conditions)
     strange = NOWHERE.get(case.effect[0]) if case.effect else None
     truth = Truth(
-        effects=tuple(
-            HiddenEffect(name, cause.settings, tuple(cause.parameters[0].tolist()), lam)
-            for name, cause, lam in zip(case.effect, causes, sizes, strict=True)
-        ),
+        effects=tuple(map(HiddenEffect.of, causes, sizes)),
         classes=tuple(same for _, same in known),
         oracle=knowing.judge(left_of(knowing.atlas, sensor, forces, reading), case.lam),
         noise={
