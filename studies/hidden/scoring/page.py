@@ -166,17 +166,16 @@ def kind_table(campaigns: pd.DataFrame, line: Mapping[str, Any]) -> pd.DataFrame
     """What becomes of each kind of physics that the catalogue lacks."""
     large = campaigns[campaigns["large"] & campaigns["set"].isin(["outside", "unforeseen"])]
     right = large["place_right"].fillna(value=False)
-    large = large.assign(confirmed_right=large["confirmed"].where(right))
+    of_right = {name: large[name].where(right) for name in ("confirmed", "explained")}
+    large = large.assign(**of_right)
     groups = large.groupby(["set", "what"], observed=True)
     kinds: Any = groups.groups
     places = [", ".join(place_of(what) or ("–",)) for _, what in kinds]
-    explained = (
-        large["explained"].where(right).groupby([large["set"], large["what"]], observed=True)
-    )
     table = share_table(large, line)
     table.insert(0, "place", places)
     table.insert(1, "n", groups.size().to_numpy())
-    return labelled(table.assign(explained=explained.median().map(share_text).to_numpy()))
+    explained = groups["explained"].median().map(share_text)
+    return labelled(table.assign(explained=explained.to_numpy()))
 
 
 def method_table(baselines: pd.DataFrame) -> pd.DataFrame:
@@ -184,9 +183,8 @@ def method_table(baselines: pd.DataFrame) -> pd.DataFrame:
     whole = baselines[baselines["size"].isna()]
     heads = {head: tuple(column) for head, column in SCORE["methods"].items()}
     wide = whole.pivot_table("share", "method", ["set", "quantity"])
-    wide = wide.reindex(columns=pd.MultiIndex.from_tuples(heads.values())).set_axis(
-        [*heads], axis=1
-    )
+    wide = wide.reindex(columns=pd.MultiIndex.from_tuples(heads.values()))
+    wide.columns = pd.Index([*heads])
     order = dict.fromkeys(["diagnosis", "oracle", *wide.index])
     return wide.reindex([*order]).map(share_text).rename_axis("method").reset_index()
 
