@@ -5,6 +5,7 @@ import re
 import subprocess
 import tempfile
 from collections import defaultdict
+from functools import cache
 from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
@@ -30,8 +31,10 @@ def rooms():
     return found
 
 
-def imports(known):
+@cache
+def imports():
     """Rooms that each room imports, within functions too, but not for type checkers."""
+    known = rooms()
     graph = build_graph("accelstudy", exclude_type_checking_imports=True, cache_dir=None)
     for room in known:
         graph.squash_module(f"accelstudy.{room}")
@@ -191,13 +194,19 @@ def drawing(graph, what, linked):
     )
 
 
-def on_page_markdown(markdown, page, **_):
-    """Put drawing and table where the page of the rooms has them."""
-    if page.file.src_uri != "contribute/architecture.md":
-        return markdown
-    known = rooms()
-    graph = imports(known)
-    order = [room for row in reversed(levels(graph)) for room in row]
+def rooms_drawing():
+    """The rooms and their imports, drawn."""
+    return drawing(imports(), "Rooms and their imports", linked=True)
+
+
+def rules_drawing():
+    """The rules of a study, drawn."""
+    return drawing(rules(), "Rules of a study", linked=False)
+
+
+def rooms_table():
+    """The rooms in a table."""
+    known, graph = rooms(), imports()
     lines = [
         (
             f'<span id="{room}"></span>`{room}/`',
@@ -205,14 +214,7 @@ def on_page_markdown(markdown, page, **_):
             len([*(ROOT / room).rglob("*.py")]),
             ", ".join(f"[{each}](#{each})" for each in sorted(graph[room])),
         )
-        for room in order
+        for row in reversed(levels(graph))
+        for room in row
     ]
-    heads = ("room", "what it holds", "files", "imports")
-    drawings = {
-        "<!-- drawing of the rooms -->": drawing(graph, "Rooms and their imports", linked=True),
-        "<!-- drawing of the rules -->": drawing(rules(), "Rules of a study", linked=False),
-        "<!-- table of the rooms -->": table(heads, lines),
-    }
-    for place, text in drawings.items():
-        markdown = markdown.replace(place, text)
-    return markdown
+    return table(("room", "what it holds", "files", "imports"), lines)

@@ -1,4 +1,4 @@
-"""Pages of what there is to choose from: effects, errors, models, schemes, approaches, sensors."""
+"""Lists of what there is to choose from: effects, errors, models, schemes, approaches, sensors."""
 
 import inspect
 import math
@@ -74,33 +74,22 @@ def _effect(effect):
     )
 
 
-def effects():
-    """Effects of the sensor and of the rig."""
-    chosen = [get_effect(name) for name in effect_names()]
-    parts = {part: [e for e in chosen if e.part == part] for part in ("sensor", "rig")}
+def _of_part(part):
+    return [e for e in map(get_effect, effect_names()) if e.part == part]
 
-    def listed(part):
-        rows = [
-            (f"[`{e.name}`](#{e.name})", _equation(e.equation), len(e.parameters), e.family)
-            for e in parts[part]
-        ]
-        return table(("effect", "what it adds", "parameters", "family"), rows)
 
-    return page(
-        "# Effects",
-        "A sensor model is a composition of effects. Parts are joined by `+`, and settings stand "
-        "in brackets: `bias-scale-nonorthogonality+warm_up(tau=300)`. The names of some parameters "
-        "in square brackets leave out the others: `saturation(knee=9.5)[k_sat_z]`.",
-        "In the equations *f* is the specific force in the axes of the sensor, *i* one of these "
-        "axes, *g* local gravity, *t* the time since the start and *T* the temperature. Typical "
-        "sizes go from good to cheap equipment. Settings are in SI units. Effects of one *family* "
-        "are easily taken for each other. `accelstudy effects` prints the same list.",
-        "**Of the sensor**",
-        listed("sensor"),
-        "**Of the rig** that turns it, a robot with its encoders and its base:",
-        listed("rig"),
-        *map(_effect, [*parts["sensor"], *parts["rig"]]),
-    )
+def effects(part):
+    """Effects of a part, sensor or rig, one a line."""
+    rows = [
+        (f"[`{e.name}`](#{e.name})", _equation(e.equation), len(e.parameters), e.family)
+        for e in _of_part(part)
+    ]
+    return table(("effect", "what it adds", "parameters", "family"), rows)
+
+
+def each_effect():
+    """All effects, one after the other."""
+    return page(*map(_effect, [*_of_part("sensor"), *_of_part("rig")]))
 
 
 def noise_effects():
@@ -113,40 +102,26 @@ def noise_effects():
         facts = [("**Noise**", _equation(effect.equation)), ("**Typical size**", typical)]
         text = [_docstring(effect), table(("", ""), facts), _settings(effect)]
         parts.append(page(f"## `{effect.name}`", *text))
-    return page(
-        "# Noise effects",
-        "The noise of the position means is white, Gaussian and of one standard deviation on all "
-        "axes. A noise effect is a way in which it is not: `noise: {effects: [heavy_tails(nu=3)]}` "
-        "in the configuration of a study, or `--noise-effect` of `accelstudy simulate-campaign`. "
-        "The calibration does not know of it. Settings are in SI units. Several work one after the "
-        "other.",
-        *parts,
-    )
+    return page(*parts)
 
 
 def gross_errors():
     """Gross errors."""
-    parts = [
-        page(
-            f"## `{error.name}`",
-            _docstring(error),
-            table(("", ""), [("**Data**", _equation(error.equation))]),
-            _settings(error),
-        )
-        for error in map(get_gross_error, gross_error_names())
-    ]
     return page(
-        "# Gross errors",
-        "A gross error is a mistake in the data, not in the sensor. `accelstudy "
-        "simulate-campaign --gross` puts one in, and `accelstudy diagnose` recognises and "
-        "mends it where that can be done. A setting that is *drawn* is drawn for the campaign if "
-        "it is not given.",
-        *parts,
+        *(
+            page(
+                f"## `{error.name}`",
+                _docstring(error),
+                table(("", ""), [("**Data**", _equation(error.equation))]),
+                _settings(error),
+            )
+            for error in map(get_gross_error, gross_error_names())
+        )
     )
 
 
 def models():
-    """Models and the presets of Table 1."""
+    """Models."""
     rows = [
         (
             code(name),
@@ -155,22 +130,13 @@ def models():
         )
         for name, own in MODELS.items()
     ]
-    presets = [
-        (preset.source, code(preset.model), f"[`{preset.scheme}`](schemes.md)")
-        for preset in PRESETS
-    ]
-    return page(
-        "# Models",
-        table(("model", "parameters", "effects"), rows),
-        "Wherever a model is asked for, a composition of models and [effects](effects.md) will do "
-        "(`bias-scale+warm_up(tau=300)`), and so will the path of a YAML file with a model, such "
-        "as the `model.yaml` of a diagnosis. Where a file has several models, the name follows "
-        "after a colon: `mine.yaml:with-all`.",
-        "## Published calibrations",
-        "Table 1 of the paper: who calibrates which model in which positions. A study with "
-        "`presets` in its configuration simulates them all.",
-        table(("source", "model", "scheme"), presets),
-    )
+    return table(("model", "parameters", "effects"), rows)
+
+
+def presets():
+    """The presets of Table 1."""
+    rows = [(p.source, code(p.model), f"[`{p.scheme}`](schemes.md)") for p in PRESETS]
+    return table(("source", "model", "scheme"), rows)
 
 
 def schemes():
@@ -188,26 +154,13 @@ def schemes():
                 scheme.source,
             )
         )
-    return page(
-        "# Schemes",
-        "A scheme is a list of positions: directions of gravity in the body frame, in the order of "
-        "acquisition. *m* is the mean of x²y² over the positions and the pairs of axes; it is "
-        "1/15 = 0.0667 on the sphere, and the closed forms of the standard deviations contain it. "
-        "*Pole* is the smallest angle to the x axis, where roll is undefined. What a scheme can "
-        "determine is listed by `accelstudy schemes`, and its directions by `accelstudy scheme`.",
-        table(("scheme", "positions", "n", "status", "m", "pole [gon]", "source"), rows),
-        "The small drawings show where gravity points in the frame of the sensor, on maps of equal "
-        "area: left the half with the sensor upright, with x up and y to the right, right the half "
-        "with it upside down.",
-        "*exact* are the positions of the source, *standard* the usual set of that kind, "
-        "*stand-in* a substitute because the source does not publish its own, and *generated* "
-        "positions follow a rule.",
-        "## Families",
-        "A family has a member for each number: N positions (1 to 9999), and a seed where it is "
-        "random.",
-        table(("family", "for example"), [(code(f), code(_member(f))) for f in scheme_families()]),
-        "A scheme of your own is a YAML file such as `accelstudy design` writes. Its path stands "
-        "wherever a scheme is asked for. [A new scheme](../tutorials/scheme.md) shows both ways.",
+    return table(("scheme", "positions", "n", "status", "m", "pole [gon]", "source"), rows)
+
+
+def families():
+    """Families of schemes, each with a member."""
+    return table(
+        ("family", "for example"), [(code(f), code(_member(f))) for f in scheme_families()]
     )
 
 
@@ -241,39 +194,28 @@ def approaches():
             ("**Angles from outside**", "roll and pitch" if approach.uses_angles else "none"),
         ]
         parts.append(page(f"## `{approach.name}`", _docstring(approach), table(("", ""), facts)))
-    return page(
-        "# Approaches",
-        "An approach says what is known of each position, as condition equations for the "
-        "Gauss–Helmert adjustment. The equipment decides: gravity is there for everybody, a robot "
-        "also tells roll and pitch.",
-        *parts,
-    )
+    return page(*parts)
 
 
 def data_sheets():
-    """Data sheets and public data."""
+    """Data sheets, and where they come from."""
     sheets = [get_data_sheet(name) for name in data_sheet_names()]
     rows = []
     for name, (unit, meaning) in QUANTITIES.items():
         values = [getattr(sheet, name) for sheet in sheets]
         shown = ["" if value is None else f"{number(to_display(value, unit))}" for value in values]
         rows.append((code(name), meaning, _unit(display_unit(unit)), *shown))
-    public = [
+    sources = [(code(sheet.name), sheet.title, sheet.source) for sheet in sheets]
+    return page(
+        table(("quantity", "meaning", "unit", *(code(sheet.name) for sheet in sheets)), rows),
+        table(("name", "sensor", "source"), sources),
+    )
+
+
+def public():
+    """Public data."""
+    rows = [
         (code(name), data.description, data.licence, f"[{data.file_name}]({data.url})")
         for name, data in public_data().items()
     ]
-    return page(
-        "# Data sheets and public data",
-        "## Data sheets",
-        "`--sensor` of `accelstudy plan` and `data-sheet` takes one of these names, or a "
-        "YAML file like them. What a data sheet does not say is left out.",
-        table(("quantity", "meaning", "unit", *(code(sheet.name) for sheet in sheets)), rows),
-        table(
-            ("name", "sensor", "source"),
-            [(code(sheet.name), sheet.title, sheet.source) for sheet in sheets],
-        ),
-        "## Public data",
-        "`accelstudy public NAME --out FOLDER` downloads a file, checks its sha256 and makes a "
-        "campaign of it.",
-        table(("name", "what it is", "licence", "file"), public),
-    )
+    return table(("name", "what it is", "licence", "file"), rows)

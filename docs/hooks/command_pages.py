@@ -15,16 +15,13 @@ def commands():
     for title, its in SECTIONS.items():
         rows = [(f"[`{c.name}`](#{c.name})", c.get_short_help_str(200)) for c in its]
         lists += [f"**{title}**", table(("command", "what it does"), rows)]
-    return page(
-        "# Commands",
-        _text(main.help),
-        "Options of `accelstudy` itself:",
-        _table(_options(main, top)),
-        "Each command ends its `--help` with an example, and overwrites nothing of yours without "
-        "`--force`. Bad input ends with one line and the exit status 2.",
-        *lists,
-        *(_command(command, top) for its in SECTIONS.values() for command in its),
-    )
+    return page(*lists, *(_command(command, top) for its in SECTIONS.values() for command in its))
+
+
+def own_options():
+    """What accelstudy does, and its own options."""
+    options = _options(main, click.Context(main, info_name="accelstudy"))
+    return page(_text(main.help), "Options of `accelstudy` itself:", _table(options))
 
 
 def _command(command, top):

@@ -1,4 +1,4 @@
-"""The page of all keys of all configurations."""
+"""All keys of all configurations."""
 
 from markdown_text import page
 from schemas import blocks
@@ -13,11 +13,6 @@ from studies.hidden.study import HiddenConfig
 def configuration():
     """All keys of all configurations."""
     return page(
-        "# Configuration",
-        "All keys of the configurations, from the schema that checks them. How they work together "
-        "is explained in [Studies and their configuration](../guides/configuration.md). A key that "
-        "is not *required* may be left out. A wrong key or value ends with one line that names it "
-        "and says what it may be.",
         blocks(config_schema(), "A study"),
         blocks(BatchConfig.model_json_schema(), "A batch of campaigns", "batch: "),
         blocks(RoundTrip.model_json_schema(), "A hidden effect, found again", "round trip: "),

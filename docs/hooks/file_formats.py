@@ -1,4 +1,4 @@
-"""Pages of the files: campaigns, calibrations, diagnoses, and the tables of studies."""
+"""Tables of the files: campaigns, calibrations, diagnoses, and the tables of studies."""
 
 from pathlib import Path
 
@@ -33,7 +33,7 @@ def _columns(heads, columns):
 
 
 def tables():
-    """The page of the tables of a study."""
+    """All tables of a study."""
     parts = []
     for name, (row, columns) in study_tables().items():
         file = "estimates/*.parquet" if name == "estimates" else f"{name}.parquet"
@@ -42,18 +42,11 @@ def tables():
             f"A row per {row}.",
             _columns(("column", "unit", "meaning"), columns),
         ]
-    return page(
-        "# Tables of a study",
-        "A study writes these tables to `results/<study>/`, as Parquet. Each file says where it "
-        "comes from: hash of the configuration, seed, version, commit and the libraries' versions "
-        "(`accelstudy.files.tables.read_origin`). Where the unit is *unit*, the column of that "
-        "name has it. What is not known is null.",
-        *parts,
-    )
+    return page(*parts)
 
 
-def formats():
-    """The page of all other files."""
+def positions():
+    """Columns of the positions of a campaign."""
     rows = []
     for column in COLUMNS.values():
         within = column.within
@@ -67,29 +60,26 @@ def formats():
                 column.meaning,
             )
         )
-    calibration = []
+    return table(("columns", "type", "unit", "range", "", "meaning"), rows)
+
+
+def calibrations():
+    """Files of a calibration and of a batch."""
+    parts = []
     for name, (about, columns) in calibration_files().items():
         kind = {".json": "key", ".parquet": "column"}.get(Path(name).suffix, "name")
         whose = "Batch" if about.startswith("A batch") else "Calibration"
         heads = (kind, "unit", "meaning")
-        calibration += [f"## {whose}: `{name}`", about, _columns(heads, columns)]
-    schema = HERE.parent / "reference" / "diagnosis.schema.yaml"
-    return page(
-        "# File formats",
-        "What the guides say of the files in words: [campaigns](../guides/campaign-format.md), "
-        "[diagnosis](../guides/diagnosis.md#files). The tables of a study are "
-        "[a page of their own](tables.md).",
-        blocks(Header.model_json_schema(), f"Campaign: `{HEADER}`", "header: "),
-        "## Campaign: `positions.csv` or `positions.parquet`",
-        "Columns that belong together are all there or all absent. *unit* is the unit of the "
-        "header.",
-        table(("columns", "type", "unit", "range", "", "meaning"), rows),
-        *calibration,
-        blocks(
-            yaml.safe_load(schema.read_text(encoding="utf-8")),
-            "Diagnosis: `diagnosis.json`",
-            "diagnosis: ",
-        ),
-        "The JSON Schema itself, with what each verdict requires: "
-        "[diagnosis.schema.yaml](diagnosis.schema.yaml).",
-    )
+        parts += [f"## {whose}: `{name}`", about, _columns(heads, columns)]
+    return page(*parts)
+
+
+def header():
+    """Keys of the header of a campaign."""
+    return blocks(Header.model_json_schema(), f"Campaign: `{HEADER}`", "header: ")
+
+
+def diagnosis():
+    """Keys of a diagnosis."""
+    schema = yaml.safe_load((HERE.parent / "reference/diagnosis.schema.yaml").read_text("utf-8"))
+    return blocks(schema, "Diagnosis: `diagnosis.json`", "diagnosis: ")

@@ -40,12 +40,7 @@ def study_figures():
         heading = "Of the paper" if category == "Paper" else "Of any study"
         own = [figure for figure in figures if figure.category == category]
         parts += [f"## {heading}", *(_figure(figure, made_by[figure.name]) for figure in own)]
-    return page(
-        "# Figures of a study",
-        "Each figure is there as SVG and PNG, in `results/<study>/figures/`. The pictures below "
-        "are smaller than what a study draws. The command makes the study that has the figure.",
-        *parts,
-    )
+    return page(*parts)
 
 
 def _figure(figure, config):

@@ -1,12 +1,16 @@
-"""Pages that are made from the code while the site is built."""
+"""What pages take from the code, where they have a comment of its name, while the site is built."""
 
+import re
+from functools import partial
+
+import architecture
 import catalogue
 import command_pages
 import configuration_page
 import file_formats
 import gallery
 from drawings import DRAWINGS
-from markdown_text import page, table
+from markdown_text import table
 from mkdocs.structure.files import File
 
 from accelstudy.pages.glossary import TERMS
@@ -14,40 +18,49 @@ from accelstudy.pages.glossary import TERMS
 
 def terms():
     """The terms that reports explain."""
-    rows = [(f"**{term}**", meaning) for term, meaning in TERMS.items()]
-    return page(
-        "# Terms", "What the words on reports and on these pages mean.", table(("", ""), rows)
-    )
+    return table(("", ""), [(f"**{term}**", meaning) for term, meaning in TERMS.items()])
 
 
-PAGES = {
-    "reference/effects.md": catalogue.effects,
-    "reference/noise-effects.md": catalogue.noise_effects,
-    "reference/gross-errors.md": catalogue.gross_errors,
-    "reference/models.md": catalogue.models,
-    "reference/schemes.md": catalogue.schemes,
-    "reference/approaches.md": catalogue.approaches,
-    "reference/data-sheets.md": catalogue.data_sheets,
-    "reference/commands.md": command_pages.commands,
-    "reference/configuration.md": configuration_page.configuration,
-    "reference/file-formats.md": file_formats.formats,
-    "reference/tables.md": file_formats.tables,
-    "reference/terms.md": terms,
-    "gallery/study.md": gallery.study_figures,
+PARTS = {
+    "effects of the sensor": partial(catalogue.effects, "sensor"),
+    "effects of the rig": partial(catalogue.effects, "rig"),
+    "each effect": catalogue.each_effect,
+    "noise effects": catalogue.noise_effects,
+    "gross errors": catalogue.gross_errors,
+    "models": catalogue.models,
+    "published calibrations": catalogue.presets,
+    "schemes": catalogue.schemes,
+    "families of schemes": catalogue.families,
+    "approaches": catalogue.approaches,
+    "data sheets": catalogue.data_sheets,
+    "public data": catalogue.public,
+    "accelstudy and its options": command_pages.own_options,
+    "commands": command_pages.commands,
+    "configuration": configuration_page.configuration,
+    "header of a campaign": file_formats.header,
+    "positions of a campaign": file_formats.positions,
+    "files of calibrations": file_formats.calibrations,
+    "keys of a diagnosis": file_formats.diagnosis,
+    "tables of a study": file_formats.tables,
+    "terms": terms,
+    "figures of a study": gallery.study_figures,
+    "all figures, small": gallery.overview,
+    "drawing of the rooms": architecture.rooms_drawing,
+    "drawing of the rules": architecture.rules_drawing,
+    "table of the rooms": architecture.rooms_table,
 }
+PLACE = re.compile(rf"^<!-- ({'|'.join(PARTS)}) -->$", re.MULTILINE)
 
 
 def on_files(files, config):
-    """Add the pages, the drawings, and small copies of the figures."""
-    for path, make in {**PAGES, **DRAWINGS}.items():
+    """Add the drawings, and small copies of the figures."""
+    for path, make in DRAWINGS.items():
         files.append(File.generated(config, path, content=make()))
     for path, content in gallery.thumbnails().items():
         files.append(File.generated(config, path, content=content))
     return files
 
 
-def on_page_markdown(markdown, page, **_):
-    """Put the small copies where the gallery has them."""
-    if page.file.src_uri != "gallery/index.md":
-        return markdown
-    return markdown.replace("<!-- all figures, small -->", gallery.overview())
+def on_page_markdown(markdown, **_):
+    """Put the parts where a page has their names."""
+    return PLACE.sub(lambda place: PARTS[place[1]]().strip("\n"), markdown)
