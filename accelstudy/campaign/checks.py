@@ -44,10 +44,7 @@ def check_column(
         complain_of(values % 1 != 0, "is no whole number")
     within = column.within
     for i in np.flatnonzero((values < within.least) | (values > within.most))[:1]:
-        try:
-            within.check(values[i])
-        except InputError as error:
-            raise InputError(f"{path}: {name}: {labels[i]}: {error}") from None
+        within.check_key(f"{path}: {name}: {labels[i]}", values[i])
     behind = np.diff(values, prepend=-np.inf)
     if attribute == "positions":
         text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"

@@ -187,11 +187,8 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
 def write_truth(truth: dict[str, Any], path: str | Path) -> None:
     """Write the truth as YAML."""
     text = yaml.safe_dump(truth, sort_keys=False, allow_unicode=True)
-    try:
-        with whole_file(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _hidden_effects(

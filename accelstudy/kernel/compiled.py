@@ -10,7 +10,7 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
-from accelstudy.files.kept import kept_or_made
+from accelstudy.files.cache import cached
 
 KIND = "kernels"
 """Under which compiled functions are kept."""
@@ -30,9 +30,7 @@ class Compiled:
         machine = _machine()
         described = (text, machine.triple, *_processor(), llvmlite.__version__)
         key = hashlib.sha256("\n".join(described).encode()).hexdigest()
-        compiled = kept_or_made(
-            KIND, key, lambda: _compiled(text, machine), llvm.ObjectFileRef.from_data
-        )
+        compiled = cached(KIND, key, lambda: _compiled(text, machine), llvm.ObjectFileRef.from_data)
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         self._engine.add_object_file(compiled)
         self._engine.finalize_object()

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import accelstudy
-from accelstudy.files.kept import kept_or_made
+from accelstudy.files.cache import cached
 
 KIND = "formulas"
 """Under which it is kept."""
@@ -52,7 +52,7 @@ def kept_under(key: str | None, name: str, make: Callable[[], Made]) -> Made:
     if key is None:
         return make()
     dumped = lambda: marshal.dumps(make())  # type: ignore[arg-type]  # noqa: E731
-    made: Made = kept_or_made(KIND, f"{key}-{name}", dumped, marshal.loads)
+    made: Made = cached(KIND, f"{key}-{name}", dumped, marshal.loads)
     return made
 
 

@@ -12,7 +12,7 @@ from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions, effect_names
-from accelstudy.files.kept import kept_in
+from accelstudy.files.cache import cache_folder
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -164,14 +164,14 @@ def test_what_is_compiled_is_kept_whole_or_not_at_all(tmp_path, monkeypatch):
         return len(made)
 
     assert [doubled(tmp_path), doubled(tmp_path)] == [1, 1]
-    (file,) = kept_in(compiled.KIND).iterdir()
+    (file,) = cache_folder(compiled.KIND).iterdir()
     content = file.read_bytes()
     for damaged in (content[:-8], content[:-1] + bytes([content[-1] ^ 1]), b""):
         file.write_bytes(damaged)
         before = len(made)
         assert doubled(tmp_path) == before + 1
         assert file.read_bytes() == content
-    assert [path.name for path in kept_in(compiled.KIND).iterdir()] == [file.name]
+    assert [path.name for path in cache_folder(compiled.KIND).iterdir()] == [file.name]
     closed = tmp_path / "closed"
     closed.write_text("no folder", encoding="utf-8")
     before = len(made)

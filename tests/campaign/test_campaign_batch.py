@@ -404,11 +404,13 @@ def test_patterns(tmp_path, monkeypatch):
     ({"campaigns": [{"log": "a", "name": "a/b"}]}, "campaigns.0.name: "),
     ({"campaigns": [{"public": "xsens"}]}, "campaigns.0: unknown public data 'xsens'; did you"),
     ({"campaigns": [{"public": "ferraris-sections"}]}, "hold no forces"),
-    ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0: unknown model 'six'"),
+    ({"campaigns": [{"log": "a", "model": "six"}]}, "campaigns.0.model: unknown model 'six'"),
     ({"approach": "gravty"}, "unknown approach 'gravty'; did you mean 'gravity'?"),
     ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
     ({"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
      "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`"),
+    ({"campaigns": [{"campaign": "a"}, {"campaign": "./a", "approach": "gravity"}]},
+     "campaigns: a and a are both named 'a'"),
 ])  # fmt: skip
 def test_one_line_for_a_wrong_key(change, message):
     content = {"batch": "b", "campaigns": [{"campaign": "a"}], **change}

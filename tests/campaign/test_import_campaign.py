@@ -92,6 +92,14 @@ def test_means(tmp_path):
     assert (report.holds, report.accuracy) == (None, None)
 
 
+def test_a_table_of_means_has_its_units_in_its_names(tmp_path):
+    path = tmp_path / "means.csv"
+    path.write_text("fx [g],fy [g],fz [g]\n1,0,0\n0,1,0\n0,0,-1\n")
+    campaign, _ = import_means(path)
+    assert campaign.unit == "g"
+    np.testing.assert_allclose(campaign.forces, np.diag([1, 1, -1]) * STANDARD_GRAVITY)
+
+
 @pytest.mark.parametrize(("change", "settings", "message"), [
     ({"n": 0}, {}, "n_samples: must be positive"),
     ({"sy": -1}, {}, "must not be negative"),

@@ -375,13 +375,3 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         assert len(time) == len(forces)
         assert np.isfinite(forces).all()
         find_joint_holds([Recording([log])], ImportSettings(shortest_s=0.1, window_s=0.5))
-
-
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=300), st.sampled_from(["log.txt", "log.mat", "log.parquet"]))
-@example(b"\x00\x00\x00\x00" + bytes(100), "log.mat")
-def test_whatever_the_bytes(tmp_path, content, name):
-    path = tmp_path / name
-    path.write_bytes(content)
-    with one_line_at_most():
-        everything(open_log(path, columns={"fx": 0, "fy": 1, "fz": 2}, rate_hz=1))

@@ -15,7 +15,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.effects import Effect, HoldConditions, get_effect
-from accelstudy.files.kept import kept_in, kept_or_made
+from accelstudy.files.cache import cache_folder, cached
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import not_affine
@@ -70,7 +70,7 @@ def test_kept_functions_give_the_same_bits_and_are_not_made_again(monkeypatch):
 
 def test_damaged_and_unwritable_caches_are_no_harm(tmp_path, monkeypatch):
     first = numbers()
-    for file in kept_in(made.KIND).iterdir():
+    for file in cache_folder(made.KIND).iterdir():
         content = file.read_bytes()
         file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
     assert numbers() == first
@@ -86,7 +86,7 @@ def test_damaged_and_unwritable_caches_are_no_harm(tmp_path, monkeypatch):
 def planted(content):
     """What was stored under the one key of a kind, with other content that is whole."""
     stored = hashlib.sha256(content).digest() + content
-    (file,) = kept_in("planted").iterdir()
+    (file,) = cache_folder("planted").iterdir()
     file.write_bytes(stored)
     return file
 
@@ -114,10 +114,10 @@ def test_what_somebody_else_can_have_written_is_not_there(monkeypatch, damage):
     """Both are whole: only whose they are, and who can write them, tells them apart."""
 
     def value():
-        return kept_or_made("planted", "key", lambda: b"true", bytes.decode)
+        return cached("planted", "key", lambda: b"true", bytes.decode)
 
     assert value() == "true"
-    assert kept_in("planted").stat().st_mode & 0o777 == 0o700
+    assert cache_folder("planted").stat().st_mode & 0o777 == 0o700
     file = planted(b"false")
     assert value() == "false"  # it is the user's own
     damage(file, monkeypatch)
@@ -126,11 +126,11 @@ def test_what_somebody_else_can_have_written_is_not_there(monkeypatch, damage):
 
 def test_a_folder_that_a_group_could_write_is_made_anew():
     """Earlier versions made it with the umask of the user, which often lets the group write."""
-    folder = kept_in("planted")
+    folder = cache_folder("planted")
     folder.mkdir(parents=True)
     folder.chmod(0o775)
     for _ in range(2):
-        assert kept_or_made("planted", "key", lambda: b"true", bytes.decode) == "true"
+        assert cached("planted", "key", lambda: b"true", bytes.decode) == "true"
     assert folder.stat().st_mode & 0o777 == 0o700
     assert [path.name for path in folder.iterdir()] == ["key"]
 
@@ -140,7 +140,7 @@ def test_what_cannot_be_loaded_is_made_again():
         return made.kept_under("planted", "n", lambda: (1, "a"))
 
     assert value() == (1, "a")
-    for file in kept_in(made.KIND).iterdir():
+    for file in cache_folder(made.KIND).iterdir():
         content = b"no marshal"
         file.write_bytes(hashlib.sha256(content).digest() + content)
     assert value() == (1, "a")
@@ -184,7 +184,7 @@ def test_what_is_not_of_the_package_is_not_kept():
 
     assert made.key_of(type(get_effect("bias")), Own) is None
     assert made.kept_under(None, "name", lambda: [1]) == [1]
-    assert not kept_in(made.KIND).exists()
+    assert not cache_folder(made.KIND).exists()
     patched = type("Patched", (type(get_effect("bias")),), {"output": lambda *_: (1, 1, 1)})
     assert made.key_of(patched) is None
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import glob
 import os
-import re
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import check_path_name, natural
+from accelstudy.basics.names import natural, path_name
 from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
@@ -26,6 +24,20 @@ from accelstudy.sensors.models import get_model
 KINDS = ("campaign", "log", "public")
 
 
+def _known_model(name: str) -> str:
+    get_model(name)
+    return name
+
+
+def _known_approach(name: str) -> str:
+    get_approach(name)
+    return name
+
+
+Model = Annotated[ModelName, AfterValidator(_known_model)]
+Approach = Annotated[str, AfterValidator(_known_approach)]
+
+
 class Entry(Block):
     """One or more campaigns to calibrate, and what differs from the rest of the batch."""
 
@@ -35,8 +47,8 @@ class Entry(Block):
     name: PathName | None = Field(
         None, description="name of the results; by default that of the source"
     )
-    model: ModelName | None = Field(None, description="model; by default that of the batch")
-    approach: str | None = Field(None, description="approach; by default that of the batch")
+    model: Model | None = Field(None, description="model; by default that of the batch")
+    approach: Approach | None = Field(None, description="approach; by default that of the batch")
     gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
     settings: ImportSettings | None = Field(
         None,
@@ -50,12 +62,8 @@ class Entry(Block):
             raise ValueError(f"give exactly one of {', '.join(KINDS)}")
         if self.campaign is not None and self.settings is not None:
             raise ValueError("import: goes with log or public; a campaign is imported already")
-        _check_names(self.model, self.approach)
-        try:
-            if self.public is not None:
-                import_settings(self.public)
-        except InputError as error:
-            raise ValueError(str(error)) from None
+        if self.public is not None:
+            import_settings(self.public)
         return self
 
     @property
@@ -89,30 +97,25 @@ class Task(Entry):
     """One campaign to calibrate: an entry without patterns, and with all that it inherits."""
 
     name: PathName
-    model: ModelName
+    model: Model
 
 
 class LotSettings(Block):
     """How the campaigns of a batch are evaluated together, as those of sensors of one type."""
 
-    model: ModelName | None = Field(None, description="model; by default that of the batch")
-    approach: str | None = Field(
+    model: Model | None = Field(None, description="model; by default that of the batch")
+    approach: Approach | None = Field(
         None, description="approach; by default robot where a campaign has the robot's angles"
     )
     seed: int = Field(1, ge=0, description="seed of the draws")
-
-    @model_validator(mode="after")
-    def _names_exist(self) -> Self:
-        _check_names(self.model, self.approach)
-        return self
 
 
 class BatchConfig(Configuration):
     """Campaigns that are calibrated and summarised together."""
 
     batch: PathName = Field(description="name; results go to results/<batch>/")
-    model: ModelName = Field("bias-scale-nonorthogonality", description="model of all campaigns")
-    approach: str | None = Field(
+    model: Model = Field("bias-scale-nonorthogonality", description="model of all campaigns")
+    approach: Approach | None = Field(
         None, description="approach of all; by default robot where a campaign has its angles"
     )
     public_folder: str = Field(
@@ -125,17 +128,15 @@ class BatchConfig(Configuration):
     )
 
     @model_validator(mode="after")
-    def _names_exist(self) -> Self:
-        _check_names(self.model, self.approach)
-        try:
-            twice = [name for name, n in Counter(t.name for t in self.tasks()).items() if n > 1]
-        except InputError as error:
-            raise ValueError(str(error)) from None
-        if twice:
-            sources = " and ".join(task.source for task in self.tasks() if task.name == twice[0])
-            raise ValueError(
-                f"campaigns: {sources} are both named {twice[0]!r}; give one another `name`"
-            )
+    def _names_differ(self) -> Self:
+        sources: dict[str, str] = {}
+        for task in self.tasks():
+            if task.name in sources:
+                raise ValueError(
+                    f"campaigns: {sources[task.name]} and {task.source} are both named "
+                    f"{task.name!r}; give one another `name`"
+                )
+            sources[task.name] = task.source
         return self
 
     def tasks(self) -> list[Task]:
@@ -161,10 +162,12 @@ class BatchConfig(Configuration):
                     raise InputError(f"campaigns.{index}: no {what} matches {sources[0]}")
                 sources = [path for path in matching if path not in named]
             for source in sources:
+                path = Path(os.path.abspath(source))
+                names = {"campaign": path.name, "log": path.stem, "public": source}
                 inherited = {
                     **entry.model_dump(by_alias=True, exclude_unset=True),
                     entry.kind: source,
-                    "name": entry.name or _name_of(entry.kind, source),
+                    "name": entry.name or path_name(names[entry.kind], "campaign"),
                     "model": entry.model or self.model,
                     "approach": entry.approach or self.approach,
                 }
@@ -180,27 +183,6 @@ class BatchConfig(Configuration):
 def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
     return checked(BatchConfig, content, source)
-
-
-def _check_names(model: str | None, approach: str | None) -> None:
-    """Raise `ValueError`, as pydantic wants it, for a name that does not exist."""
-    try:
-        if model is not None:
-            get_model(model)
-        if approach is not None:
-            get_approach(approach)
-    except InputError as error:
-        raise ValueError(str(error)) from None
-
-
-def _name_of(kind: str, source: str) -> str:
-    path = Path(os.path.abspath(source))
-    name = source if kind == "public" else path.stem if kind == "log" else path.name
-    name = re.sub(r"[^\w.-]+", "-", name).lstrip(".-") or "campaign"
-    try:
-        return check_path_name(name)
-    except InputError as error:
-        raise InputError(f"campaigns: {source}: {error}; give it a `name`") from None
 
 
 def _settings(entry: Entry) -> dict[str, Any]:

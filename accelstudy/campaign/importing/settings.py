@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -92,6 +92,11 @@ class ImportSettings(LogLayout):
     )
     join: list[str] = Field([], description="holds that are one, as 4,5 or 120s-135s")
 
+    @model_validator(mode="after")
+    def _names_holds(self) -> Self:
+        _ = self.left_out, self.joined
+        return self
+
     @property
     def full_range(self) -> float:
         """Range of the sensor, m/s²; infinite if it is unknown, or the offset of counts is."""
@@ -139,12 +144,7 @@ def _which(text: str) -> Which | None:
 
 def parse_settings(content: Mapping[str, Any], source: str = "settings") -> ImportSettings:
     """Check settings; raise `InputError` with one line that names the source and the key."""
-    settings = checked(ImportSettings, content, source)
-    try:
-        _ = settings.left_out, settings.joined
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
-    return settings
+    return checked(ImportSettings, content, source)
 
 
 def read_settings(

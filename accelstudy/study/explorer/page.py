@@ -18,7 +18,7 @@ import pandas as pd
 from accelstudy.basics.units import angles_in, display_unit, unit_label
 from accelstudy.basics.wording import comma_list, counted
 from accelstudy.drawing.style import approach_colour, approach_marker
-from accelstudy.files.kept import kept_or_made
+from accelstudy.files.cache import cached
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages import render
 from accelstudy.study.config import Study
@@ -186,7 +186,7 @@ def library() -> str:
 
     To bundle it takes two seconds, so the text is kept for the next study.
     """
-    return kept_or_made("explorer", f"vega-{version('vl-convert-python')}", _bundled, bytes.decode)
+    return cached("explorer", f"vega-{version('vl-convert-python')}", _bundled, bytes.decode)
 
 
 def _bundled() -> bytes:

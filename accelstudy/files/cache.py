@@ -1,4 +1,4 @@
-"""What takes long to make and depends on nothing but itself: kept on disk for the next process.
+"""A cache on disk of what takes long to make and depends on nothing but its key.
 
 Formulas and kernels are code, so whoever can write to them runs code as the user who reads them.
 They are read only from a folder and a file that are the user's own and that nobody else can write.
@@ -22,24 +22,28 @@ _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 Made = TypeVar("Made")
 
 
-def kept_in(kind: str) -> Path:
-    """Where things of a kind are kept: under `accelstudy` in the user's folder of caches."""
+def cache_folder(kind: str) -> Path:
+    """Folder of the cache of a kind, under `accelstudy` in the user's folder of caches."""
     caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(caches) / "accelstudy" / kind
 
 
-def kept_or_made(
-    kind: str, key: str, make: Callable[[], bytes], load: Callable[[bytes], Made]
-) -> Made:
-    """Return what `load` makes of the stored bytes, or of those that are made and then stored.
+def cached(kind: str, key: str, make: Callable[[], bytes], load: Callable[[bytes], Made]) -> Made:
+    """Return the cached value, computing it if necessary.
 
     What is damaged, or could have been written by somebody else, counts as not there.
+
+    Parameters
+    ----------
+    kind, key : str, name of the cache, and of the value in it
+    make : function that gives the bytes to store
+    load : function that makes the value of these bytes
     """
     with contextlib.suppress(Exception):
-        return load(_read(kept_in(kind) / key))
+        return load(_read(cache_folder(kind) / key))
     content = make()
     with contextlib.suppress(OSError, RuntimeError):  # no right, no room, or no home folder
-        _write(kept_in(kind) / key, content)
+        _write(cache_folder(kind) / key, content)
     return load(content)
 
 
