@@ -7,53 +7,62 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from accelstudy.api.advice import Advised
     from accelstudy.api.calibrations import Calibration
-    from accelstudy.api.campaigns import find_holds, read_campaign, simulate_campaign
     from accelstudy.api.catalogues import catalogue
+    from accelstudy.api.designs import Design
     from accelstudy.api.diagnoses import Diagnosis
     from accelstudy.api.epochs import Comparison, History
-    from accelstudy.api.logs import Log, read_log
+    from accelstudy.api.logs import Log
     from accelstudy.api.lots import Lot
     from accelstudy.api.plans import Plan
-    from accelstudy.api.simulations import Simulation, simulate
+    from accelstudy.api.simulations import Simulation
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.session import Campaign
     from accelstudy.study.run import run_study
     from accelstudy.verbs.calibrations import (
+        apply,
         calibrate,
         check_sigmas,
         diagnose,
         export,
         read_calibration,
     )
-    from accelstudy.verbs.planning import plan
+    from accelstudy.verbs.campaigns import find_holds, read_campaign, read_log, simulate_campaign
+    from accelstudy.verbs.planning import advise, data_sheet, find_positions, plan, simulate
     from accelstudy.verbs.sensors import compare, history, lot
 
     __version__: str
 
 _PLACES = {
+    "api.advice": ("Advised",),
     "api.calibrations": ("Calibration",),
-    "api.campaigns": ("find_holds", "read_campaign", "simulate_campaign"),
     "api.catalogues": ("catalogue",),
+    "api.designs": ("Design",),
     "api.diagnoses": ("Diagnosis",),
     "api.epochs": ("Comparison", "History"),
-    "api.logs": ("Log", "read_log"),
+    "api.logs": ("Log",),
     "api.lots": ("Lot",),
     "api.plans": ("Plan",),
-    "api.simulations": ("Simulation", "simulate"),
+    "api.simulations": ("Simulation",),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
     "study.run": ("run_study",),
-    "verbs.calibrations": ("calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
-    "verbs.planning": ("plan",),
+    "verbs.calibrations": (
+        *("apply", "calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
+    ),
+    "verbs.campaigns": ("find_holds", "read_campaign", "read_log", "simulate_campaign"),
+    "verbs.planning": ("advise", "data_sheet", "find_positions", "plan", "simulate"),
     "verbs.sensors": ("compare", "history", "lot"),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
+    "Advised",
     "Calibration",
     "Campaign",
     "Comparison",
+    "Design",
     "Diagnosis",
     "History",
     "InputError",
@@ -61,13 +70,17 @@ __all__ = [
     "Lot",
     "Plan",
     "Simulation",
+    "advise",
+    "apply",
     "calibrate",
     "catalogue",
     "check_sigmas",
     "compare",
+    "data_sheet",
     "diagnose",
     "export",
     "find_holds",
+    "find_positions",
     "history",
     "lot",
     "plan",

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.api.given import (
+    SIGMA_READING,
+    START,
     drawing,
-    for_programs,
     of_type,
     path_of,
-    python_words,
     quantity,
 )
 from accelstudy.api.logs import log_of
@@ -28,6 +28,7 @@ from accelstudy.basics.units import GON, Given
 from accelstudy.campaign.calibration import export as forms
 from accelstudy.campaign.calibration.applying import (
     NO_CALIBRATION,
+    SensorCalibration,
     calibration_of,
     dof_of,
     read_calibration_content,
@@ -60,7 +61,6 @@ from accelstudy.sensors.sensor import SensorModel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SIGMA = Given("m/s^2")
 TILT = Given("rad", "", 1e-3, np.pi / 2)
 
 
@@ -131,12 +131,16 @@ class Calibration(Result):
         """Correlation matrix of the parameters."""
         return self._matrix("correlation")
 
+    @cached_property
+    def sensor(self) -> SensorCalibration:
+        """The calibration as it stays with the sensor: it levels readings, and is compared."""
+        return calibration_of(self.content)
+
     def _matrix(self, key: str) -> pd.DataFrame:
         names = self.parameters.index
         values = np.array(self.content[key], dtype=float)  # None becomes NaN
         return pd.DataFrame(values, index=names, columns=names)
 
-    @for_programs
     def intervals(self, level: float = 0.95) -> pd.DataFrame:
         """Return the interval of each parameter that holds it with a probability, SI.
 
@@ -166,7 +170,6 @@ class Calibration(Result):
         """Residuals, tests and reliability of each position, as positions.parquet has them."""
         return assessed_positions(assess(self._fitted("residuals")))
 
-    @for_programs
     def tilt_error(self, tilt_range: float | str = MAX_TILT_GON * GON) -> pd.Series:
         """Return the rms tilt error that the calibration leaves, rad, of roll and of pitch.
 
@@ -187,38 +190,28 @@ class Calibration(Result):
             )
         return self.fit
 
-    @for_programs
     def apply(
-        self, log: Any, *, sigma: float | str | None = None, start: float | None = None
+        self, log: Any, *, start: float | str | None = None, sigma: float | str | None = None
     ) -> pd.DataFrame:
-        """Level a log.
+        """Level a log; see `accelstudy.apply`, which takes more keywords.
 
         Parameters
         ----------
         log : Log, or what `read_log` takes
-        sigma : float in m/s² or str with a unit, of a reading; as within the holds of the campaign
-            if omitted
-        start : float, s from the start of the calibration session to the first row, where effects
-            depend on it; 0 if omitted
-
-        Returns
-        -------
-        DataFrame
-            The columns of the log, the calibrated force in m/s², roll and pitch in the unit that
-            the names say, and their sigmas; a DataFrame keeps its index. Warnings stand in
-            ``attrs["warnings"]``.
+        start : float in s or str with a unit, from the start of the calibration session
+        sigma : float in m/s² or str with a unit, of a reading
         """
-        log = log_of(log)
-        reading = None if sigma is None else quantity("sigma", sigma, SIGMA)
-        sensor = calibration_of(self.content)
-        table, leveled = level_frame(sensor, log.file, log.layout, reading, start, log.table)
-        table.attrs["warnings"] = list(map(python_words, leveled.warnings))
+        opened = log_of(log)
+        at = None if start is None else quantity("start", start, START)
+        noise = None if sigma is None else quantity("sigma", sigma, SIGMA_READING)
+        file, layout, given = opened.file, opened.layout, opened.table
+        table, leveled = level_frame(self.sensor, file, layout, noise, at, given)
+        table.attrs["warnings"] = list(leveled.warnings)
         return table
 
-    @for_programs
     def export(self, form: str = "json") -> str:
         """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
-        return forms.export(calibration_of(self.content).content, form)
+        return forms.export(self.sensor.content, form)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters, as `parameters`."""

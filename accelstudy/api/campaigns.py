@@ -1,177 +1,180 @@
-"""Campaigns of a program: found in a log, read from a folder, or simulated."""
+"""Campaigns of a program: found in logs, or simulated."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+import glob
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
-from pydantic import ConfigDict, create_model
+import pandas as pd
 
-from accelstudy.api.given import GRAVITY, for_programs, names, path_of, python_words, quantity
-from accelstudy.api.logs import Log, log_of
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY, Given
-from accelstudy.campaign.format import read_campaign as read_folder
-from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.settings import parse_settings
+from accelstudy.api.given import LAYOUT, each, path_of
+from accelstudy.api.logs import Log, keys_of, log_of, names_of
+from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.names import natural
+from accelstudy.basics.units import UNITS
+from accelstudy.campaign.beside import Beside, ReferenceLog
+from accelstudy.campaign.importing.logs import import_sensors
+from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
+from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
+from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings
-from accelstudy.campaign.simulated import simulate_campaign as simulated
-from accelstudy.files.validation import checked
-from accelstudy.planning.quantities import QUANTITIES
+from accelstudy.campaign.simulated import simulate_campaign as simulate
 
-_QUANTITIES = {
-    "sigma": QUANTITIES["sigma"],
-    "sigma_angle": Given("rad"),
-    "gravity": GRAVITY,
-    "interval": Given("s"),
-}
-_NAMES = ("effects", "noise_effects", "gross_errors")
-_TYPES = get_type_hints(CampaignSettings)
-_KEYS: Any = {each.name: (_TYPES[each.name], each.default) for each in fields(CampaignSettings)}
-_Settings = create_model("Settings", __config__=ConfigDict(extra="forbid"), **_KEYS)
+OTHERS = ("reference_log", "reference", "reference_columns", "reference_offset", "settings")
+"""Keywords of an import that no file of settings has."""
+_NUMBER = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 
 
-@for_programs
-def find_holds(log: Log, *, gravity: float | str | None = None, **settings: Any) -> Campaign:
-    """Find the static holds of a log.
+@dataclass(frozen=True)
+class Import:
+    """Logs, and how campaigns are made of them.
 
-    Parameters
+    Attributes
     ----------
-    log : Log, or what `read_log` takes
-    gravity : float in m/s² or str with a unit, optional; standard gravity if omitted
-    settings
-        Other keys of the settings of ``accelstudy import``, as ``exclude`` or ``window_s``.
+    files : list of path, or the columns of a table in memory
+    settings : ImportSettings
+    beside : Beside, optional, a calibrated sensor on the same plate
+    """
 
-    Returns
-    -------
-    Campaign, with what was found and assumed in `notes`, and what the user should know in
-    `warnings`
+    files: list[LogFile]
+    settings: ImportSettings
+    beside: Beside | None
+
+    @classmethod
+    def of(
+        cls, log: Any, given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
+    ) -> Import:
+        """Read the settings and look for the files.
+
+        Parameters
+        ----------
+        log : Log or path or DataFrame, or several paths
+        given : mapping, keywords of `find_holds`, checked
+        sensors : mapping of a name to three columns, of several sensors in one log
+        """
+        settings = settings_of(given, sensors or {})
+        beside = _beside(*(given[name] for name in OTHERS[:-1]))
+        if not isinstance(log, Log | pd.DataFrame):
+            return cls([*files_of(each(log))], settings, beside)
+        log = log_of(log, {name: given[name] for name in LAYOUT})
+        layout = settings.model_dump(exclude_unset=True) | log.layout
+        return cls([log.file], parse_settings(layout), beside)
+
+    def campaign(self) -> Campaign:
+        """Campaign of the one sensor."""
+        if self.settings.sensors:
+            raise InputError(
+                "sensors: several sensors make several campaigns; give the columns of one"
+            )
+        ((campaign, report),) = import_sensors(self.files, self.settings, self.beside).values()
+        return replace(campaign, notes=tuple(report.lines()))
+
+
+def settings_of(
+    given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
+) -> ImportSettings:
+    """Settings of a file, overlaid with those that were given as keywords."""
+    path = given["settings"]
+    own = {name: value for name, value in given.items() if name not in (*OTHERS, "range")}
+    own = {name: value for name, value in own.items() if value is not False}
+    own["sensors"] = sensors or None
+    names, content = names_of(own), keys_of(own)
+    settings = read_settings(path, content, names)
+    if given.get("range") is None:
+        return settings
+    content["range_mps2"] = _range(str(given["range"]), settings)
+    return read_settings(path, content, {**names, "range_mps2": key("range")})
+
+
+def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
+    """Files that are meant by files, folders and patterns.
+
+    Those of a folder or a pattern come in the order of their names, and pos2 before pos10. So do
+    files in the order of the alphabet, which is how a shell lists them.
 
     Raises
     ------
     InputError
-        If the log cannot be read, has no holds, or a setting is wrong.
+        If there is none.
     """
-    log = log_of(log)
-    content = {"name": Path(log.name).stem, **log.layout, **settings}
-    if gravity is not None:
-        content["gravity"] = {"value_mps2": quantity("gravity", gravity, GRAVITY)}
-    given = parse_settings(content, "find_holds")
-    if given.sensors:
-        raise InputError("sensors: several sensors make several campaigns; give the columns of one")
-    campaign, report = import_log(log.file, given)
-    notes, warnings = (
-        tuple(map(python_words, each)) for each in (report.lines(), campaign.warnings)
-    )
-    return replace(campaign, notes=notes, warnings=warnings)
+    files: list[Path] = []
+    for path in (path_of("log", one, "a path or a DataFrame") for one in given):
+        if path.is_dir() and not (path / BAG_OF_FOLDER).is_file():
+            inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
+        elif glob.has_magic(str(path)) and not path.exists():
+            inside = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]
+        else:
+            files.append(path)
+            continue
+        if not inside:
+            raise InputError(f"{path}: no file there")
+        files += sorted(inside, key=natural)
+    if files == sorted(files):
+        files.sort(key=natural)
+    twice = [path for path in files if files.count(path) > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: the file is given twice")
+    return files
 
 
-@for_programs
-def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Campaign:
-    """Read a campaign from its folder; see `accelstudy.campaign.format.read_campaign`.
+def _range(text: str, settings: ImportSettings) -> float:
+    """Range in m/s², of a number with or without a unit."""
+    match = _NUMBER.fullmatch(text)
+    unit = match[2] or "m/s^2" if match else ""
+    sizes = {**UNITS["m/s^2"], "m/s²": 1.0}
+    if unit == "counts" and settings.scale is not None:
+        sizes["counts"] = float(max(map(abs, settings.scale)))
+    try:
+        return float(match[1]) * sizes[unit] if match else sizes[text]
+    except (KeyError, ValueError):
+        raise InputError(
+            f"{key('range')}: expected a number in m/s², g or counts, as 4g, not {text!r}"
+        ) from None
 
-    Parameters
+
+def _beside(
+    log: Path | None,
+    calibration: Path | None,
+    columns: dict[str, str] | None,
+    offset: float | None,
+) -> Beside | None:
+    """Return the sensor beside that of the log, if there is one."""
+    of_log, of_calibration = key("reference_log"), key("reference")
+    if log is None and calibration is None:
+        more = {"reference_columns": columns, "reference_offset": offset}
+        for name in (name for name, value in more.items() if value is not None):
+            raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
+        return None
+    if calibration is None:
+        raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
+    if log is None:
+        raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
+    return Beside.of(ReferenceLog(log, calibration, columns or {}, offset))
+
+
+# --- simulated ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedCampaign(Campaign):
+    """A campaign of which the truth is known.
+
+    Attributes
     ----------
-    folder : path
-    plausible : bool
-        Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
-        wrong with it, too.
+    truth : mapping, the settings, and everything that was drawn
     """
-    return read_folder(path_of("folder", folder), plausible=plausible)
+
+    truth: Mapping[str, Any] = field(default_factory=dict)
 
 
-@for_programs
-def simulate_campaign(
-    *,
-    name: str = "simulated",
-    seed: int = 1,
-    scheme: str = "mclaren-24",
-    repeats: int = 1,
-    repeat_first: int = 0,
-    order: str = "scheme",
-    approach: str = "robot",
-    model: str = "bias-scale-nonorthogonality",
-    effects: str | Sequence[str] = (),
-    size: float = 1.0,
-    noise_effects: str | Sequence[str] = (),
-    gross_errors: str | Sequence[str] = (),
-    sigma: float | str = 0.002,
-    sigma_known: bool = True,
-    sigma_angle: float | str = "3.2 mgon",
-    gravity: float | str = STANDARD_GRAVITY,
-    interval: float | str | None = 60.0,
-    temperature: tuple[float, float] | None = None,
-    temperature_order: str = "linear",
-    vibration: tuple[float, float] | None = None,
-    yaw: str = "none",
-    n_samples: int | None = None,
-) -> Campaign:
-    """Simulate a campaign with effects of your choice.
-
-    What is not given is drawn at random, from the seed.
-
-    Parameters
-    ----------
-    name : str
-        Name of the campaign.
-    seed : int
-        Seed of all random numbers.
-    scheme : str
-        Positions: a name that `accelstudy schemes` lists, or a file.
-    repeats : int
-        How often the scheme is measured.
-    repeat_first : int
-        First holds that are measured again at the end.
-    order : str
-        Order of the holds: scheme or random.
-    approach : str
-        By gravity alone, or with the angles of a robot, too.
-    model : str
-        Effects that the sensor has; their parameters are drawn, of typical size.
-    effects : str, or several
-        Effects beside the model, as "warm_up(tau=400)" or, with their parameters in SI,
-        "thermal_bias: 0.004, -0.002, 0.001"; one of an effect of the model replaces it.
-    size : float
-        Factor of the typical size of each effect without parameters.
-    noise_effects : str, or several
-        As "heavy_tails(nu=3)".
-    gross_errors : str, or several
-        As "row_order(first=3, second=4)".
-    sigma : float in m/s², or str with a unit
-        Standard deviation of a position's mean.
-    sigma_known : bool
-        Whether the campaign states it.
-    sigma_angle : float in rad, or str with a unit
-        Standard deviation of the robot's roll and pitch.
-    gravity : float in m/s², or str with a unit
-        Local gravity.
-    interval : float in s, or str with a unit
-        Time between holds; without time if None.
-    temperature : two of float, °C
-        First and last temperature.
-    temperature_order : str
-        Course of the temperature: linear, ABBA or random.
-    vibration : two of float, m/s²
-        Lowest and highest rms.
-    yaw : str
-        Yaw of the holds: none or random.
-    n_samples : int
-        Samples of a hold; adds columns on them.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown or a value is wrong.
-    """
-    settings = dict(locals())
-    for key, given in _QUANTITIES.items():
-        if settings[key] is not None:
-            settings[key] = quantity(key, settings[key], given)
-    for key in _NAMES:
-        settings[key] = names(key, settings[key])
-    content = checked(_Settings, settings, "simulate_campaign")
-    return simulated(CampaignSettings(**content.model_dump()))[0]
+def simulated(settings: Mapping[str, Any]) -> SimulatedCampaign:
+    """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
+    campaign, truth = simulate(CampaignSettings(**settings))
+    values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
+    return SimulatedCampaign(**values, truth=truth)

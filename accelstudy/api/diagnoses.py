@@ -12,7 +12,6 @@ from numpy.linalg import LinAlgError
 from accelstudy.api.calibrations import Calibration
 from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.diagnosis.loop import Loop, close_loop
@@ -31,8 +30,6 @@ from accelstudy.sensors.frames import FRD, axes_note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-SESSIONS = Range(100, 10**9)
 
 
 class Diagnosis(Result):

@@ -15,7 +15,7 @@ from accelstudy.api.calibrations import Calibration
 from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
 from accelstudy.basics.dates import read_date
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.wording import counted
 from accelstudy.drawing.style import FULL
 from accelstudy.epochs import comparison as comparing
@@ -138,7 +138,7 @@ def follow(
     """Follow a sensor over its calibrations, which messages call as they were given."""
     if dates and len(dates) != len(calibrations):
         raise InputError(
-            f"--date: {counted(len(dates), 'date')} for "
+            f"{key('dates')}: {counted(len(dates), 'date')} for "
             f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
             "2026-03-01"
         )
@@ -153,17 +153,16 @@ def follow(
             raise InputError(f"{names[i]}: has the numbers of {names[same]}; each counts once")
     stated: Sequence[Any] = dates or [one.content.get("date") for one in calibrations]
     places = [f"{name}: date" for name in called or map(repr, calibrations)]
-    where = ["--date"] * len(dates) or places
-    return history_of(
-        calibrations, [_date(text, what) for text, what in zip(stated, where, strict=True)]
-    )
+    where = [key("dates")] * len(dates) or places
+    read = [_date(text, what) for text, what in zip(stated, where, strict=True)]
+    return history_of([one.sensor for one in calibrations], read)
 
 
 def _date(given: str | datetime | None, where: str) -> datetime:
     if given is None:
         raise InputError(
-            f"{where}: missing; give --date for each calibration, or calibrate again with `date` "
-            "in the header of the campaign"
+            f"{where}: missing; give `dates` for each calibration, or calibrate "
+            "again with `date` in the header of the campaign"
         )
     if isinstance(given, datetime):
         return given

@@ -2,62 +2,31 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import wraps
 from math import isfinite
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import BY_COMMAND, InputError, shown
+from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import Given
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
-
-GRAVITY = Given("m/s^2", "", bounds.GRAVITY.least, bounds.GRAVITY.most)
-_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
-_KEYWORDS = {"range": "range_mps2", "threshold": "threshold_mps2"}
-"""Options whose keywords have other names."""
-
-
-def python_words(text: str) -> str:
-    """Say in words of Python what was written for a command: --time-unit is `time_unit`."""
-    if "accelstudy " not in text:  # a command that is quoted keeps its options
-        text = _OPTION.sub(_keyword, text)
-    return text
-
-
-def _keyword(option: re.Match[str]) -> str:
-    name = _KEYWORDS.get(option[1], option[1].replace("-", "_"))
-    return f"`{name}`" if option.start() else name
-
-
-def for_programs(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Let the errors of a function speak to the user of Python."""
-
-    @wraps(function)
-    def within(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        if BY_COMMAND.get():
-            return function(*args, **kwargs)
-        try:
-            return function(*args, **kwargs)
-        except InputError as error:
-            text = python_words(str(error))
-            if text == str(error):
-                raise
-            raise InputError(text) from None
-
-    return within
+GRAVITY = Given("m/s^2", "", bounds.GRAVITY.least, bounds.GRAVITY.most, True)
+SIGMA_READING = Given("m/s^2", "", 0.0, bounds.SIGMA_READING.most, True)
+START = Given("s", "", 0.0, bounds.TIME.most, True)
+LAYOUT = (
+    *("columns", "time", "time_unit", "rate", "delimiter", "variable"),
+    *("unit", "scale", "offset", "frame"),
+)
+"""Keywords that say how a log is read."""
 
 
 def of_type(name: str, value: Any, *types: type, expected: str) -> None:

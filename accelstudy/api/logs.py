@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from os import PathLike
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pyarrow as pa
 
-from accelstudy.api.given import for_programs, of_type, path_of
-from accelstudy.basics.errors import InputError
+from accelstudy.api.given import path_of
+from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.opening import open_source
@@ -49,54 +49,17 @@ class Log:
         return notebook_html("Log", self.name, given)
 
 
-@for_programs
-def read_log(
-    log: str | PathLike[str] | pd.DataFrame,
-    *,
-    rate: float | None = None,
-    columns: Mapping[str, str | int] | None = None,
-    **layout: Any,
-) -> Log:
-    """Say which log to read, and how.
-
-    Parameters
-    ----------
-    log : path or DataFrame
-        Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS, a ULog of
-        PX4, or a table in memory, of which an index of dates is the time.
-    rate : float, Hz, optional
-        Samples per second, where there is no column of time.
-    columns : mapping, optional
-        ``fx``, ``fy``, ``fz``, ``temperature`` and ``vibration`` to the name of a column, or its
-        number from 0.
-    layout
-        Other keys of the settings of ``accelstudy import`` that say how a log is read: ``time``,
-        ``time_unit``, ``unit``, ``scale``, ``offset``, ``frame``, ``variable``,
-        ``delimiter``.
-
-    Returns
-    -------
-    Log
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or a key or a value is wrong.
-    """
-    if columns is not None:
-        of_type("columns", columns, Mapping, expected="a mapping, as {'fx': 'ax'}")
-        columns = dict(columns)
-    given = {"rate_hz": rate, "columns": columns, **layout}
-    given = {key: value for key, value in given.items() if value is not None}
-    known = checked(LogLayout, given, "read_log")
+def open_log(log: Any, given: Mapping[str, Any]) -> Log:
+    """Return a log, which is looked at, with the keywords that say how it is read."""
+    layout = layout_of(given)
     if not isinstance(log, pd.DataFrame):
         path = path_of("log", log, "a path or a DataFrame")
-        open_source(path, given.get("variable"), known.delimiter)
-        return Log(path, given)
+        open_source(path, layout.get("variable"), layout.get("delimiter"))
+        return Log(path, layout)
     table = log.copy()  # what its owner changes later is not of this log
     rows = table
-    if "rate_hz" not in given and "time" not in given:
-        rows, given = _with_time(table, given)
+    if "rate_hz" not in layout and "time" not in layout:
+        rows, layout = _with_time(table, layout)
     try:
         typed = pa.Table.from_pandas(rows.rename(columns=str), preserve_index=False)
     except (TypeError, ValueError, NotImplementedError) as error:
@@ -104,7 +67,7 @@ def read_log(
         raise InputError(
             f"log: the DataFrame cannot be a log, which has numbers: {reason}"
         ) from None
-    return Log(TableSource("DataFrame", typed), given, table)
+    return Log(TableSource("DataFrame", typed), layout, table)
 
 
 def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, dict[str, Any]]:
@@ -116,6 +79,49 @@ def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, 
     return log.assign(**{name: times}), {**given, "time": name}
 
 
-def log_of(log: Any) -> Log:
-    """Return a log as such, whatever way it was given."""
-    return log if isinstance(log, Log) else read_log(log)
+def log_of(log: Any, given: Mapping[str, Any] | None = None) -> Log:
+    """Return a log as such, whatever way it was given; keywords go before its own."""
+    if not isinstance(log, Log):
+        return open_log(log, given or {})
+    return replace(log, layout=log.layout | layout_of(given or {}))
+
+
+def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a layout that keywords say, checked."""
+    layout = checked(LogLayout, keys_of(given), "log", names=names_of(given))
+    return layout.model_dump(exclude_unset=True)
+
+
+KEYS = {
+    "rate": "rate_hz",
+    "range": "range_mps2",
+    "threshold": "threshold_mps2",
+    "window": "window_s",
+    "trim": "trim_s",
+    "shortest": "shortest_s",
+    "gravity": "gravity.value_mps2",
+    "robot_sigma": "robot.angle_sigma_mgon",
+    "robot_unit": "robot.unit",
+}
+"""Keywords whose keys in a file have other names, of which some say a unit."""
+DIGITS = 12
+"""Of a quantity in the unit of a file, so that 3.2 mgon stays that number."""
+
+
+def keys_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Content of a file of settings that says the same as keywords."""
+    content: dict[str, Any] = {}
+    for name, value in given.items():
+        if value is None or value == ():
+            continue
+        if name == "robot_sigma":
+            value = float(f"{value / MGON:.{DIGITS}g}")
+        block, _, inner = KEYS.get(name, name).rpartition(".")
+        part = content.setdefault(block, {}) if block else content
+        part[inner] = list(value) if isinstance(value, tuple) else value
+    return content
+
+
+def names_of(given: Mapping[str, Any]) -> dict[str, str]:
+    """Keys of keywords that are given, and what their user calls them."""
+    return {KEYS.get(name, name): key(name) for name, value in given.items() if value is not None}

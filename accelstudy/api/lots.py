@@ -10,7 +10,6 @@ import pandas as pd
 from accelstudy.api.calibrations import Calibration
 from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL
@@ -19,8 +18,6 @@ from accelstudy.lots.output import LotReport, draw_sensors, write_lot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-CORES = Range(1, 10_000)
 
 
 class Lot(Result):

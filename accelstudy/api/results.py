@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from accelstudy.api.given import for_programs, path_of
+from accelstudy.api.given import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.pages.notebook import notebook_html
@@ -65,7 +65,6 @@ class Result(ABC):
         show(f"{self.state.upper()}: {self.verdict}")
         say(f"report: {place / 'report.html'}")
 
-    @for_programs
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Write the files of the command of the same name.
 

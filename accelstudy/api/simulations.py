@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from math import inf
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from accelstudy.api.given import GRAVITY, each, for_programs, names, of_type, quantity, whole
+from accelstudy.api.given import drawing, of_type, quantity
+from accelstudy.api.results import Result
 from accelstudy.approaches import get_approach
-from accelstudy.basics import bounds
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY, Given
+from accelstudy.basics.units import MGON, Given, display_unit, to_display
 from accelstudy.basics.wording import counted
-from accelstudy.pages.notebook import notebook_html
-from accelstudy.planning.quantities import QUANTITIES
+from accelstudy.drawing.style import FULL
+from accelstudy.files.outputs import SIMULATION
+from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cell import Cell
@@ -37,43 +38,79 @@ from accelstudy.study.summary import tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
-REPLICATES = Range(2, bounds.REPLICATES.most)
-"""Calibrations of a cell, of which there is a standard deviation."""
-DIGITS = 12
-"""Of a quantity in the configuration, so that 3.2 mgon stays that number."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Simulation:
+class Simulation(Result):
     """Simulated calibrations of one set-up, or of several: the cells of a study.
 
     Attributes
     ----------
-    statistics : tuple of CellStatistics
+    statistics : sequence of CellStatistics
+    cells : tuple of Cell, the set-ups
     """
 
-    statistics: tuple[CellStatistics, ...]
+    kind = SIMULATION
+
+    def __init__(self, statistics: Sequence[CellStatistics], seed: int) -> None:
+        self.statistics, self._seed = statistics, seed
+        self.cells = tuple(one.cell for one in statistics)
 
     @property
-    def cells(self) -> tuple[Cell, ...]:
-        """The set-ups."""
-        return tuple(one.cell for one in self.statistics)
-
-    def __repr__(self) -> str:
-        return f"Simulation({self._what})"
-
-    def _repr_html_(self) -> str:
-        table = self.parameters if len(self.cells) == 1 else self.tilt
-        return notebook_html("Simulation", self._what, table)
+    def name(self) -> str:
+        """Name of the cell, or how many there are."""
+        return self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
 
     @property
-    def _what(self) -> str:
-        n = sum(one.converged for one in self.statistics)
-        what = self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
-        return f"{what}, {counted(n, 'calibration')}"
+    def state(self) -> str:
+        """Whether all calibrations converged: converged or incomplete."""
+        wanted = sum(cell.replicates for cell in self.cells)
+        return "converged" if self._converged == wanted else "incomplete"
+
+    @property
+    def verdict(self) -> str:
+        """How many calibrations there are and, of one set-up, what they leave."""
+        said = f"{self.name}, {counted(self._converged, 'calibration')}"
+        if len(self.cells) > 1 or not self._converged:
+            return f"{said}."
+        roll, pitch = to_display(self.tilt["rms"], "rad")
+        unit = display_unit("rad")
+        return f"{said}. Roll is left with {roll:.3g} {unit} and pitch with {pitch:.3g} {unit} rms."
+
+    @property
+    def _converged(self) -> int:
+        return sum(one.converged for one in self.statistics)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """State, verdict, and the rows of parameters and of tilt errors."""
+        tables = {"parameters": self.parameters, "tilt": self.tilt}
+        rows = {name: table.reset_index().to_dict("records") for name, table in tables.items()}
+        return {"state": self.state, "verdict": self.verdict, **rows}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the parameters or, of several set-ups, the tilt errors."""
+        return self.parameters if len(self.cells) == 1 else self.tilt
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the tilt error of each set-up, with its standard error."""
+        with drawing(ax, FULL, 40 + 6 * len(self.cells)) as ax:
+            for angle, rows in self.tilt.groupby("angle", sort=False):
+                rms, error = (to_display(rows[key], "rad") for key in ("rms", "rms_error"))
+                ax.errorbar(rms, range(len(rms)), xerr=error, fmt="o", markersize=3, label=angle)
+            ax.set_yticks(range(len(self.cells)), [cell.name for cell in self.cells])
+            ax.set_xlabel(f"tilt error / {display_unit('rad')}")
+            ax.legend()
+        return ax
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write the tables of a study."""
+        for name, table in self.tables.items():
+            provenance = {"config_hash": None, "seed": self._seed}
+            write_table(folder / f"{name}.parquet", table, provenance)
 
     @cached_property
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -185,57 +222,34 @@ class Simulation:
         return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
 
 
-@for_programs
-def simulate(
-    model: str | Sequence[str],
-    scheme: str | Sequence[str],
-    approach: str | Sequence[str],
-    *,
-    sigma: float | str | Sequence[float | str],
-    robot_accuracy: float | str = "3.2 mgon",
-    gravity: float | str = STANDARD_GRAVITY,
-    truth: Mapping[str, float | str] | None = None,
-    replicates: int = 1000,
-    seed: int = 1,
+def simulated(
+    names: Mapping[str, Sequence[str]],
+    sigma: Sequence[float],
+    robot_accuracy: float,
+    gravity: float,
+    truth: Mapping[str, float | str] | None,
+    replicates: int,
+    seed: int,
 ) -> Simulation:
-    """Simulate the calibrations of one set-up, or of every combination of several.
-
-    A study of the workflow with the same cells, noise and seed gives the same numbers.
-
-    Parameters
-    ----------
-    model, scheme, approach : str, a name or a file, or several of them
-    sigma : float in m/s² or str with a unit, of the mean of a position; or several
-    robot_accuracy : float in rad or str with a unit, of the robot's roll and pitch
-    gravity : float in m/s² or str with a unit
-    truth : mapping of parameter to true value, SI or with a unit; 0 if omitted. Of several models
-        each has those that are its own.
-    replicates, seed : int
-
-    Raises
-    ------
-    InputError
-        If a name or a value is wrong, or the positions do not determine any of the models.
-    """
-    grid: dict[str, Any] = {
-        "models": [get_model(one).name for one in names("model", model)],
-        "schemes": [get_scheme(one).name for one in names("scheme", scheme)],
-        "approaches": [get_approach(one).name for one in names("approach", approach)],
-        "sensor_sigma_mps2": [_si("sigma", one, QUANTITIES["sigma"]) for one in each(sigma)],
-        "replicates": whole("replicates", replicates, REPLICATES),
-    }
-    for key, values in zip(("model", "scheme", "approach", "sigma"), grid.values(), strict=False):
+    """Simulate every combination of models, schemes and approaches; see `accelstudy.simulate`."""
+    for key, values in {**names, "sigma": sigma}.items():
         if not values:
             raise InputError(f"{key}: none is given")
-    robot = _si("robot_accuracy", robot_accuracy, QUANTITIES["robot_accuracy"], MGON)
+    grid = {
+        "models": [get_model(one).name for one in names["model"]],
+        "schemes": [get_scheme(one).name for one in names["scheme"]],
+        "approaches": [get_approach(one).name for one in names["approach"]],
+        "sensor_sigma_mps2": [_tidy(one) for one in sigma],
+        "replicates": replicates,
+    }
     study = parse_study(
         {
             "study": "python",
-            "seed": whole("seed", seed, bounds.SEED),
-            "gravity_mps2": _si("gravity", gravity, GRAVITY),
+            "seed": seed,
+            "gravity_mps2": _tidy(gravity),
             "noise": {
-                "sensor": {"sigma_mps2": grid["sensor_sigma_mps2"][0]},
-                "robot": {"sigma_mgon": robot},
+                "sensor": {"sigma_mps2": _tidy(sigma[0])},
+                "robot": {"sigma_mgon": _tidy(robot_accuracy / MGON)},
             },
             "grids": [grid],
         },
@@ -244,12 +258,12 @@ def simulate(
     cells = _with_truth(study.cells, truth)
     if not any(cell.estimability.estimable for cell in cells):
         raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
-    return Simulation(tuple(simulated_statistics(cell, seed, LEVELING) for cell in cells))
+    return Simulation([simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
 
 
-def _si(name: str, value: float | str, given: Given, unit: float = 1.0) -> float:
-    """Quantity in a unit of the configuration."""
-    return float(f"{quantity(name, value, given) / unit:.{DIGITS}g}")
+def _tidy(value: float) -> float:
+    """Quantity of a configuration, so that 3.2 mgon stays that number."""
+    return float(f"{value:.12g}")
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:

@@ -3,34 +3,40 @@
 from __future__ import annotations
 
 import difflib
+import re
 import reprlib
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 
-BY_COMMAND: ContextVar[bool] = ContextVar("by_command", default=False)
-"""Whether the user came by the command line, so that messages name its options."""
+OPTIONS: ContextVar[Mapping[str, str] | None] = ContextVar("options", default=None)
+"""Options of the command that runs, by the keywords that they are; None in a program."""
 
 
-def key(name: str, option: str = "") -> str:
-    """Spell the name of a keyword for who gave it: --time-unit on a command line, else time_unit.
+def key(name: str) -> str:
+    """Spell the name of a keyword as its user does: --time-unit on a command line, or time_unit."""
+    options = OPTIONS.get()
+    return name if options is None else options.get(name, f"--{name.replace('_', '-')}")
 
-    Parameters
-    ----------
-    name : str, of the keyword
-    option : str, of the option, where it has another name
+
+def for_user(text: str) -> str:
+    """Spell the keywords in a text, which stand in backticks, as options of the command that runs.
+
+    Words in backticks that are no keywords of it, such as commands and keys of files, stay.
     """
-    return f"--{(option or name).replace('_', '-')}" if BY_COMMAND.get() else name
+    options = OPTIONS.get() or {}
+    return re.sub(r"`(\w+)`", lambda word: options.get(word[1], word[0]), text)
 
 
 class InputError(ValueError):
     """Input that cannot be used; the message says where, what is wrong and what would be right.
 
     The message may quote a file. So characters that control a terminal are spelled out in it.
+    Keywords stand in backticks in it, see `for_user`.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(printable(message))
+        super().__init__(printable(for_user(message)))
 
 
 def printable(text: str) -> str:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from accelstudy.basics.errors import BY_COMMAND, printable
+from accelstudy.basics.errors import OPTIONS, for_user, printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -53,18 +53,18 @@ def show(text: str) -> None:
 
     It may quote a file, so characters that control a terminal are spelled out.
     """
-    click.echo("\n".join(map(printable, text.split("\n"))))
+    click.echo("\n".join(map(printable, for_user(text).split("\n"))))
 
 
 def begin(text: str) -> None:
     """Say on standard error that long work begins, where no bar can show it: it is no terminal."""
-    if BY_COMMAND.get() and not _quiet.get() and not sys.stderr.isatty():
+    if OPTIONS.get() is not None and not _quiet.get() and not sys.stderr.isatty():
         click.echo(text, err=True)
 
 
 def warn(text: str) -> None:
     """Print a warning on standard error, whether the command is quiet or not."""
-    click.echo(f"warning: {printable(text)}", err=True)
+    click.echo(f"warning: {printable(for_user(text))}", err=True)
 
 
 def failure(what: str, error: Exception) -> str:

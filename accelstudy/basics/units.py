@@ -211,7 +211,9 @@ _SPELLINGS = {"µ": "u", "μ": "u", "²": "^2", "°C": "degC", "°": "deg", "√
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
 
 
-def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float = math.inf) -> float:
+def parse_quantity(
+    text: str, unit: str, least: float = -math.inf, most: float = math.inf, bare: bool = False
+) -> float:
     """Read a number with its unit, as a person writes it: 10mgon, 0.01°, 2 mm/s2, 22.5µg/√Hz.
 
     Parameters
@@ -219,6 +221,7 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
     text : str
     unit : str, SI unit of the quantity
     least, most : float, in that unit, both allowed
+    bare : bool, whether a number without a unit is one in that unit
 
     Returns
     -------
@@ -231,10 +234,11 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
     """
     match = _QUANTITY.fullmatch(text)
     known = UNITS.get(unit, {unit: 1.0})
-    if match is None or not (match[2] or float(match[1]) == 0):
-        example = f"2{next(iter(known))}"
-        raise InputError(f"expected a number with its unit, as {example}, not {shown(text)}")
-    given = match[2] or next(iter(known))
+    if match is None or not (match[2] or bare or float(match[1]) == 0):
+        example = f"2{next(iter(known))}" if unit != "1" else "2"
+        number = "a number" if bare else "a number with its unit"
+        raise InputError(f"expected {number}, as {example}, not {shown(text)}")
+    given = match[2] or (unit if bare else next(iter(known)))
     for spelling, plain in _SPELLINGS.items():
         given = given.replace(spelling, plain)
     given = re.sub(r"(?<=[a-zA-Z])2", "^2", given)
@@ -245,6 +249,8 @@ def parse_quantity(text: str, unit: str, least: float = -math.inf, most: float =
         ends = [f"at least {least / known[given]:.6g}"] if least > -math.inf else []
         ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
         raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
+    if math.isinf(value):
+        raise InputError(f"{shown(text)}: must be a finite number")
     return value
 
 
@@ -257,16 +263,18 @@ class Given:
     unit : str, SI
     usual : str, with its unit; empty if there is none
     least, most : float, SI, both allowed
+    bare : bool, whether a number without a unit is one in SI, also as a text
     """
 
     unit: str
     usual: str = ""
     least: float = 0.0
     most: float = math.inf
+    bare: bool = False
 
     def read(self, text: str) -> float:
         """Value of a text with its unit, SI; raises `InputError` if it is not one."""
-        return parse_quantity(text, self.unit, self.least, self.most)
+        return parse_quantity(text, self.unit, self.least, self.most, self.bare)
 
     @property
     def value(self) -> float:

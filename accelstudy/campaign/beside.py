@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.applying import Calibration, read_calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
 from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout
@@ -52,7 +52,7 @@ QUARTER_TURNS = tuple(
 LEAST = 8
 """Holds from which on it is checked that both sensors turn together."""
 
-REMEDIES = Remedies(*["it is read in the unit of the log of which --reference was made"] * 3)
+REMEDIES = Remedies(*["it is read in the unit of the log of which `reference` was made"] * 3)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Beside:
     """The open log of a reference, and its calibration."""
 
     given: ReferenceLog
-    calibration: Calibration
+    calibration: SensorCalibration
     log: Recording
 
     @classmethod
@@ -112,7 +112,7 @@ class Beside:
         means = np.array([segment.mean for segment in segments.values()])
         raw = means / self.log.first.conversion.scale[0]
         check_norm(
-            f"--reference-log {self.given.log}",
+            f"`reference_log` {self.given.log}",
             raw,
             means,
             self.log.first.layout.unit,
@@ -124,9 +124,9 @@ class Beside:
         moving = [n for n, s in segments.items() if s.variance > (WANDERING * rest.sd) ** 2]
         if len(moving) > len(segments) / 2:
             raise InputError(
-                f"--reference-log {self.given.log}: the reference moves in {len(moving)} of "
+                f"`reference_log` {self.given.log}: the reference moves in {len(moving)} of "
                 f"{len(segments)} holds; is it on one plate with the sensor, and are its times "
-                "right (--reference-offset)?"
+                "right (`reference_offset`)?"
             )
         for n in moving:
             lost[n] = f"the reference moves: its sd is {np.sqrt(segments.pop(n).variance):.2g} m/s²"
@@ -154,10 +154,10 @@ class Beside:
                 segments[n] = Segment.of(samples, inside)
         if not segments:
             raise InputError(
-                f"--reference-log {self.given.log}: runs from {time[0]:.6g} s to {time[-1]:.6g} s "
+                f"`reference_log` {self.given.log}: runs from {time[0]:.6g} s to {time[-1]:.6g} s "
                 f"of the time of {log.path}, whose holds lie from {holds.t0[0]:.6g} s to "
                 f"{holds.t1[-1]:.6g} s: all are left out, the first because "
-                f"{next(iter(lost.values()))}; --reference-offset gives the seconds to add to the "
+                f"{next(iter(lost.values()))}; `reference_offset` gives the seconds to add to the "
                 "times of the reference"
             )
         return segments, lost
@@ -200,7 +200,7 @@ class Beside:
         if angles_in_log := locate(log.first.source, {}, ("roll", "pitch"), needed=False):
             warnings.append(
                 f"{log.path}: columns {', '.join(angles_in_log)} are left out: roll and pitch are "
-                "those of --reference-log"
+                "those of `reference_log`"
             )
         notes = [
             f"reference: {self.given.log}, {self._clock(log)}; its axes x, y, z point "
@@ -225,7 +225,7 @@ class Beside:
         InputError
             If a rotation does not explain them, or it is not small beside the quarter turns.
         """
-        log = f"--reference-log {self.given.log}"
+        log = f"`reference_log` {self.given.log}"
         if len(own) >= LEAST:
             design = np.column_stack([own, np.ones(len(own))])
             left = forces - design @ np.linalg.lstsq(design, forces, rcond=None)[0]
@@ -234,7 +234,7 @@ class Beside:
                 raise InputError(
                     f"{log}: the two sensors do not turn together: their forces differ by "
                     f"{misfit:.2g} g, whatever the rotation between them; are they on one plate, "
-                    "and are the times of the reference right (--reference-offset)?"
+                    "and are the times of the reference right (`reference_offset`)?"
                 )
         left_side, _, right_side = np.linalg.svd(forces.T @ own)
         turn = left_side @ np.diag([1, 1, np.linalg.det(left_side @ right_side)]) @ right_side
@@ -250,7 +250,9 @@ class Beside:
         return best
 
 
-def reference_sensor(calibration: Calibration, sigma: float, frame: Frame = FRD) -> ReferenceSensor:
+def reference_sensor(
+    calibration: SensorCalibration, sigma: float, frame: Frame = FRD
+) -> ReferenceSensor:
     """Reference with a calibration, a noise of its means, m/s², and its axes."""
     return ReferenceSensor(
         calibration=calibration.content["campaign"],
@@ -262,7 +264,7 @@ def reference_sensor(calibration: Calibration, sigma: float, frame: Frame = FRD)
     )
 
 
-def usable_reference(path: Path) -> Calibration:
+def usable_reference(path: Path) -> SensorCalibration:
     """Read the calibration of a reference.
 
     Raises
@@ -270,7 +272,7 @@ def usable_reference(path: Path) -> Calibration:
     InputError
         If it tells no angles with their sigmas.
     """
-    calibration, where = read_calibration(path), f"--reference {path}"
+    calibration, where = read_calibration(path), f"`reference` {path}"
     quality = calibration.content["quality"]
     if not quality["plausible"]:
         why = "; ".join(quality["warnings"])
@@ -288,21 +290,21 @@ def usable_reference(path: Path) -> Calibration:
     return calibration
 
 
-def _opened(given: ReferenceLog, calibration: Calibration) -> Recording:
+def _opened(given: ReferenceLog, calibration: SensorCalibration) -> Recording:
     """Open the log of a reference; it is read like that of its calibration."""
     columns = dict(given.columns)
     if unknown := [key for key in columns if key not in (*AXES, "time")]:
         raise InputError(
-            f"--reference-columns: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
+            f"`reference_columns`: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
         )
     time = {"time": columns.pop("time")} if "time" in columns else {}
-    layout = checked(LogLayout, {**time, "columns": columns}, "--reference-columns")
+    layout = checked(LogLayout, {**time, "columns": columns}, "`reference_columns`")
     try:
         log = read_log(given.log, layout, like=calibration.usual_layout, conditions=("time",))
     except InputError as error:
         said = re.split("; give the column of time|; the columns are those", str(error))[0]
         raise InputError(
-            f"--reference-log {said}; it is read like the log of --reference, and "
-            "--reference-columns fx=…,fy=…,fz=…,time=… names other columns"
+            f"`reference_log` {said}; it is read like the log of `reference`, and "
+            "`reference_columns` fx=…,fy=…,fz=…,time=… names other columns"
         ) from None
     return Recording([log])

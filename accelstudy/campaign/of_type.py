@@ -91,7 +91,7 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
     if {*read.parameters} != {*model.parameter_names}:
         raise InputError(
             f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "
-            f"{', '.join(model.parameter_names)}; give --model {path}"
+            f"{', '.join(model.parameter_names)}; give `model` {path}"
         )
     if read.sensors < FEWEST:
         raise InputError(

@@ -9,25 +9,21 @@ from typing import Any
 
 import click
 
-from accelstudy.basics.errors import BY_COMMAND, InputError
+from accelstudy.basics.errors import OPTIONS, InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
-from accelstudy.commands.advise import advise_command
-from accelstudy.commands.apply import apply_command
-from accelstudy.commands.cells import cells_command
-from accelstudy.commands.claims import claims_command
-from accelstudy.commands.config_schema import config_schema_command
-from accelstudy.commands.data_sheet import data_sheet_command
-from accelstudy.commands.design import design_command
-from accelstudy.commands.effects import effects_command
+from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN
+from accelstudy.commands.campaigns import (
+    ADVISE,
+    APPLY,
+    DATA_SHEET,
+    DESIGN,
+    IMPORT,
+    PUBLIC,
+    SIMULATE_CAMPAIGN,
+)
+from accelstudy.commands.choices import EFFECTS, MODELS, SCHEME, SCHEMES
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
-from accelstudy.commands.importing import import_command
-from accelstudy.commands.init import init_command
-from accelstudy.commands.models import models_command
-from accelstudy.commands.options import ANGLE_UNIT, plugin_option
-from accelstudy.commands.public import public_command
-from accelstudy.commands.scheme import scheme_command
-from accelstudy.commands.schemes import schemes_command
-from accelstudy.commands.simulate_campaign import simulate_campaign_command
+from accelstudy.commands.studies import CELLS, CLAIMS, CONFIG_SCHEMA, INIT
 from accelstudy.commands.verbs import (
     CALIBRATE,
     CHECK_SIGMAS,
@@ -41,35 +37,35 @@ from accelstudy.commands.verbs import (
 
 SECTIONS: dict[str, tuple[click.Command, ...]] = {
     "Campaigns, measured or simulated": (
-        import_command,
-        public_command,
-        simulate_campaign_command,
-        advise_command,
+        IMPORT,
+        PUBLIC,
+        SIMULATE_CAMPAIGN,
+        ADVISE,
         CALIBRATE,
         DIAGNOSE,
         LOT,
         CHECK_SIGMAS,
-        apply_command,
+        APPLY,
         EXPORT,
         COMPARE,
         HISTORY,
     ),
     "Before a calibration, and what it is worth": (
         PLAN,
-        data_sheet_command,
+        DATA_SHEET,
     ),
     "What there is to choose from": (
-        models_command,
-        effects_command,
-        schemes_command,
-        scheme_command,
-        design_command,
+        MODELS,
+        EFFECTS,
+        SCHEMES,
+        SCHEME,
+        DESIGN,
     ),
     "Studies": (
-        init_command,
-        cells_command,
-        claims_command,
-        config_schema_command,
+        INIT,
+        CELLS,
+        CLAIMS,
+        CONFIG_SCHEMA,
     ),
 }
 """Commands in the order of use."""
@@ -100,12 +96,12 @@ class Commands(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the command line; also its help may meet a full disk."""
-        token = BY_COMMAND.set(True)
+        token = OPTIONS.set({})
         try:
             with bad_input_as_one_line():
                 return super().main(*args, **kwargs)
         finally:
-            BY_COMMAND.reset(token)
+            OPTIONS.reset(token)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -128,14 +124,14 @@ class Commands(click.Group):
 @click.option(
     "--angle-unit",
     metavar="[gon|deg]",
-    type=ANGLE_UNIT,
+    type=ANGLE_UNITS,
     default="gon",
     show_default=True,
     envvar=ANGLE_UNIT_VARIABLE,
     show_envvar=True,
     help="Unit in which commands, pages and figures show angles, gon or deg.",
 )
-@plugin_option()
+@click.option("--plugin", **PLUGIN)
 @click.pass_context
 def main(ctx: click.Context, angle_unit: str) -> None:
     """Monte Carlo study of accelerometer calibration for leveling.
@@ -148,8 +144,3 @@ def main(ctx: click.Context, angle_unit: str) -> None:
     reaches the accuracy or the command was broken off, and 2 if an input or an option is wrong.
     """
     ctx.with_resource(angles_in(angle_unit))
-
-
-# After the command's name it is taken, too, without a line in the help of each.
-for command in main.commands.values():
-    plugin_option(hidden=True)(command)

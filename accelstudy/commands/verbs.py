@@ -9,7 +9,6 @@ import click
 
 from accelstudy.basics.progress import say, warn
 from accelstudy.commands.bridge import command
-from accelstudy.commands.options import retired_option
 from accelstudy.files import outputs
 from accelstudy.verbs import calibrations, planning, sensors
 
@@ -57,6 +56,7 @@ LOT = command(
     sensors.lot,
     "accelstudy lot sensor-1 sensor-2 sensor-3 --out lot",
     writes=outputs.LOT,
+    reads=sensors.folders_of,
 )
 CHECK_SIGMAS = command(
     calibrations.check_sigmas,
@@ -67,9 +67,9 @@ EXPORT = command(
     calibrations.export,
     "accelstudy export calibrated/calibration.json --form c",
     run=run_export,
+    retired={"--level!": LEVELED},
     angles=False,
 )
-retired_option("--level", LEVELED, is_flag=True)(EXPORT)
 COMPARE = command(
     sensors.compare,
     "accelstudy compare spring/calibration.json autumn/calibration.json --out both",
@@ -89,21 +89,9 @@ PLAN = command(
     optional=True,
     sections={
         "What is asked": (
-            "tilt_accuracy",
-            "tilt_range",
-            "sensor",
-            "sigma",
-            "history",
-            "equipment",
-            "reference",
-            "confidence",
+            "tilt_accuracy tilt_range sensor sigma history equipment reference confidence"
         ),
-        "What is tried": ("holds", "schemes", "max_time", "max_positions", "replicates", "seed"),
-        "What the equipment takes": (
-            "moving_time",
-            "robot_moving_time",
-            "robot_setup_time",
-            "robot_accuracy",
-        ),
+        "What is tried": "holds schemes max_time max_positions replicates seed",
+        "What the equipment takes": "moving_time robot_moving_time robot_setup_time robot_accuracy",
     },
 )

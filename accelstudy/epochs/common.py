@@ -17,7 +17,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.device import KNOWN, USUAL
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
@@ -53,13 +53,13 @@ class Common:
     covariances: Array
     dof: Array
 
-    def missing_in(self, one: Calibration) -> list[str]:
+    def missing_in(self, one: SensorCalibration) -> list[str]:
         """Effects of the sensor that a calibration has, and another one lacks."""
         common = [effect.spec for effect in self.model.effects]
         return [spec for spec in _effects(one) if spec not in common]
 
 
-def in_common(calibrations: Sequence[Calibration]) -> Common:
+def in_common(calibrations: Sequence[SensorCalibration]) -> Common:
     """Bring calibrations of one sensor to the effects that all of them have.
 
     Raises
@@ -99,7 +99,7 @@ def in_common(calibrations: Sequence[Calibration]) -> Common:
     return Common(model, np.array(values), np.array(covariances), dof)
 
 
-def session_like(like: Calibration, directions: Array) -> Campaign:
+def session_like(like: SensorCalibration, directions: Array) -> Campaign:
     """Session in which gravity has some directions, under the conditions of a calibration."""
     n, forces = len(directions), -like.gravity * directions
     columns = {}
@@ -119,13 +119,13 @@ def session_like(like: Calibration, directions: Array) -> Campaign:
     )
 
 
-def _effects(calibration: Calibration) -> list[str]:
+def _effects(calibration: SensorCalibration) -> list[str]:
     """Effects of the sensor: the rig of a session stays behind."""
     return [effect.spec for effect in calibration.model.effects if effect.part == "sensor"]
 
 
 def _brought_to(
-    calibration: Calibration, model: SensorModel, like: Calibration
+    calibration: SensorCalibration, model: SensorModel, like: SensorCalibration
 ) -> tuple[Array, Array]:
     """Parameters (p,) and covariance matrix (p, p) of a model with fewer effects."""
     own = calibration.model

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.applying import Calibrated, Calibration, applicable
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common, session_like
 from accelstudy.epochs.congruence import Epochs, Test
@@ -31,13 +31,13 @@ class Comparison:
 
     Attributes
     ----------
-    first, second : Calibration
+    first, second : SensorCalibration
     common : Common, the effects that both have
     tilt_range : float, rad
     """
 
-    first: Calibration
-    second: Calibration
+    first: SensorCalibration
+    second: SensorCalibration
     common: Common
     tilt_range: float
 
@@ -91,22 +91,21 @@ class Comparison:
         by_chance = np.einsum("auw,uw->a", error.quadratic, self.epochs.covariance)
         return np.sqrt([np.where(error.constant > NOTHING**2, error.constant, 0.0), by_chance])
 
-    def only_in(self, one: Calibration) -> list[str]:
+    def only_in(self, one: SensorCalibration) -> list[str]:
         """Effects of the sensor that one of the calibrations has, and the other lacks."""
         return self.common.missing_in(one)
 
 
 def compare(
-    first: Calibration | Calibrated,
-    second: Calibration | Calibrated,
+    first: SensorCalibration,
+    second: SensorCalibration,
     tilt_range: float = MAX_TILT_GON * GON,
 ) -> Comparison:
     """Compare two calibrations of one sensor.
 
     Parameters
     ----------
-    first, second : what `accelstudy.calibrate` returns or `read_calibration` reads, the older one
-        first
+    first, second : SensorCalibration, the older one first
     tilt_range : float, rad, over which tilts are compared
 
     Raises
@@ -114,5 +113,4 @@ def compare(
     InputError
         As `in_common`.
     """
-    pair = applicable(first), applicable(second)
-    return Comparison(*pair, in_common(pair), tilt_range)
+    return Comparison(first, second, in_common((first, second)), tilt_range)

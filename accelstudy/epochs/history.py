@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
-from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import Calibrated, Calibration, applicable
+from accelstudy.basics.errors import InputError, key
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.effects import Parameter
 from accelstudy.epochs.common import Common, in_common
 from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, noncentrality, tail
@@ -181,12 +181,12 @@ class History:
 
     Attributes
     ----------
-    calibrations : tuple of n Calibration
+    calibrations : tuple of n SensorCalibration
     dates : tuple of n datetime
     common : Common, the effects that all have
     """
 
-    calibrations: tuple[Calibration, ...]
+    calibrations: tuple[SensorCalibration, ...]
     dates: tuple[datetime, ...]
     common: Common
 
@@ -220,12 +220,8 @@ class History:
         return tuple(course.found(self.level) for course in self.courses)
 
 
-def history_of(
-    calibrations: Sequence[Calibration | Calibrated], dates: Sequence[datetime]
-) -> History:
+def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[datetime]) -> History:
     """Put calibrations of one sensor in the order of time, and bring them to common effects.
-
-    They are what `accelstudy.calibrate` returns or `read_calibration` reads, each with its date.
 
     Raises
     ------
@@ -238,11 +234,10 @@ def history_of(
             "takes two"
         )
     if len(set(dates)) < 2:
-        raise InputError("--date: all are the same; a rate needs two dates or more")
-    given = [applicable(one) for one in calibrations]
-    common = in_common(given)
+        raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
+    common = in_common(calibrations)
     order = sorted(range(len(dates)), key=dates.__getitem__)
     ordered = Common(
         common.model, common.values[order], common.covariances[order], common.dof[order]
     )
-    return History(tuple(given[i] for i in order), tuple(dates[i] for i in order), ordered)
+    return History(tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered)

@@ -82,6 +82,11 @@ STUDY = Kind(
     ("profiles", "campaigns/example"),
     replaced=False,
 )
+SIMULATION = Kind(
+    "simulation",
+    "cells.parquet",
+    ("summary.parquet", "correlations.parquet", "leveling.parquet", "quantiles.parquet"),
+)
 _KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, PLAN, COMPARISON, HISTORY, LOT)
 
 
@@ -138,7 +143,7 @@ def new_file(
         if path.is_dir() or (path.exists() and not path.is_file()):
             raise InputError(f"{path}: is no file; give the name of a file to write")
         if os.path.lexists(path) and not force:
-            raise InputError(f"{path}: is there already; --force replaces it")
+            raise InputError(f"{path}: is there already; `force` replaces it")
         with whole_file(path) as temporary:
             stages.append(temporary)
             yield temporary
@@ -256,7 +261,7 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
     if not force and (earlier is None or not kind.replaced):
         shown = ", ".join(there[:3]) + (", …" if len(there) > 3 else "")
         raise InputError(
-            f"{out}: is not empty ({shown}); give another folder, or --force to replace the files "
+            f"{out}: is not empty ({shown}); give another folder, or `force` to replace the files "
             f"of a {kind.name} in it"
         )
     return earlier is kind

@@ -173,7 +173,11 @@ class Configuration(Block):
 
 
 def checked(
-    model: type[Model], content: Mapping[str, Any], source: str | Path, section: str = ""
+    model: type[Model],
+    content: Mapping[str, Any],
+    source: str | Path,
+    section: str = "",
+    names: Mapping[str, str] | None = None,
 ) -> Model:
     """Check what was read from a file against a pydantic model.
 
@@ -183,6 +187,9 @@ def checked(
     content : mapping, as read from YAML or JSON
     source : str or path, named in errors
     section : str, key of `source` under which `content` stands
+    names : mapping of str to str, optional
+        Keys that are not of the source, as they were given on the command line, to what they are
+        called there; then the error does not name the source.
 
     Returns
     -------
@@ -196,7 +203,11 @@ def checked(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_error(error, content, model, section)}") from None
+        text = _first_error(error, content, model, section)
+        for key, name in (names or {}).items():
+            if text.startswith((f"{key}: ", f"{key}.")):
+                raise InputError(f"{name}{text.removeprefix(key)}") from None
+        raise InputError(f"{source}: {text}") from None
 
 
 def _first_error(

@@ -12,7 +12,7 @@ import numpy as np
 
 from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
@@ -182,7 +182,7 @@ def question_of(
     """
     if (sensor is None) == (sigma is None):
         raise InputError(
-            "plan: give the sensor by --sensor, or its noise by --sigma"
+            "plan: give the sensor by `sensor`, or its noise by `sigma`"
             + (", not both" if sensor else "")
         )
     by_hand = Equipment("gravity", moving_time, 0.0)
@@ -230,7 +230,7 @@ def _of_calibration(path: Path) -> ReferenceSensor:
     calibration = usable_reference(path)
     sigma = calibration.content["sigma_position_mps2"]
     if not sigma:
-        raise InputError(f"--reference {path}: it does not tell the noise of a position")
+        raise InputError(f"{key('reference')} {path}: it does not tell the noise of a position")
     return reference_sensor(calibration, sigma)
 
 
@@ -260,7 +260,7 @@ def confidence_of(text: str) -> float | None:
         share = math.nan
     if not 0.5 <= share <= 0.999:
         raise InputError(
-            f"--confidence: must be rms, or a share from 50% to 99.9% of the calibrations, "
+            f"{key('confidence')}: must be rms, or a share from 50% to 99.9% of the calibrations, "
             f"not {text!r}"
         )
     return share

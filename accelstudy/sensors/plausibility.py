@@ -31,8 +31,8 @@ LARGEST = {
 and 4 %. What is clearly beyond both comes from a wrong unit, range, offset or sign. The tilt of a
 rig and the zeros of its circles depend on its set-up, not on its quality."""
 USUAL_CAUSE = (
-    "The usual cause is a wrong --scale, --offset, --unit or --gravity of the import, or a wrong "
-    "sign, axis or row."
+    "The usual cause is a wrong scale, offset, unit or gravity of the import, or a wrong sign, "
+    "axis or row."
 )
 """What to check if no sensor can have some parameters."""
 

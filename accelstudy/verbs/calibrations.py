@@ -5,14 +5,30 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
+from accelstudy.api.given import LAYOUT, SIGMA_READING, START
 from accelstudy.basics.bounds import Range
-from accelstudy.verbs.kinds import ApproachName, File, ModelName, Seed, verb
+from accelstudy.verbs.kinds import (
+    ColumnsOf,
+    Delimiter,
+    ModelName,
+    Quantity,
+    Rate,
+    Seed,
+    Time,
+    TimeUnit,
+    TypeFile,
+    Unit,
+    UsualApproach,
+    Variable,
+    verb,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy.api.calibrations import Calibration
     from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.api.logs import Log
     from accelstudy.campaign.session import Campaign
 
 
@@ -21,8 +37,8 @@ def calibrate(
     campaign: Campaign | str | PathLike[str],
     *,
     model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName | None = None,
-    prior: File | None = None,
+    approach: UsualApproach = None,
+    prior: TypeFile = None,
 ) -> Calibration:
     """Calibrate a campaign and report on it.
 
@@ -34,13 +50,6 @@ def calibrate(
     ----------
     campaign : Campaign or path
         Folder of the campaign.
-    model : str
-        A model: one that `accelstudy models` lists, a composition, or a YAML file.
-    approach : str
-        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
-        campaign has its angles]
-    prior : path
-        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
 
     Raises
     ------
@@ -78,7 +87,7 @@ def check_sigmas(
     campaign: Campaign | str | PathLike[str],
     *,
     model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName | None = None,
+    approach: UsualApproach = None,
     replicates: Annotated[int, Range(2, 10**9)] = 2000,
     seed: Seed = 1,
 ) -> pd.DataFrame:
@@ -91,15 +100,8 @@ def check_sigmas(
     ----------
     campaign : Campaign or path
         Folder of the campaign that is calibrated.
-    model : str
-        A model: one that `accelstudy models` lists, a composition, or a YAML file.
-    approach : str
-        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
-        campaign has its angles]
     replicates : int
         Simulated campaigns.
-    seed : int
-        Seed of all random numbers.
 
     Returns
     -------
@@ -116,6 +118,66 @@ def check_sigmas(
     table = sigma_check.check_sigmas(fit, replicates, seed)
     table.attrs["finds"] = sigma_check.what_it_finds(fit)
     return table
+
+
+@verb
+def apply(
+    calibration: Calibration | str | PathLike[str],
+    log: Log | str | PathLike[str] | pd.DataFrame,
+    *,
+    columns: ColumnsOf = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    rate: Rate = None,
+    delimiter: Delimiter = None,
+    variable: Variable = None,
+    unit: Unit = None,
+    start: Annotated[Quantity | None, START] = None,
+    sigma: Annotated[Quantity | None, SIGMA_READING] = None,
+) -> pd.DataFrame:
+    """Apply a calibration to a log and level with it.
+
+    The log is read as that of the campaign was; `columns` and the like say what is different. The
+    output has its columns, and beside them the calibrated force, roll and pitch with their sigmas,
+    in the axes of the log. A row that cannot be corrected stays empty. Where the x axis is so near
+    the vertical that the sigmas of roll and pitch do not hold, near_pole is true.
+
+    Some effects depend on the time since the calibration session began. The first row is taken for
+    that moment. This is right for the log of the session itself, and for a warm-up if the log
+    begins when the sensor is switched on. For a log that begins later give `start`. A drift is
+    known in its session only; later rows are corrected by what it was at the end. Hysteresis and
+    settling depend on the position before, which a log does not tell; they are not corrected.
+
+    Parameters
+    ----------
+    calibration : Calibration or path
+        A calibration.json.
+    log : Log or path or DataFrame
+        Any log that `accelstudy import` reads.
+    time_unit : str
+        Unit of the time: s, ms, us or ns.
+    delimiter : str
+        Between columns of text: ; or tab or blank.
+    unit : str
+        Unit of the readings: m/s^2, g, mg or counts.
+    start : float in s, or str with a unit
+        Seconds from the start of the calibration session to the first row. [default: 0]
+    sigma : float in m/s², or str with a unit
+        Sd of a reading, m/s². [default: as within the holds of the campaign]
+
+    Returns
+    -------
+    DataFrame
+        The columns of the log, the calibrated force in m/s², roll and pitch in the unit that the
+        names say, and their sigmas; a DataFrame keeps its index. Warnings stand in
+        ``attrs["warnings"]``.
+    """
+    given = {**locals()}
+    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.api.logs import log_of
+
+    layout = {name: given[name] for name in LAYOUT if name in given}
+    return as_calibration(calibration).apply(log_of(log, layout), start=start, sigma=sigma)
 
 
 @verb
@@ -157,8 +219,8 @@ def diagnose(
     campaign: Campaign | str | PathLike[str],
     *,
     model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName | None = None,
-    prior: File | None = None,
+    approach: UsualApproach = None,
+    prior: TypeFile = None,
     seed: Seed = 1,
     replicates: Annotated[int, Range(100, 10**9)] = 1000,
 ) -> Diagnosis:
@@ -171,15 +233,6 @@ def diagnose(
     ----------
     campaign : Campaign or path
         Folder of the campaign.
-    model : str
-        A model: one that `accelstudy models` lists, a composition, or a YAML file.
-    approach : str
-        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
-        campaign has its angles]
-    prior : path
-        The type.yaml of a lot: how its sensors scatter, as what is known of this one.
-    seed : int
-        Seed of all random numbers.
     replicates : int
         Sessions simulated with either model; fewer beyond 500 positions.
 

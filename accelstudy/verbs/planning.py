@@ -2,19 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from accelstudy.api.given import GRAVITY
+from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
+from accelstudy.basics.errors import key
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, Given
 from accelstudy.planning.quantities import EQUIPMENT, MOST_POSITIONS, QUANTITIES, REPLICATES
-from accelstudy.verbs.kinds import File, Quantity, SchemeName, Seed, SensorName, Share, verb
+from accelstudy.verbs.kinds import (
+    Accuracy,
+    ApproachName,
+    ColumnsOf,
+    Delimiter,
+    EffectName,
+    File,
+    ModelName,
+    Names,
+    Quantity,
+    Rate,
+    Scale,
+    SchemeName,
+    Seed,
+    SensorName,
+    Share,
+    Tilt,
+    Time,
+    TimeUnit,
+    Unit,
+    UsualApproach,
+    Values,
+    Variable,
+    in_si,
+    verb,
+)
 
 if TYPE_CHECKING:
+    from accelstudy.api.advice import Advised
+    from accelstudy.api.designs import Design
     from accelstudy.api.plans import Plan
+    from accelstudy.api.simulations import Simulation
+    from accelstudy.campaign.session import Campaign
+    from accelstudy.data_sheets.sheet import DataSheet
 
 Hold = Annotated[Quantity, QUANTITIES["hold"]]
+Sigma = Annotated[Quantity, QUANTITIES["sigma"]]
+HalfTurn = Annotated[Quantity, Given("rad", "", -200 * GON, 200 * GON)]
+QuarterTurn = Annotated[Quantity, Given("rad", "", -100 * GON, 100 * GON)]
 
 
 @verb
@@ -76,8 +114,6 @@ def plan(
         Largest number of positions.
     replicates : int
         Simulated calibrations of each candidate at the top.
-    seed : int
-        Seed of all random numbers.
     moving_time : float in s, or str with a unit
         Time from position to position by hand.
     robot_moving_time : float in s, or str with a unit
@@ -125,3 +161,245 @@ def plan(
         question = replace(question, sheet=with_history(question.sheet, Path(history)))
     begin("comparing calibrations, which takes some seconds ...")
     return Plan(answer(question, seed, replicates))
+
+
+@verb
+def find_positions(
+    *,
+    model: ModelName = "bias-scale-nonorthogonality",
+    approach: ApproachName = "robot",
+    positions: Annotated[int, Range(1, 300)] = 24,
+    sigma: Annotated[Quantity, Given("m/s^2")] = "2mm/s^2",
+    robot_sigma: Annotated[Quantity, Given("rad")] = "3.2mgon",
+    gravity_sigma: Annotated[Quantity, Given("m/s^2")] = "0",
+    criterion: str = "I",
+    tilt_range: Annotated[Quantity, Given("rad", "", GON / 10, 100 * GON)] = "50gon",
+    neglect: str | Sequence[str] = (),
+    discriminate: tuple[EffectName, EffectName] | None = None,
+    prior: str | Sequence[str] = (),
+    after: SchemeName | None = None,
+    attitudes: Annotated[
+        str, Names("attitudes", "accelstudy.proposal.request", "SPACES", True)
+    ] = "all",
+    mountings: Annotated[int, Range(1, 9)] | None = None,
+    roll: tuple[HalfTurn, HalfTurn] | None = None,
+    pitch: tuple[QuarterTurn, QuarterTurn] | None = None,
+    pole_distance: Annotated[Quantity, Given("rad", "", 0.0, 100 * GON)] | None = None,
+    least_angle: Annotated[Quantity, Given("rad", "", 0.0, 200 * GON)] | None = None,
+    seed: Seed = 1,
+    starts: Annotated[int, Range(1, 1000)] = 8,
+) -> Design:
+    """Find the best positions for a calibration.
+
+    The YAML file that comes out is a scheme: configurations and commands take its path wherever
+    they take the name of a scheme. The positions are in an order that makes the ways between them
+    short, with the last one near the first.
+
+    Parameters
+    ----------
+    positions : int
+        Number of positions.
+    sigma : float in m/s², or str with a unit
+        Sd of a position's mean.
+    robot_sigma : float in rad, or str with a unit
+        Sd of the robot's roll and pitch.
+    gravity_sigma : float in m/s², or str with a unit
+        Sd of the value of gravity; 0 holds it fixed.
+    criterion : str
+        I: variance of roll and pitch; D: determinant of the parameters' covariance matrix; A: mean
+        variance of the parameters; minimax: variance of the worse of roll and pitch.
+    tilt_range : float in rad, or str with a unit
+        Largest tilt at which the calibrated sensor is used.
+    neglect : str, or several
+        An effect that the model leaves out, though the tilt is to be good, as EFFECT or
+        EFFECT=SIZE. SIZE is the sd of its parameters, by default that of cheap equipment.
+    discriminate : two of str
+        Two effects that are to be told from each other; then the tilt does not count.
+    prior : str, or several
+        Sd of what is known of an effect or a parameter before, as bias=20mg or s_x=500ppm.
+    after : str
+        Scheme that has been measured already.
+    attitudes : str
+        Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that an
+        eye can judge; or a CSV file of those that are allowed.
+    mountings : int
+        How often the sensor may be mounted; each mounting is turned about one horizontal axis.
+    roll : two of float in rad, or str with a unit
+        Least and largest roll.
+    pitch : two of float in rad, or str with a unit
+        Least and largest pitch.
+    pole_distance : float in rad, or str with a unit
+        Least angle to the vertical x axis, where roll is undefined.
+    least_angle : float in rad, or str with a unit
+        Least angle between any two positions.
+    starts : int
+        Number of random sets from which the search starts.
+
+    Raises
+    ------
+    InputError
+        If a name or a value is wrong, or no such positions determine the model.
+    """
+    given = {**locals()}
+    from accelstudy.api.designs import Design
+    from accelstudy.basics.progress import stage
+    from accelstudy.proposal.proposal import Proposal
+    from accelstudy.proposal.request import Request
+    from accelstudy.simulation.sessions import Noise
+
+    sigmas = [given.pop(name) for name in ("sigma", "robot_sigma", "gravity_sigma")]
+    bounds.SIGMA_FORCE.check_key(key("sigma"), sigmas[0])
+    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), sigmas[1] / MGON)
+    bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), sigmas[2])
+    request = Request(noise=Noise(*sigmas), **given)
+    with stage("search"):
+        return Design(Proposal.of(request))
+
+
+@verb
+def advise(
+    campaign: Campaign | str | PathLike[str],
+    *,
+    tilt_accuracy: Accuracy,
+    tilt_range: Tilt = "30gon",
+    approach: UsualApproach = None,
+    model: ModelName = "bias-scale-nonorthogonality",
+    prior: File | None = None,
+    attitudes: Annotated[
+        str | None, Names("attitudes", "accelstudy.sequential.choice", "SETS", True)
+    ] = None,
+    pole_distance: Annotated[Quantity, Given("rad", "", 0.0, 2.0)] | None = None,
+    max_roll: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
+    max_pitch: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
+) -> Advised:
+    """Say in a session where to go next, and when to stop.
+
+    The positions so far are calibrated and judged as `calibrate` does. The advice says what is not
+    determined yet, which positions contradict the others, and the tilt accuracy so far.
+
+    The accuracy is the rms over all calibrations that could have come out. If the noise is known,
+    about half of single ones leave more in roll or in pitch.
+
+    Parameters
+    ----------
+    campaign : Campaign or path
+        Folder of the session. It has a campaign.yaml; its positions.csv may have few positions or
+        none, or be missing still.
+    tilt_accuracy : float in rad, or str with a unit
+        Rms of roll and of pitch to reach, as 10mgon or 0.01deg.
+    tilt_range : float in rad, or str with a unit
+        Largest tilt at which the accuracy is wanted.
+    prior : path
+        An earlier calibration.json with the same model, or the type.yaml of a lot.
+    attitudes : str
+        Attitudes to choose from: cube (faces, edges, corners), grid (roll and pitch in steps of 25
+        gon) or a CSV file. [default: cube, with a robot grid]
+    pole_distance : float in rad, or str with a unit
+        Least angle between the x axis and the vertical. [default: none]
+    max_roll : float in rad, or str with a unit
+        Largest roll, either way. [default: any]
+    max_pitch : float in rad, or str with a unit
+        Largest pitch, either way. [default: any]
+
+    Raises
+    ------
+    InputError
+        If no positions can determine the model, or a name or a value is wrong.
+    """
+    given = {**locals()}
+    from accelstudy.api.advice import Adviser
+    from accelstudy.api.calibrations import as_campaign, place_of
+    from accelstudy.sequential.running import read_as_it_is
+
+    session, place = given.pop("campaign"), place_of(campaign)
+    now = as_campaign(session) if place is None else read_as_it_is(place).campaign
+    return Adviser(now, place, **given)(now)
+
+
+@verb
+def simulate(
+    model: str | Sequence[str],
+    scheme: str | Sequence[str],
+    approach: str | Sequence[str],
+    *,
+    sigma: Sigma | Sequence[Sigma],
+    robot_accuracy: Annotated[Quantity, QUANTITIES["robot_accuracy"]] = "3.2mgon",
+    gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
+    truth: Annotated[Mapping[str, float | str] | None, Values()] = None,
+    replicates: Annotated[int, Range(2, bounds.REPLICATES.most)] = 1000,
+    seed: Seed = 1,
+) -> Simulation:
+    """Simulate the calibrations of one set-up, or of every combination of several.
+
+    A study of the workflow with the same cells, noise and seed gives the same numbers.
+
+    Parameters
+    ----------
+    model, scheme, approach : str, or several
+        A name or a file.
+    sigma : float in m/s², or str with a unit, or several
+        Noise of the mean of a position.
+    robot_accuracy : float in rad, or str with a unit
+        Standard deviation of the robot's roll and pitch.
+    gravity : float in m/s², or str with a unit
+        Local gravity.
+    truth : mapping of str to float, or str with a unit
+        True values of parameters; 0 if omitted. Of several models each has those that are its own.
+    replicates : int
+        Calibrations of each set-up.
+
+    Raises
+    ------
+    InputError
+        If a name or a value is wrong, or the positions do not determine any of the models.
+    """
+    from accelstudy.api.given import names
+    from accelstudy.api.simulations import simulated
+
+    given = {"model": model, "scheme": scheme, "approach": approach}
+    chosen = {name: names(name, value) for name, value in given.items()}
+    noise: dict[str, Any] = {"sigma": sigma, "robot_accuracy": robot_accuracy}  # in SI by `verb`
+    return simulated(
+        chosen, **noise, gravity=in_si(gravity), truth=truth, replicates=replicates, seed=seed
+    )
+
+
+@verb
+def data_sheet(
+    source: str | PathLike[str],
+    *,
+    columns: ColumnsOf = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    rate: Rate = None,
+    delimiter: Delimiter = None,
+    variable: Variable = None,
+    unit: Unit = None,
+    scale: Scale = None,
+    settings: File | None = None,
+) -> DataSheet:
+    """Make a data sheet of a sensor from a log or a campaign.
+
+    White noise, bias instability and random walk come from the Allan deviation of the log; of a
+    campaign only the noise of its positions is known. What the maker says can be added to the file,
+    which `accelstudy plan --sensor` takes.
+
+    Parameters
+    ----------
+    source : path
+        A log in which the sensor rests, the longer the better, or the folder of a campaign.
+    settings : path
+        YAML file with these settings, as for an import.
+
+    Raises
+    ------
+    InputError
+        If the source cannot be read, or tells too little.
+    """
+    given = {**locals()}
+    from accelstudy.api.campaigns import settings_of
+    from accelstudy.api.given import path_of
+    from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
+
+    path = path_of("source", given.pop("source"))
+    return sheet_of_campaign(path) if path.is_dir() else sheet_of_log(path, settings_of(given))

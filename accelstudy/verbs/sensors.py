@@ -12,11 +12,11 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.verbs.kinds import (
     Accuracy,
-    ApproachName,
     ModelName,
     Seed,
     Share,
     Tilt,
+    UsualApproach,
     in_si,
     paths,
     verb,
@@ -63,7 +63,7 @@ def compare(
     from accelstudy.api.epochs import Comparison
     from accelstudy.epochs.comparison import compare as compared
 
-    pair = as_calibration(first, "first"), as_calibration(second, "second")
+    pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
     return Comparison(compared(*pair, in_si(tilt_range)))
 
 
@@ -123,7 +123,7 @@ def lot(
     campaigns: Sequence[Campaign | str | PathLike[str]],
     *,
     model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName | None = None,
+    approach: UsualApproach = None,
     seed: Seed = 1,
     cores: Annotated[int, Range(1, 10_000)] = 1,
 ) -> Lot:
@@ -142,13 +142,6 @@ def lot(
     campaigns : sequence of Campaign or path
         Folders of campaigns, one per sensor, patterns such as 'sensor-*', or the list of a batch
         (a YAML file).
-    model : str
-        A model: one that `accelstudy models` lists, a composition, or a YAML file.
-    approach : str
-        Calibrate by gravity alone, or with the angles of a robot, too. [default: robot, if the
-        campaign has its angles]
-    seed : int
-        Seed of all random numbers.
     cores : int
         Processes that work at once; the results do not depend on it.
 

@@ -27,7 +27,7 @@ def own_options():
 def _command(command, top):
     context = click.Context(command, info_name=command.name, parent=top)
     options = _options(command, context)
-    said = [(f"`{name}`", text) for name, text in getattr(command, "meanings", {}).items()]
+    said = [(f"`{name}`", text) for name, text in command.meanings().items()]
     own = dict(getattr(command, "sections", {}))
     named = {title: [options.pop(name) for name in names] for title, names in own.items()}
     usage = command.get_usage(context).removeprefix("Usage: ")

@@ -1,6 +1,8 @@
 """Docstrings of the Python pages: apart what a parameter is and what it means."""
 
+import inspect
 import re
+from importlib import import_module
 
 import griffe
 
@@ -27,6 +29,10 @@ class Meanings(griffe.Extension):
     """Rewrites docstrings before they are parsed."""
 
     def on_object(self, *, obj, **_):
-        """Rewrite one."""
+        """Rewrite one; that of a verb has the meanings of the kinds of its keywords, too."""
+        verb = obj.path.startswith("accelstudy.verbs.") and obj.parent.is_module
+        if obj.docstring and obj.is_function and verb:
+            module = import_module(obj.parent.path)
+            obj.docstring.value = inspect.getdoc(getattr(module, obj.name))
         if obj.docstring:
             obj.docstring.value = apart(obj.docstring.value)

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import Calibration, read_calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
 from accelstudy.data_sheets import DataSheet, get_data_sheet
 from accelstudy.leveling.angles import jacobian as leveling_jacobian
 from accelstudy.leveling.angles import roll_pitch
@@ -98,7 +98,7 @@ class Situation:
     """A pole that leans by k tilts in k directions, with its calibrated sensor."""
 
     pole: Pole
-    calibration: Calibration
+    calibration: SensorCalibration
     sheet: DataSheet
     tilt: np.ndarray
     direction: np.ndarray

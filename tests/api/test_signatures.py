@@ -1,6 +1,7 @@
 """Commands are made of functions: the same words, the same defaults, the same errors."""
 
 import inspect
+import pickle
 from dataclasses import fields
 from typing import Any
 
@@ -10,26 +11,36 @@ from calling import refusal
 
 import accelstudy
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.units import Given
+from accelstudy.basics.errors import OPTIONS
+from accelstudy.basics.units import STANDARD_GRAVITY, Given
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.verbs import kinds
 
 TERMINAL = {"out", "force", "quiet", "angle_unit", "plugin"}
 """What only a terminal asks."""
+OF_THE_TERMINAL = {
+    "import": {"sensors", "figure"}, "simulate-campaign": {"truth"}, "advise": {"watch"},
+}  # fmt: skip
+"""What only the terminal asks of a command: several outputs, and a session that goes on."""
 VERBS = [
-    *("calibrate", "check-sigmas", "compare", "diagnose", "export", "history", "lot"),
-    "plan",
+    *("import", "simulate-campaign", "advise", "calibrate", "diagnose", "lot", "check-sigmas"),
+    *("apply", "export", "compare", "history", "plan", "data-sheet", "design"),
 ]
+NEEDED = {
+    "plan": {"tilt_accuracy": "10mgon"}, "advise": {"tilt_accuracy": "10mgon"},
+}  # fmt: skip
 
 
 def options(verb: str) -> dict[str, click.Parameter]:
     params = main.commands[verb].params
-    return {p.name: p for p in params if p.expose_value and p.name and p.name not in TERMINAL}
+    more = TERMINAL | OF_THE_TERMINAL.get(verb, set())
+    return {p.name: p for p in params if p.expose_value and p.name and p.name not in more}
 
 
 def function(verb: str) -> Any:
-    return getattr(accelstudy, verb.replace("-", "_"))
+    names = {"import": "find_holds", "design": "find_positions"}
+    return getattr(accelstudy, names.get(verb, verb.replace("-", "_")))
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -45,10 +56,11 @@ def test_options_are_keywords_and_arguments_are_positional(verb: str) -> None:
 def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
     """It names the option to one user, and the keyword to the other."""
     paths = [name for name, one in options(verb).items() if isinstance(one, click.Argument)]
-    out = [] if verb in ("check-sigmas", "export") else ["--out", tmp_path / "out"]
-    needed = {"tilt_accuracy": "10mgon"} if verb == "plan" else {}
+    out = [] if verb in ("check-sigmas", "export", "advise") else ["--out", tmp_path / "out.yaml"]
+    needed = NEEDED.get(verb, {})
     for keyword in kinds.keywords(function(verb)):
-        if not isinstance(keyword.kind, Given | Range | kinds.Share):
+        checked = Given | Range | kinds.Share | kinds.Numbers | kinds.Columns
+        if keyword.ends or not isinstance(keyword.kind, checked):
             continue
         given = {**needed, keyword.name: "5 parsec"}
         words = [
@@ -71,3 +83,47 @@ def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() ->
     assert one.angles.tolist() == other.angles.tolist()
     keywords = inspect.signature(accelstudy.simulate_campaign).parameters
     assert [*keywords] == [each.name for each in fields(CampaignSettings)]
+
+
+def test_a_message_calls_a_keyword_as_its_user_does() -> None:
+    said = "give `time_unit`; `apply` takes the same"
+    assert str(accelstudy.InputError(said)) == said
+    token = OPTIONS.set({"time_unit": "--time-unit"})
+    try:
+        command = accelstudy.InputError(said)
+    finally:
+        OPTIONS.reset(token)
+    assert str(command) == "give --time-unit; `apply` takes the same"
+    assert str(pickle.loads(pickle.dumps(command))) == str(command)
+
+
+@pytest.mark.parametrize("given", ["3", 3, "3:4:5", ("a", 1), "one:2"])
+def test_two_numbers_are_two(given: Any) -> None:
+    kind = kinds.Numbers("two numbers, as 20:40", ":", 2)
+    assert kind.read("temperature", "20:40") == kind.read("temperature", (20, 40)) == (20.0, 40.0)
+    with pytest.raises(accelstudy.InputError, match="temperature: expected two numbers, as 20:40"):
+        kind.read("temperature", given)
+
+
+def test_a_number_without_a_unit_is_in_si_where_it_may_be() -> None:
+    bare = kinds.si("m/s^2", 0, 100)
+    assert [bare.read(text) for text in ("9.81", "981 mg", "1g")] == [
+        9.81, pytest.approx(0.981 * STANDARD_GRAVITY), STANDARD_GRAVITY,
+    ]  # fmt: skip
+    for wrong in ("fast", "1e400", "-1", "nan"):
+        with pytest.raises(accelstudy.InputError):
+            bare.read(wrong)
+
+
+def test_a_kind_says_once_what_it_means() -> None:
+    """The docstrings of all verbs that take it say the same, and so do their commands."""
+    for name in ("model", "approach", "prior", "seed"):
+        said = {
+            kinds.meanings(function(verb))[name]
+            for verb in ("calibrate", "diagnose")
+            if name in kinds.meanings(function(verb))
+        }
+        assert len(said) == 1
+        (option,) = (p for p in main.commands["diagnose"].params if p.name == name)
+        assert isinstance(option, click.Option)
+        assert said == {str(option.help).replace("  [", " [")}

@@ -9,12 +9,14 @@ from subprocess import run
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call
+import yaml
+from calling import call, refusal, succeed
 from matplotlib.figure import Figure
 from scipy import stats
 
 import accelstudy as acs
 from accelstudy.campaign.format import write_campaign
+from accelstudy.files.tables import read_table
 
 KINDS = (
     "effects",
@@ -89,6 +91,63 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
     (other / "report.html").write_text("mine")
     with pytest.raises(acs.InputError, match="force"):
         result.save(other)
+
+
+def test_results_of_a_lot_are_apart_from_the_campaigns_of_its_list(folder, tmp_path):
+    listed = [{"campaign": str(folder / f"sensor-{i}")} for i in range(3)]
+    batch = tmp_path / "batch.yaml"
+    batch.write_text(json.dumps({"batch": "b", "campaigns": listed}), encoding="utf-8")
+    for given in (batch, f"{folder}/sensor-*"):
+        line = refusal("lot", given, "--out", folder / "sensor-1/lot")
+        assert f"lies in the input {folder / 'sensor-1'}" in line
+    assert not (folder / "sensor-1/lot").exists()
+
+
+def test_a_function_gives_what_its_command_writes(tmp_path):
+    """A campaign simulated, positions found, a log imported, leveled and described."""
+    words = ("--scheme", "faces-6", "--model", "bias", "--sigma", "1mm/s^2", "--interval", "none")
+    succeed("simulate-campaign", *words, "--out", tmp_path / "six", "--truth", tmp_path / "truth")
+    six = acs.simulate_campaign(
+        name="six", scheme="faces-6", model="bias", sigma=1e-3, interval=None
+    )
+    np.testing.assert_allclose(acs.read_campaign(tmp_path / "six").forces, six.forces, rtol=1e-13)
+    assert yaml.safe_load((tmp_path / "truth").read_text(encoding="utf-8")) == six.truth
+
+    words = ("--positions", 4, "--model", "bias", "--approach", "gravity", "--starts", 1)
+    succeed("design", *words, "--roll", "-50gon", "50gon", "--out", tmp_path / "mine.yaml")
+    found = acs.find_positions(
+        positions=4, model="bias", approach="gravity", starts=1, roll=("-50gon", "50gon")
+    )
+    (tmp_path / "function").mkdir()
+    found.save(tmp_path / "function/mine.yaml")
+    written = (tmp_path / name for name in ("mine.yaml", "function/mine.yaml"))
+    assert len({path.read_bytes() for path in written}) == 1
+
+    log, rng = tmp_path / "log.csv", np.random.default_rng(4)
+    turned = np.repeat(six.forces, 400, axis=0) + 0.01 * rng.standard_normal((2400, 3))
+    pd.DataFrame(turned.round(4), columns=["x", "y", "z"]).to_csv(log, index=False)
+    how = {"rate": 100, "columns": {"fx": "x", "fy": "y", "fz": "z"}}
+    words = ("--rate", 100, "--columns", "fx=x,fy=y,fz=z")
+    succeed("import", log, *words, "--window", "500ms", "--no-figure", "--out", tmp_path / "found")
+    holds = acs.find_holds(log, window=0.5, **how)
+    kept = acs.read_campaign(tmp_path / "found")
+    assert (kept.name, kept.n_positions) == (holds.name, 6)
+    np.testing.assert_allclose(kept.forces, holds.forces, rtol=1e-13)
+
+    one = acs.calibrate(holds, model="bias")
+    one.save(tmp_path / "calibrated")
+    file = tmp_path / "calibrated/calibration.json"
+    succeed("apply", file, log, *words, "--sigma", 0.01, "--out", tmp_path / "leveled.parquet")
+    leveled = pd.read_parquet(tmp_path / "leveled.parquet")
+    pd.testing.assert_frame_equal(acs.apply(one, log, sigma=0.01, **how), leveled)
+    pd.testing.assert_frame_equal(one.apply(acs.read_log(log, **how), sigma=0.01), leveled)
+
+    succeed("data-sheet", tmp_path / "found", "--out", tmp_path / "sheet.yaml")
+    sheet = acs.data_sheet(tmp_path / "found")
+    assert yaml.safe_load((tmp_path / "sheet.yaml").read_text("utf-8")) == sheet.content
+    said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
+    advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")
+    assert (said.strip(), advice.enough) == (advice.summary().strip(), True)
 
 
 @pytest.mark.parametrize("verb", ["calibrate", "diagnose", "compare", "history", "lot"])
@@ -271,3 +330,14 @@ def test_the_front_door_is_light_and_complete():
     assert found.split() == [str(len(acs.__all__)), "False"]
     for name in acs.__all__:
         assert getattr(acs, name).__doc__
+
+
+def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
+    result = acs.simulate("bias", "faces-6", ["gravity", "robot"], sigma="2mm/s^2", replicates=20)
+    assert (result.state, result.name) == ("converged", "2 cells")
+    assert [*result.to_frame()] == [*result.tilt]
+    assert result.plot(Figure().subplots()).has_data()
+    result.save(tmp_path / "simulated")
+    written = {path.stem: read_table(path) for path in (tmp_path / "simulated").iterdir()}
+    assert set(written) == set(result.tables)
+    pd.testing.assert_frame_equal(written["summary"], result.tables["summary"])

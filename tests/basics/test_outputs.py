@@ -137,7 +137,7 @@ def test_what_is_there_is_replaced_only_if_asked(tmp_path):
     write(tmp_path, positions_csv="mine", notes_txt="mine", figures__mine_png="mine")
     text = refused(tmp_path, CAMPAIGN)
     assert "not empty (figures, notes.txt, positions.csv)" in text
-    assert "--force" in text
+    assert "`force`" in text
     with result_folder(tmp_path, CAMPAIGN, force=True) as folder:
         write(folder, positions_csv="new", campaign_yaml="new")
     kept = {"notes.txt": b"mine", "figures/mine.png": b"mine"}

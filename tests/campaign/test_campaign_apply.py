@@ -202,7 +202,7 @@ def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
     without.to_csv(tmp_path / "without.csv", index=False)
     stored = LogLayout(columns={c: c for c in ("temperature", "vibration")}, time=None)
     for known in (None, stored):
-        with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*--"):
+        with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*`"):
             level_log(
                 replace(calibration, log=known), tmp_path / "without.csv", tmp_path / "never.csv"
             )
@@ -412,7 +412,7 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
     ("log.csv", "fx,fy,fz\n", "no line of numbers"),
     ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
-     "about 1.05 m.s.2: these look like g, not m.s.2; give --unit g"),
+     "about 1.05 m.s.2: these look like g, not m.s.2; give `unit` g"),
     ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "these look like counts"),
     ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-30\n" + "1,2,-9\n", "nowhere near gravity"),
     ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),
@@ -513,7 +513,7 @@ def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(pl
     mixed_log().to_csv(log, index=False)
     layout = LogLayout(columns={"fx": "ax", "fy": "ay", "fz": "az", "temperature": "T"})
     known = replace(plain, log=layout)
-    with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, --columns"):
+    with pytest.raises(InputError, match=r"no column 'ax'.*log of the campaign, `columns`"):
         level_log(known, log, tmp_path / "out.csv")
     # A temperature that no effect needs may be missing, unless it is asked for.
     layout = LogLayout(columns={"fx": "fx", "fy": "fy", "fz": "fz", "temperature": "T"})
@@ -568,6 +568,6 @@ def test_where_nothing_can_be_written(plain, log, tmp_path):
 @pytest.mark.parametrize("sigma", [1e300, np.nan, -1.0, 1e-12])
 def test_a_sigma_that_no_reading_has(plain, log, tmp_path, sigma):
     log.write_text("fx,fy,fz\n1,2,-9.6\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"--sigma: must be 0, or from 1e-09 to 1000 m/s²"):
+    with pytest.raises(InputError, match=r"`sigma`: must be 0, or from 1e-09 to 1000 m/s²"):
         level_log(plain, log, tmp_path / "out.csv", sigma=sigma)
     assert not (tmp_path / "out.csv").exists()

@@ -243,7 +243,7 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
             found.append(diagnosis_lines(diagnose(measured, NINE)))
         for lines in found:
             assert (f"No sensor is like this: {said}" in " ".join(lines)) == (said is not None)
-            assert ("a wrong --scale" in " ".join(lines)) == (said is not None)
+            assert ("a wrong scale" in " ".join(lines)) == (said is not None)
 
 
 def test_a_bad_log_is_one_line(calibrations, tmp_path):

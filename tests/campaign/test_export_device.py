@@ -13,7 +13,7 @@ from calling import refusal, succeed
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import Calibration, calibration_of
+from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
 from accelstudy.campaign.calibration.c_code import HEAD, SOLVE, c_header
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export, losses
@@ -60,7 +60,7 @@ def calibration_with(specs, ranges=RANGES, values=None):
         sizes = [np.minimum(e.typical[1], e.deviations) for e in model.effects]
         values = np.concatenate(sizes) * rng.choice([-1, 1], u)
     root = 0.1 * np.abs(values)[:, None] * (np.eye(u) + rng.uniform(-0.2, 0.2, (u, u)))
-    return Calibration(model, np.array(values), root @ root.T, G, CONTENT, None, ranges)
+    return SensorCalibration(model, np.array(values), root @ root.T, G, CONTENT, None, ranges)
 
 
 def conditions(n, until=1000.0):

@@ -252,8 +252,8 @@ HOSTILE = [
 ]
 OPTIONS = [
     *("--name", "--seed", "--scheme", "--repeats", "--repeat-first", "--order", "--approach"),
-    *("--model", "--effect", "--size", "--noise-effect", "--gross", "--sigma", "--interval"),
-    *("--robot-sigma-mgon", "--temperature", "--vibration", "--yaw", "--samples-per-hold"),
+    *("--model", "--effect", "--size", "--noise-effect", "--gross-error", "--sigma", "--interval"),
+    *("--sigma-angle", "--temperature", "--vibration", "--yaw", "--n-samples"),
 ]
 
 

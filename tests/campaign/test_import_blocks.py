@@ -68,7 +68,7 @@ def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
 @pytest.mark.parametrize(("change", "says"), [
     ({"--block": 39}, "560 samples are no multiple of the 39 of a block (--block): 546 or 585"),
     ({"--block": 80}, "blocks of 80 samples are no positions"),
-    ({"--block": 3}, "block: must be at least 4"),
+    ({"--block": 3}, "--block: must be from 4 to"),
     ({"--means": None}, "a table of means (--means) has a row for each position, no block"),
     ({"--exclude": "1s-2s:moved"}, "has no time; name blocks by their numbers, as 13:moved"),
 ])  # fmt: skip

@@ -201,8 +201,8 @@ def test_command_with_everything(tmp_path):
     ([], "give the column of time (--time), or the rate (--rate)"),
     (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
     (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
-    (["--rate", "-5"], "options: rate_hz: must be from 1e-06 to 1e+09 per second"),
-    (["--rate", "nan"], "options: rate_hz"),
+    (["--rate", "-5"], "--rate: '-5': must be at least 1e-06 and at most 1e+09 Hz"),
+    (["--rate", "nan"], "--rate: expected a number, as 2Hz"),
     (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
 ])  # fmt: skip
 def test_command_says_what_is_wrong(log, tmp_path, options, message):

@@ -165,7 +165,7 @@ def test_override_and_limits(tmp_path):
         ({"threshold_mps2": 1e-6}, "no static hold"),
         ({"threshold_mps2": 0.0}, "threshold_mps2: must be greater than 0"),
         ({"window_s": 0.02}, "a window of 0.02 s holds 2 samples, at 100 per second; is the rate"),
-        ({"window_s": 1e6}, r"is the rate \(--rate\) right"),
+        ({"window_s": 1e6}, r"is the rate \(`rate`\) right"),
         ({"window_s": 1e3}, "too few samples for a window of 100001"),
     ]:
         with pytest.raises(InputError, match=message):

@@ -8,6 +8,7 @@ from log_helpers import open_log
 from test_import_campaign import XSENS
 from test_import_holds import RATE, G, session, shared, write
 
+from accelstudy.api.campaigns import files_of
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
@@ -16,7 +17,6 @@ from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
-from accelstudy.commands.importing import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
@@ -163,10 +163,10 @@ def test_sigma_does_not_depend_on_the_offset():
     (1, ["--unit", "g"], "look like m/s^2, not g; give --unit m/s^2"),
     (1e3, [], "look like counts, not m/s^2; give --unit counts"),
     (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
-    (1, ["--threshold", "1e300"], "threshold_mps2: must be at most 1"),
+    (1, ["--threshold", "1e300"], "--threshold: '1e300': must be at least 1e-09"),
     (1, ["--frame", "fru"], "is left-handed"),
     (1, ["--range", "8 feet"], "--range: expected a number"),
-    (1, ["--robot-sigma", "3"], r"its angles go with a table of means"),
+    (1, ["--robot-sigma", "3mgon"], r"its angles go with a table of means"),
 ])  # fmt: skip
 def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, options, message):
     path = write(tmp_path, factor * turned[0])
@@ -339,7 +339,7 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     arguments = (tmp_path / "means.csv", "--means", "--frame", frame)
     succeed(
         "import",
-        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", 3.2, "--robot-unit", unit),
+        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", "3.2mgon", "--robot-unit", unit),
     )
     campaign = read_campaign(tmp_path / "out")
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
@@ -350,7 +350,7 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     wrong = "rad" if unit != "rad" else "gon"
     line = refusal(
         "import",
-        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", 3.2, "--robot-unit", wrong),
+        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", "3.2mgon", "--robot-unit", wrong),
     )
     assert f"--robot-unit {unit} would be right" in line
     result = call("import", *arguments, "--out", tmp_path / "new")

@@ -197,7 +197,7 @@ def test_options_that_go_together(plate, tmp_path, words, part):
     [
         (["--means"], "--means"),
         (["--block", "100"], "--block"),
-        (["--robot-sigma", "3"], "--robot-sigma"),
+        (["--robot-sigma", "3mgon"], "--robot-sigma"),
         (["--reference-columns", "fx=ax,fw=az"], "--reference-columns: fw"),
         (["--reference-columns", "ax,ay"], "--reference-columns: expected"),
         (["--reference-offset", "nan"], "--reference-offset"),

@@ -20,16 +20,16 @@ HOLDS = ("--temperature", "15:40", "--temperature-order", "random", "--vibration
 ADDED = [
     *(("--effect", name) for name in effect_names() if name not in BASE),
     *(("--noise-effect", name) for name in noise_effect_names()),
-    *(("--gross", name) for name in gross_error_names()),
+    *(("--gross-error", name) for name in gross_error_names()),
 ]
 CASES = {
     "nothing": (),
-    "nothing-unknown-sigma": ("--sigma-unknown",),
+    "nothing-unknown-sigma": ("--no-sigma-known",),
     "sigma-too-small": ("--noise-effect", "noise_level(kappa=6)"),
-    "fx-fy": ("--scheme", "fibonacci-30", "--gross", "axis_error(x=2, y=1, z=3)"),
+    "fx-fy": ("--scheme", "fibonacci-30", "--gross-error", "axis_error(x=2, y=1, z=3)"),
     **{name: (option, name) for option, name in ADDED},
-    "slip-without-time": ("--no-time", "--effect", "mounting_slip(t=12.5)"),
-    "gravity-outlier": ("--approach", "gravity", "--gross", "outlier_position"),
+    "slip-without-time": ("--interval", "none", "--effect", "mounting_slip(t=12.5)"),
+    "gravity-outlier": ("--approach", "gravity", "--gross-error", "outlier_position"),
     "gravity-few": ("--approach", "gravity", "--scheme", "fibonacci-10"),
 }  # fmt: skip
 SAID = {"fx-fy": "axes are swapped: x is read as y, y is read as x"}
@@ -62,7 +62,7 @@ def test_three_commands_end_well_and_agree(case, tmp_path, request):
     run("simulate-campaign", "--out", campaign, *scheme, *HOLDS, *options)
     approach = "gravity" if "gravity" in options else "robot"
     with_approach = ("--approach", approach)
-    gross = "--gross" in options
+    gross = "--gross-error" in options
     told = run("calibrate", campaign, *with_approach, "--out", tmp_path / "cal", fails=gross)
     calibration = None
     if told.exit_code:  # a unit that is not read, or no solution

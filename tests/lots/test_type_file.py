@@ -135,7 +135,7 @@ def test_each_command_takes_a_type(tmp_path):
     ("change", "said"),
     [
         ({"sensors": 4}, "4 are too few"),
-        ({"parameters": {}}, "give --model"),
+        ({"parameters": {}}, "give `model`"),
         ({"schema_version": 2}, "schema_version"),
     ],
 )

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import roll_pitch
@@ -41,7 +41,7 @@ def calibrated(model=NINE, parameters=None, covariance=None):
         found = estimability(get_scheme("mclaren-24"), model, get_approach("gravity"), noise)
         covariance = found.cofactors
     parameters = np.zeros(model.n_parameters) if parameters is None else parameters
-    return Calibration(model, parameters, covariance, STANDARD_GRAVITY, {})
+    return SensorCalibration(model, parameters, covariance, STANDARD_GRAVITY, {})
 
 
 def of(pole, name, tilt, calibration=None, setup=None, sheet=SHEET):

@@ -3,16 +3,20 @@
 `make docs` checks the rest: links, anchors, and the files, commands and options that pages name.
 """
 
+import inspect
 import json
 import re
 import sys
 from datetime import datetime
+from importlib import import_module
 
+import griffe
 import numpy as np
 import pytest
 from places import ROOT
 from study_helpers import grid, make_study, run_study
 
+import accelstudy
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
 from accelstudy.campaign.calibration.applying import calibration_of
@@ -130,3 +134,13 @@ def _keys(document):
         inner = value[0] if listed else value
         if listed or key in ("affine", "quality"):
             yield from (f"{key}.{each}" for each in inner)
+
+
+def test_the_reference_says_what_the_kinds_of_keywords_mean(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs/hooks")
+    path = ROOT / "accelstudy/verbs/calibrations.py"
+    module = griffe.visit("accelstudy.verbs.calibrations", path, path.read_text(encoding="utf-8"))
+    import_module("meanings").Meanings().on_object(obj=module["diagnose"])
+    said = module["diagnose"].docstring.value
+    assert "\nmodel : str\n    A model: one that `accelstudy models` lists" in said
+    assert said == inspect.getdoc(accelstudy.diagnose)

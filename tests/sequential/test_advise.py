@@ -17,7 +17,7 @@ from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.commands import advise as command
+from accelstudy.commands import campaigns as command
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
@@ -49,7 +49,7 @@ def sessions(tmp_path_factory):
     for name, options in {
         "gravity": ("--approach", "gravity"),
         "robot": ("--approach", "robot"),
-        "quiet": ("--approach", "robot", "--sigma-unknown"),
+        "quiet": ("--approach", "robot", "--no-sigma-known"),
         "warm": ("--approach", "robot", "--temperature", "15:40", "--effect", "thermal_bias"),
     }.items():
         assert call("simulate-campaign", "--out", folder / name, *common, *options).exit_code == 0

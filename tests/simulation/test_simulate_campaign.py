@@ -176,9 +176,9 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     result = call(
         "simulate-campaign", "--out", folder, "--truth", truth_path, "--seed", 7,
         "--effect", "warm_up(tau=300)",
-        "--noise-effect", "heavy_tails(nu=3)", "--gross", "unit_error(force=0.1)",
+        "--noise-effect", "heavy_tails(nu=3)", "--gross-error", "unit_error(force=0.1)",
         "--temperature", "20:40", "--temperature-order", "ABBA", "--vibration", "0:1",
-        "--yaw", "random", "--samples-per-hold", 50, "--sigma-unknown", "--robot-sigma-mgon", 5,
+        "--yaw", "random", "--n-samples", 50, "--no-sigma-known", "--sigma-angle", "5mgon",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in folder.iterdir()) == ["campaign.yaml", "positions.csv"]
@@ -198,21 +198,23 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
 
 @pytest.mark.parametrize(("arguments", "expected"), [
     (["--effect", "thermal_bias"], "temperature: missing; the effect 'thermal_bias' needs"),
-    (["--effect", "warm_up", "--no-time"], "interval: missing; the effect 'warm_up' needs"),
+    (["--effect", "warm_up", "--interval", "none"], "interval: missing; the effect 'warm_up'"),
     (["--effect", "thermal_bia"], "did you mean 'thermal_bias'?"),
     (["--effect", "bias: 1, 2"], "expected 3 numbers after the colon (b_x in m/s^2, b_y in"),
     (["--effect", "bias: 1, x, 2"], "expected 3 numbers after the colon"),
     (["--effect", "warm_up(tau=1)", "--effect", "warm_up"], "occur in two effects"),
     (["--noise-effect", "white"], "unknown noise effect 'white'"),
-    (["--gross", "row_order(first=1, second=99)"], "second=99 is no position"),
-    (["--sigma", "0"], "sigma: must be from 1e-09 to 1000 m/s², not 0"),
+    (["--gross-error", "row_order(first=1, second=99)"], "second=99 is no position"),
+    (["--sigma", "0"], "--sigma: '0': must be at least 1e-09 and at most 1000 m/s^2"),
     (["--repeats", "0"], "repeats: must be from 1 to 100000, not 0"),
     (["--repeat-first", "25"], "repeat_first: must be at most 24"),
     (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
     (["--temperature", "-300:20"], "temperature: must be from -273.15 to 10000 °C, not -300"),
     (["--temperature-order", "abba"], "unknown temperature_order 'abba'"),
     (["--yaw", "some"], "unknown yaw 'some'"),
-    (["--samples-per-hold", "1"], "n_samples: must be from 2 to 1000000000, not 1"),
+    (["--n-samples", "1"], "--n-samples: must be from 2 to 1000000000, not 1"),
+    (["--gross", "row_order"], "--gross: no longer an option; --gross-error takes it"),
+    (["--no-time"], "--no-time: no longer an option; --interval none says it"),
     (["--hold", "30"], "--hold: no longer an option; campaigns have no slopes within holds"),
     (["--scheme", "mclaren-25"], "unknown scheme"),
     (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),

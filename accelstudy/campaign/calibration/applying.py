@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json, readable
@@ -50,7 +50,7 @@ FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class SensorCalibration:
     """A calibration as it stays with the sensor, without the effects of the rig.
 
     Attributes
@@ -287,7 +287,7 @@ def dof_of(content: Mapping[str, Any]) -> float:
     return float(content.get("sigma_dof") or np.inf)
 
 
-def read_calibration(path: str | Path) -> Calibration:
+def read_calibration(path: str | Path) -> SensorCalibration:
     """Read `calibration.json`.
 
     Raises
@@ -307,7 +307,7 @@ def read_calibration_content(path: str | Path) -> Any:
     return read_json(path, NO_CALIBRATION)
 
 
-def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
+def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibration:
     """Take the content of `calibration.json`; `where` begins the message if it is something else.
 
     Raises
@@ -327,7 +327,7 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
         probes = document.gravity_mps2 * np.concatenate([np.eye(3), -np.eye(3)])
         if not np.isfinite(model.correct(probes, parameters, document.gravity_mps2)).all(1).any():
             raise InputError(f"{where}: parameters: with these no force explains any reading")
-    return Calibration(
+    return SensorCalibration(
         model=model,
         parameters=parameters,
         covariance=covariance[np.ix_(stays, stays)],
@@ -336,33 +336,6 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> Calibration:
         log=document.log,
         ranges=document.ranges,
     )
-
-
-class Calibrated(Protocol):
-    """What has the content of a calibration.json, such as what `accelstudy.calibrate` returns."""
-
-    @property
-    def content(self) -> Mapping[str, Any]:
-        """Content of calibration.json."""
-        ...
-
-
-def applicable(calibration: Calibration | Calibrated) -> Calibration:
-    """Return a calibration as `read_calibration` does, whether or not it was written to a file.
-
-    Raises
-    ------
-    InputError
-        If it is no calibration.
-    """
-    if isinstance(calibration, Calibration):
-        return calibration
-    if not hasattr(calibration, "content"):
-        raise InputError(
-            f"calibration: expected what `calibrate` returns or `read_calibration` reads, not "
-            f"{shown(calibration)}"
-        )
-    return calibration_of(calibration.content)
 
 
 def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
@@ -374,7 +347,7 @@ def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
     )
 
 
-def noise_of_reading(calibration: Calibration) -> float:
+def noise_of_reading(calibration: SensorCalibration) -> float:
     """Noise of a reading, m/s²: the noise within the holds of the campaign.
 
     If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.applying import MARGIN, Calibration
+from accelstudy.campaign.calibration.applying import MARGIN, SensorCalibration
 from accelstudy.campaign.calibration.device import KNOWN, in_use, must_be_known
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.base import expressions
@@ -96,13 +96,13 @@ KEPT = "time_kept"
 
 
 def c_header(
-    calibration: Calibration, raw: Conversion, frame: Frame, mending: Array, unit: str
+    calibration: SensorCalibration, raw: Conversion, frame: Frame, mending: Array, unit: str
 ) -> str:
     """Write a header with a function that turns readings into calibrated forces.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : SensorCalibration
     raw, frame, unit : of the readings
     mending : (3, 3) array, turns forces in frd as they are read into those that were fitted
 
@@ -252,7 +252,7 @@ class _Code:
     """A calibration, and the functions in C that are made of it."""
 
     def __init__(
-        self, calibration: Calibration, raw: Conversion, frame: Frame, mending: Array
+        self, calibration: SensorCalibration, raw: Conversion, frame: Frame, mending: Array
     ) -> None:
         self._calibration, self._raw, self._frame = calibration, raw, frame
         self._to_output = mending @ frame.matrix * raw.scale
@@ -401,7 +401,7 @@ class _Code:
         )
 
 
-def provenance(calibration: Calibration) -> Iterable[str]:
+def provenance(calibration: SensorCalibration) -> Iterable[str]:
     """Say where a calibration is from."""
     content = calibration.content
     sensor = f" of {content['sensor']}" if content["sensor"] else ""
@@ -417,7 +417,7 @@ def provenance(calibration: Calibration) -> Iterable[str]:
     yield f"Written by accelstudy {__version__}."
 
 
-def _parameters(calibration: Calibration) -> Iterable[str]:
+def _parameters(calibration: SensorCalibration) -> Iterable[str]:
     """Parameters in SI, in the axes of the model."""
     yield f"Parameters with sigmas, in the axes {FRD.description}:"
     variances = np.diag(calibration.covariance)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.effects import Course, HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
@@ -42,7 +42,7 @@ def must_be_known(needs: Iterable[tuple[str, str]]) -> None:
 
 
 def in_use(
-    calibration: Calibration, forces: Array, columns: Collection[str], margin: float = 0.0
+    calibration: SensorCalibration, forces: Array, columns: Collection[str], margin: float = 0.0
 ) -> tuple[Array, HoldConditions]:
     """Combine forces with conditions, spread over the ranges of a calibration.
 
@@ -50,7 +50,7 @@ def in_use(
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : SensorCalibration
     forces : (n, 3) array, m/s²
     columns : names of what varies
     margin : float, part of the width by which a range is left on either side

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.applying import Calibration, calibration_of
+from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.parameter_files import PX4
 from accelstudy.effects import Effect
@@ -139,7 +139,9 @@ def losses(calibration: Mapping[str, Any], form: str) -> tuple[str, ...]:
     return PX4(*_of_device(calibration)).lost if form == "px4" else ()
 
 
-def _of_device(calibration: Mapping[str, Any]) -> tuple[Calibration, Conversion, Frame, Array, str]:
+def _of_device(
+    calibration: Mapping[str, Any],
+) -> tuple[SensorCalibration, Conversion, Frame, Array, str]:
     """A calibration without its rig, and the readings that a device has."""
     raw, frame = _readings(calibration)
     unit = _unit(calibration)

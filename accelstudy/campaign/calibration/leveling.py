@@ -22,7 +22,12 @@ from accelstudy.basics.units import (
     to_display,
 )
 from accelstudy.basics.wording import counted, quantity_text, short_list
-from accelstudy.campaign.calibration.applying import FORCES, MARGIN, Calibration, noise_of_reading
+from accelstudy.campaign.calibration.applying import (
+    FORCES,
+    MARGIN,
+    SensorCalibration,
+    noise_of_reading,
+)
 from accelstudy.campaign.calibration.device import KNOWN
 from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
@@ -47,16 +52,16 @@ NEAR_POLE = "near_pole"
 """Column that says whether a row is too close to the roll pole for its sigmas."""
 
 OPTIONS = {
-    "time": "--time or --rate",
-    "temperature": "--columns temperature=NAME",
-    "vibration": "--columns vibration=NAME",
+    "time": "`time` or `rate`",
+    "temperature": "`columns` temperature=NAME",
+    "vibration": "`columns` vibration=NAME",
 }
 """Conditions that a log can hold, and the options that name their columns."""
 
 REMEDIES = Remedies(
-    unit="give --unit {unit}",
-    gravity="give the --unit or the --columns of this log",
-    other="give the --unit or the --columns of this log",
+    unit="give `unit` {unit}",
+    gravity="give the `unit` or the `columns` of this log",
+    other="give the `unit` or the `columns` of this log",
 )
 """What to do about a log whose readings are not as large as gravity."""
 DECIMALS = 9
@@ -99,7 +104,7 @@ class Readings(NamedTuple):
 
 def readings_of(
     log: LogFile,
-    calibration: Calibration,
+    calibration: SensorCalibration,
     given: Mapping[str, Any] | None = None,
     start: float = 0.0,
 ) -> Readings:
@@ -108,7 +113,7 @@ def readings_of(
     Parameters
     ----------
     log : anything that `open_source` opens
-    calibration : Calibration
+    calibration : SensorCalibration
     given : mapping, optional
         Keys of `LogLayout`, which count before the layout of the campaign's log; see `read_log`.
     start : float, s, from the start of the calibration session to the first row
@@ -168,7 +173,7 @@ def readings_of(
 
 
 def level(
-    calibration: Calibration,
+    calibration: SensorCalibration,
     log: LogFile,
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
@@ -185,7 +190,7 @@ def level(
     readings = readings_of(log, calibration, given, start or 0.0)
     _check_forces(calibration, readings)
     if sigma is not None:
-        bounds.SIGMA_READING.check_key("--sigma", sigma)
+        bounds.SIGMA_READING.check_key("`sigma`", sigma)
     noise = noise_of_reading(calibration) if sigma is None else sigma
     rows = np.arange(len(readings.forces))
     parts = []
@@ -207,7 +212,7 @@ def level(
 
 
 def level_frame(
-    calibration: Calibration,
+    calibration: SensorCalibration,
     log: LogFile,
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
@@ -231,7 +236,7 @@ def level_frame(
 
 
 def level_log(
-    calibration: Calibration,
+    calibration: SensorCalibration,
     log: str | Path,
     out: str | Path,
     given: Mapping[str, Any] | None = None,
@@ -245,7 +250,7 @@ def level_log(
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : SensorCalibration
     log : file with the raw log; see `readings_of`
     out : CSV or Parquet file to write; if that fails, there is none
     given : mapping, optional
@@ -270,7 +275,7 @@ def level_log(
 
 
 def _leveled(
-    calibration: Calibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
+    calibration: SensorCalibration, frame: Frame, forces: Array, hold: HoldConditions, noise: float
 ) -> tuple[Array, NDArray[np.bool_], dict[str, pa.Array]]:
     """Calibrated forces in frd of readings (k, 3), m/s², and the columns that are added.
 
@@ -305,13 +310,13 @@ def _with(table: pa.Table, added: Mapping[str, pa.ChunkedArray]) -> pa.Table:
     return table
 
 
-def clipped(calibration: Calibration, forces: Array) -> NDArray[np.bool_]:
+def clipped(calibration: SensorCalibration, forces: Array) -> NDArray[np.bool_]:
     """Which readings (k, 3), m/s², are at the end of the sensor's range."""
     full = calibration.content.get("range_mps2")
     return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
 
 
-def _check_forces(calibration: Calibration, readings: Readings) -> None:
+def _check_forces(calibration: SensorCalibration, readings: Readings) -> None:
     """Raise `InputError` if no row is usable, or most readings are far from gravity."""
     log, forces = readings.log, readings.forces
     forces = forces[np.isfinite(forces).all(axis=1)]
@@ -322,7 +327,7 @@ def _check_forces(calibration: Calibration, readings: Readings) -> None:
     check_norm(f"{log.path}", raw, forces, log.layout.unit, calibration.gravity, REMEDIES)
 
 
-def _of_calibration(calibration: Calibration, readings: Readings) -> Iterator[str]:
+def _of_calibration(calibration: SensorCalibration, readings: Readings) -> Iterator[str]:
     """What the user should know about the calibration."""
     quality = calibration.content["quality"]
     if not quality["plausible"]:
@@ -342,7 +347,7 @@ def _of_calibration(calibration: Calibration, readings: Readings) -> Iterator[st
         )
 
 
-def _assumptions(calibration: Calibration) -> Iterator[str]:
+def _assumptions(calibration: SensorCalibration) -> Iterator[str]:
     """Assumptions that are made if the user does not say when the log was started."""
     needs = calibration.needs
     warmed = {effect for effect, column in needs if column == "temperature"}
@@ -353,12 +358,12 @@ def _assumptions(calibration: Calibration) -> Iterator[str]:
     if timed:
         yield (
             f"{short_list(timed)}: assumes that the first row is the start of the calibration "
-            "session; if not, give the seconds between them by --start"
+            "session; if not, give the seconds between them by `start`"
         )
 
 
 def _of_log(
-    calibration: Calibration,
+    calibration: SensorCalibration,
     readings: Readings,
     empty: NDArray[np.bool_],
     near: NDArray[np.bool_],
@@ -424,7 +429,7 @@ def _beyond_ranges(
             )
 
 
-def _reason(calibration: Calibration, readings: Readings, row: int) -> str:
+def _reason(calibration: SensorCalibration, readings: Readings, row: int) -> str:
     """Say why a row is empty, and where it is."""
     log, rows = readings.log, readings.log.rows
     needed = {condition for _, condition in calibration.needs}

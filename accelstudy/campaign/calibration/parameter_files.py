@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.wording import comma_list, number
-from accelstudy.campaign.calibration.applying import Calibration
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.c_code import provenance
 from accelstudy.campaign.calibration.device import KNOWN, in_use, must_be_known
 from accelstudy.effects import HoldConditions
@@ -52,7 +52,7 @@ class PX4:
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : SensorCalibration
     raw, frame, unit : of the readings
     mending : (3, 3) array, turns forces in frd as they are read into those that were fitted
 
@@ -64,7 +64,12 @@ class PX4:
     """
 
     def __init__(
-        self, calibration: Calibration, raw: Conversion, frame: Frame, mending: Array, unit: str
+        self,
+        calibration: SensorCalibration,
+        raw: Conversion,
+        frame: Frame,
+        mending: Array,
+        unit: str,
     ) -> None:
         must_be_known(calibration.needs)
         if unit != "m/s^2":
@@ -125,12 +130,12 @@ class PX4:
         low, high = self.calibration.ranges.get(KNOWN["temperature"], (0.0, 0.0))
         return high > low and "temperature" in self.calibration.model.hold_columns
 
-    def _read(self, calibration: Calibration, forces: Array, hold: HoldConditions) -> Array:
+    def _read(self, calibration: SensorCalibration, forces: Array, hold: HoldConditions) -> Array:
         """Readings (n, 3) of forces (n, 3) in frd."""
         output = calibration.model.sense(forces, calibration.parameters, calibration.gravity, hold)
         return self._raw.from_si(self.frame.from_frd(output @ self._to_read.T))
 
-    def _fitted(self, calibration: Calibration) -> tuple[Array, Array]:
+    def _fitted(self, calibration: SensorCalibration) -> tuple[Array, Array]:
         """Gains (3,), and offsets (3, k) by powers of the temperature."""
         signs = np.array(list(product((1.0, -1.0), repeat=3)))
         ways = (signs[:, None] * evenly_spread(ATTITUDES)).reshape(-1, 3)
@@ -148,7 +153,7 @@ class PX4:
             found[i] = np.linalg.lstsq(columns / size, readings[:, i], rcond=None)[0] / size
         return found[:, 0], found[:, 1:]
 
-    def _loss(self, calibration: Calibration) -> tuple[Array, Array]:
+    def _loss(self, calibration: SensorCalibration) -> tuple[Array, Array]:
         """Rms and largest error, (2,), of roll and of pitch by what PX4 cannot hold, rad."""
         gains, offsets = self._fitted(calibration)
         cap = cap_forces(MAX_TILT_GON * GON, TILTED, calibration.gravity)
@@ -169,7 +174,7 @@ class PX4:
                 f"PX4 has no place{without}; so roll is wrong by "
                 f"{number(roll)} mgon and pitch by {number(pitch)} mgon (rms over tilts up to "
                 f"{MAX_TILT_GON:g} gon), at most by {number(most_roll)} and {number(most_pitch)} "
-                "mgon; --form c holds all"
+                "mgon; the form c holds all"
             )
         for effect in self.calibration.model.effects:
             tau = effect.settings.get("tau") if effect.family == "temperature" else None
@@ -179,7 +184,7 @@ class PX4:
                     f"{tau:g} s is right at a settled temperature only"
                 )
 
-    def _alone(self) -> Iterable[tuple[str, Calibration]]:
+    def _alone(self) -> Iterable[tuple[str, SensorCalibration]]:
         """Each effect with a calibration that has it alone."""
         first = 0
         for effect in self.calibration.model.effects:

@@ -79,7 +79,7 @@ def _blocks(log: Recording, size: int) -> NDArray[np.int_]:
     fewer = total // size * size
     if len(row) and row[-1] >= fewer:  # a note at the end is no sample
         raise InputError(
-            f"{log.path}: {total} samples are no multiple of the {size} of a block (--block): "
+            f"{log.path}: {total} samples are no multiple of the {size} of a block (`block`): "
             f"{fewer} or {fewer + size} would be {fewer // size} or {fewer // size + 1} positions"
         )
     return row // size

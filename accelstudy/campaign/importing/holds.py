@@ -192,7 +192,7 @@ def detected_holds(
         if segmentation.size is not None:
             return InputError(
                 f"{log.path}: blocks of {segmentation.size} samples are no positions: {why}; is "
-                "the number of samples (--block) right, or does a file hold a move?"
+                "the number of samples (`block`) right, or does a file hold a move?"
             )
         return InputError(
             f"{log.path}: the sensor was never still: {why}; the quietest hundredth of its windows "
@@ -264,7 +264,7 @@ def _too_short(rests: Sequence[float], window: float, trim: float, shortest: flo
     return [
         f"{counted(len(rests), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} no "
         f"hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not count; "
-        f"--shortest {takes:g} (now {shortest:g}) takes {'them' if several else 'it'}"
+        f"`shortest` {takes:g} (now {shortest:g}) takes {'them' if several else 'it'}"
     ]
 
 

@@ -67,11 +67,11 @@ def import_sensors(
     chosen = _settings_of_sensors(named_after(settings, paths))
     if beside is not None and (settings.block is not None or len(paths) > 1):
         raise InputError(
-            "--reference-log goes with one log that has a time, not with several files or --block"
+            "`reference_log` goes with one log that has a time, not with several files or `block`"
         )
     if settings.block is not None:
         if len(paths) > 1:
-            raise InputError(f"a log of blocks (--block) is one file, not {len(paths)}")
+            raise InputError(f"a log of blocks (`block`) is one file, not {len(paths)}")
         return _import_blocks(paths, chosen)
     logs = _turned_together({name: _recording(paths, each) for name, each in chosen.items()})
     if len(paths) > 1 and any(_whole_files(log, settings) for log in logs.values()):
@@ -92,13 +92,13 @@ def _import_means(
 ) -> tuple[Campaign, ImportReport]:
     if beside is not None:
         raise InputError(
-            "a table of means (--means) has no holds in time: leave out --reference-log"
+            "a table of means (`means`) has no holds in time: leave out `reference_log`"
         )
     if len(paths) > 1 or settings.sensors:
         raise InputError("a table of means is one file of one sensor")
     if settings.block is not None:
         raise InputError(
-            "a table of means (--means) has a row for each position, no block (--block)"
+            "a table of means (`means`) has a row for each position, no block (`block`)"
         )
     return import_means(paths[0], settings)
 
@@ -202,11 +202,11 @@ def import_each(
 def _settings_of_sensors(settings: ImportSettings) -> dict[str, ImportSettings]:
     """Settings of each sensor, as if it were the only one."""
     if settings.robot is not None:
-        raise InputError("robot (--robot-sigma): its angles go with a table of means (--means)")
+        raise InputError("robot (`robot_sigma`): its angles go with a table of means (`means`)")
     if not settings.sensors:
         return {"": settings}
     if set(AXES) & set(settings.columns):
-        raise InputError("columns: fx, fy and fz stand in sensors (--sensor) already")
+        raise InputError("columns: fx, fy and fz stand in sensors (`sensors`) already")
     return {
         name: settings.model_copy(
             update={

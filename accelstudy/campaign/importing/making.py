@@ -35,9 +35,9 @@ COUNTS = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
 REMEDIES = Remedies(
-    unit="give --unit {unit}, and --scale if these are counts",
-    gravity="give --gravity",
-    other="give other --unit, --scale, --offset or --columns",
+    unit="give `unit` {unit}, and `scale` if these are counts",
+    gravity="give `gravity`",
+    other="give other `unit`, `scale`, `offset` or `columns`",
 )
 """What to do about forces that are not as large as gravity."""
 
@@ -189,7 +189,7 @@ def _recognised(log: Log) -> Iterator[str]:
     )
     if "temperature" not in used and (heat := thermometers(log.source.names)):
         each = short_list([names[place] for place in heat])
-        yield f"temperature: which of {each}, in °C? Give --columns temperature=NAME"
+        yield f"temperature: which of {each}, in °C? Give `columns` temperature=NAME"
     yield from log.source.notes
 
 
@@ -281,11 +281,11 @@ def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
     share = norm / gravity - 1
     if abs(share) <= LARGEST["scale"]:
         return []
-    options = "--scale and --offset" if settings.unit == "counts" else "--unit"
+    options = "`scale` and `offset`" if settings.unit == "counts" else "`unit`"
     return [
         f"at rest the forces are about {norm:.3g} m/s², {100 * abs(share):.0f} % "
         f"{'more' if share > 0 else 'less'} than gravity, {gravity:g} m/s²: no accelerometer is so "
-        f"far off; check {options}, and --gravity"
+        f"far off; check {options}, and `gravity`"
     ]
 
 

@@ -97,7 +97,7 @@ def import_means(
         unit = UNITS["rad"][given]
         angles = np.column_stack([values[key] for key in ANGLES]) * signs[:2]
         if better := better_angles(angles, given, campaign.forces, campaign.gravity):
-            right = "another --frame" if better == OPPOSITE else f"--robot-unit {better}"
+            right = "another `frame`" if better == OPPOSITE else f"`robot_unit` {better}"
             raise InputError(
                 f"{path}: the robot's angles do not fit the forces in {given}; {right} would be "
                 "right"
@@ -128,16 +128,16 @@ def _values(log: Log, settings: ImportSettings) -> tuple[dict[str, Array], list[
         for missing in (key for key in ANGLES if key not in angles):
             raise InputError(
                 f"{log.path}: which column is the robot's {missing}? Name it by "
-                f"--columns {missing}=..."
+                f"`columns` {missing}=..."
             )
     elif {*angles} & {*settings.columns}:
         raise InputError(
             f"{log.path}: columns {', '.join(angles)}: give the standard deviation of the "
-            "robot's angles (--robot-sigma)"
+            "robot's angles (`robot_sigma`)"
         )
     elif angles:
         warnings.append(
-            f"columns {', '.join(angles)} are left out; --robot-sigma takes them for the robot's"
+            f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"
         )
         values = {key: column for key, column in values.items() if key not in angles}
     if not len(rows.forces):

@@ -126,7 +126,7 @@ def read_log(
         if like is None or "columns" in given:
             raise
         raise InputError(
-            f"{error}; the columns are those of the log of the campaign, --columns and --time "
+            f"{error}; the columns are those of the log of the campaign, `columns` and `time` "
             "change them"
         ) from None
     return Log(
@@ -183,8 +183,8 @@ def _places(
                 raise
             if needed:
                 raise InputError(
-                    f"{error}; give the column of time (--time), or the rate (--rate), or, for a "
-                    "log without the moves between positions, the samples of each (--block)"
+                    f"{error}; give the column of time (`time`), or the rate (`rate`), or, for a "
+                    "log without the moves between positions, the samples of each (`block`)"
                 ) from None
             continue
         if key in ("time", *wanted) or not {*place.values()} & {*places.values()}:
@@ -286,7 +286,7 @@ def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) ->
     known = dated or "nanoseconds" in nanoseconds_beside(source, places)
     if "time" in places and time_unit != "s" and known:
         name = source.names[places["time"]]
-        raise InputError(f"{source.path}: column {name} tells its unit; leave --time-unit out")
+        raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
     return 1e-9 if dated else UNITS["s"][time_unit]
 
 
@@ -479,7 +479,7 @@ class Log:
             return ""
         return (
             f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
-            f"--time-unit {unit}"
+            f"`time_unit` {unit}"
         )
 
     def _check(self, samples: Samples) -> None:
@@ -495,7 +495,7 @@ class Log:
         count = rows - len(samples.row)
         if count > MANY * rows:
             key = self._lost_in(first := int(self._unusable[0]))
-            hint = "; give the rate (--rate) instead" if key == "time" else ""
+            hint = "; give the rate (`rate`) instead" if key == "time" else ""
             raise InputError(
                 f"{self.path}: {self.describe(first, key)}, not a usable number{hint}; "
                 f"{count} of {counted(rows, 'row')} lack one, which are too many"

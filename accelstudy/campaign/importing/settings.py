@@ -142,17 +142,26 @@ def _which(text: str) -> Which | None:
     return tuple(sorted({int(number) for number in numbers}))
 
 
-def parse_settings(content: Mapping[str, Any], source: str = "settings") -> ImportSettings:
-    """Check settings; raise `InputError` with one line that names the source and the key."""
-    return checked(ImportSettings, content, source)
+def parse_settings(
+    content: Mapping[str, Any],
+    source: str | Path = "settings",
+    names: Mapping[str, str] | None = None,
+) -> ImportSettings:
+    """Check settings; raise `InputError` with one line that names the source and the key.
+
+    `names` are those of keys that are not from the source, see `checked`.
+    """
+    return checked(ImportSettings, content, source, names=names)
 
 
 def read_settings(
-    path: str | Path | None, given: Mapping[str, Any] | None = None
+    path: str | Path | None,
+    given: Mapping[str, Any] | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> ImportSettings:
-    """Settings from a YAML file, overlaid with `given`."""
+    """Settings from a YAML file, overlaid with `given`, whose keys messages call by `names`."""
     content = read_layer(path) if path is not None else {}
-    return parse_settings(overlay(content, given or {}), str(path or "options"))
+    return parse_settings(overlay(content, given or {}), str(path or "settings"), names)
 
 
 def named_after(settings: ImportSettings, paths: Sequence[LogFile]) -> ImportSettings:

@@ -131,7 +131,7 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
         if not found:
             raise InputError(f"{path}: no {what}")
         raise InputError(
-            f"{path}: which {what}? There are {', '.join(found)}; give --variable {min(found)}"
+            f"{path}: which {what}? There are {', '.join(found)}; give `variable` {min(found)}"
         )
     return next(iter(found)) if wanted is None else wanted
 
@@ -177,7 +177,7 @@ class TextSource(Source):
             tables = [table for table in tables if table.delimiter is not None]
         table = max(tables, key=lambda table: table.score)
         if not table.score:
-            advice = "" if delimiter is None else f" with --delimiter {delimiter!r}"
+            advice = "" if delimiter is None else f" with `delimiter` {delimiter!r}"
             raise InputError(f"{path}: no line of numbers at the beginning{advice}")
         self.delimiter, self.decimal = table.delimiter, table.decimal
         self.first, self.width = table.first, table.width

@@ -51,7 +51,7 @@ def samples_in(log: Recording, window: float) -> int:
         raise InputError(
             f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
             f"{1 / log.step:.6g} per second"
-            f"{log.likely_unit() or '; is the rate (--rate) right?'}"
+            f"{log.likely_unit() or '; is the rate (`rate`) right?'}"
         )
     return round(samples) | 1
 

@@ -1,0 +1,149 @@
+"""Designs of a program: the best positions for a calibration."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from accelstudy.api.given import path_of
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import LONGEST
+from accelstudy.basics.units import (
+    angle_note,
+    attitude_unit,
+    display_unit,
+    to_attitude,
+    to_display,
+)
+from accelstudy.basics.wording import amount
+from accelstudy.design.spaces import attitudes
+from accelstudy.files.outputs import new_file
+from accelstudy.pages.notebook import notebook_html
+from accelstudy.proposal.proposal import REFERENCE, Proposal, write_design
+from accelstudy.schemes import get_scheme, is_scheme_file
+
+
+class Design:
+    """The best positions for a calibration, in the order in which to take them.
+
+    Attributes
+    ----------
+    proposal : accelstudy.proposal.proposal.Proposal, all of it
+    """
+
+    def __init__(self, proposal: Proposal) -> None:
+        self.proposal = proposal
+
+    @property
+    def inputs(self) -> list[str]:
+        """Files that were read."""
+        request = self.proposal.request
+        read = [request.attitudes] if request.attitudes.endswith(".csv") else []
+        return read + [one for one in (request.after,) if one and is_scheme_file(one)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the positions, with angles in the unit that the names say."""
+        unit, proposal = attitude_unit(), self.proposal
+        roll, pitch = to_attitude(attitudes(proposal.directions)).T
+        rows = pd.DataFrame(
+            {
+                "position": range(1, len(roll) + 1),
+                f"roll/{unit}": roll.round(2) + 0.0,
+                f"pitch/{unit}": pitch.round(2) + 0.0,
+                f"turn/{unit}": to_attitude(proposal.turns),
+            }
+        )
+        return rows.assign(**{"turned about": axes}) if (axes := proposal.axes) else rows
+
+    def table(self) -> str:
+        """Return the positions as text."""
+        rows = self.to_frame()
+        for column, form in zip(rows.columns[1:4], ("{:.2f}", "{:.2f}", "{:.0f}"), strict=True):
+            rows[column] = ["" if x != x else form.format(x) for x in rows[column]]
+        return rows.to_string(index=False)
+
+    def summary(self) -> str:
+        """Return the positions and what they bring as text."""
+        return "\n".join([self.table(), *self.lines()])
+
+    def lines(self) -> Iterable[str]:
+        """What the design brings, in sentences."""
+        proposal, request, unit = self.proposal, self.proposal.request, display_unit("rad")
+        n, m = len(proposal.directions), get_scheme(REFERENCE).n_positions
+        noise = request.noise
+        given = f"noise {to_display(noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
+        if request.task.approach.uses_angles:
+            given += f" and robot noise {to_display(noise.sigma_angle, 'rad'):.3g} {unit}"
+        tilt = f"{to_attitude(request.tilt_range):.4g} {attitude_unit()}"
+        effects = ", the neglected effects included" if request.neglect else ""
+        after = f" after {request.after}" if request.after else ""
+        yield (
+            "\nturn: angle from the position before; 0 repeats it."
+            f"\nExpected rms of leveling for tilts up to {tilt}, with {given}{effects}:"
+        )
+        yield f"  these {n} positions{after}: {_both(proposal.rms)}"
+        if proposal.placed is not None:
+            yield f"  if a hand misses them by 5° (sd per axis): {_both(proposal.placed)}"
+        reference = proposal.reference
+        theirs = "do not determine the model" if reference is None else _both(reference)
+        yield f"  the {m} of {REFERENCE}{after}: {theirs}"
+        if sizes := proposal.nameable(proposal.directions):
+            there = proposal.nameable(get_scheme(REFERENCE).directions)
+            yield "Size from which a parameter is found, and told from the other effect:"
+            for name, (size, of) in sizes.items():
+                here, other = (amount(s, of) for s in (size, there[name][0]))
+                yield f"  {name}: {here} {display_unit(of)} ({REFERENCE}: {other})"
+        share = 100 * proposal.design.efficiency
+        if share == share:
+            yield (
+                f"Efficiency at least {share:.1f} % of the best that any {n} "
+                f"allowed positions can reach ({request.chosen.text})."
+            )
+        yield f"Noise of a leveled reading comes on top. {angle_note()}."
+
+    def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
+        """Write the YAML file of a scheme.
+
+        Parameters
+        ----------
+        path : path, ending in .yaml
+        force : bool, whether to replace a file that is there
+        """
+        out = scheme_file(path)
+        with new_file(out, self.inputs, force) as file:
+            self.write(file, out)
+
+    def write(self, file: Path, out: Path) -> None:
+        """Write a file that becomes `out`, by which the scheme is named."""
+        proposal = self.proposal
+        extra = {"turn_about": proposal.axes} if proposal.axes else None
+        name = re.sub(r"[^\w.-]+", "-", out.stem).lstrip(".-")[: LONGEST // 2] or "scheme"
+        kind = proposal.request.chosen.name
+        kind = f"{kind}-optimal" if len(kind) == 1 else kind
+        title, source = f"{name} ({kind})", f"accelstudy design, seed {proposal.request.seed}"
+        write_design(file, name, title, source, proposal.directions, proposal.made(), extra)
+
+    def __repr__(self) -> str:
+        return f"Design({len(self.proposal.directions)} positions)"
+
+    def _repr_html_(self) -> str:
+        return notebook_html("Design", " ".join(self.lines()), self.to_frame())
+
+
+def scheme_file(path: Any) -> Path:
+    """Path of a file that is known as a scheme."""
+    out = path_of("path", path)
+    if not out.name.endswith((".yaml", ".yml")):
+        raise InputError(f"{out}: must end in .yaml, by which a file is known as a scheme")
+    return out
+
+
+def _both(rms: Any) -> str:
+    unit = display_unit("rad")
+    roll, pitch = to_display(rms, "rad")
+    return f"roll {roll:.2f} {unit}, pitch {pitch:.2f} {unit}"

@@ -1,0 +1,333 @@
+"""Commands of verbs with parts of the terminal: several outputs, files, a session that goes on."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from accelstudy.api.given import LAYOUT
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, show, stage, warn
+from accelstudy.basics.wording import counted
+from accelstudy.commands.bridge import PATH, command, inputs_of
+from accelstudy.files import outputs
+from accelstudy.files.outputs import new_file, result_folder
+from accelstudy.verbs import calibrations, campaigns, planning
+from accelstudy.verbs.kinds import File, Force, check, verb
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing.making import ImportReport
+    from accelstudy.campaign.session import Campaign
+
+POLL = 1.0
+"""Seconds between two looks at a growing table."""
+
+
+def run_import(
+    log: tuple[Path, ...],
+    out: Path,
+    force: bool,
+    figure: bool,
+    sensors: tuple[str, ...],
+    **given: Any,
+) -> None:
+    """Write a campaign for each sensor of a log."""
+    from accelstudy.api.campaigns import Import
+    from accelstudy.campaign.importing.logs import import_each
+
+    columns = dict(_sensor(text) for text in sensors)
+    logs = Import.of(log, check(campaigns.find_holds, given), columns)
+    folders = {name: out / name for name in logs.settings.sensors} or {"": out}
+    inputs = [*map(Path, map(str, logs.files)), *inputs_of(campaigns.find_holds, given)]
+    with ExitStack() as stack:
+        made = {
+            name: stack.enter_context(result_folder(folder, outputs.CAMPAIGN, inputs, force))
+            for name, folder in folders.items()
+        }
+        imported = import_each(made, logs.files, logs.settings, figure, logs.beside)
+    for name, result in imported.items():
+        if name:
+            say(f"sensor {name}")
+        show_import(*result, folders[name], figure)
+
+
+def _sensor(text: str) -> tuple[str, list[str]]:
+    name, _, columns = text.partition("=")
+    places = [column.strip() for column in columns.split(",")]
+    if len(places) != 3 or not all(places):
+        raise InputError(f"--sensor: expected a name and three columns, as a=1,2,3, not {text!r}")
+    return name.strip(), places
+
+
+def show_import(campaign: Campaign, report: ImportReport, out: Path, figure: bool = True) -> None:
+    """Tell what was imported, with its warnings, and where to."""
+    for line in report.lines():
+        say(line)
+    for warning in report.warnings:
+        warn(warning)
+    if figure and report.holds is not None:
+        say(f"figure: {out / 'segmentation.png'}")
+    click.echo(f"campaign: {out} ({counted(campaign.n_positions, 'position')})")
+
+
+IMPORT = command(
+    campaigns.find_holds,
+    "accelstudy import calibration.csv --out my-campaign",
+    "accelstudy import log.csv --out by-number --rate 100 --columns fx=0,fy=1,fz=2",
+    "accelstudy import calibration.csv --out beside "
+    "--reference-log ref.csv --reference calibrated/calibration.json",
+    name="import",
+    writes=outputs.CAMPAIGN,
+    out="Folder of the campaign.",
+    more="segmentation.png in the folder shows the holds with their numbers. With --sensor, which "
+    "may be repeated as --exclude and --join may, each sensor has a campaign of its own in the "
+    "folder, which is named after the log and the sensor.",
+    run=run_import,
+    options=(
+        click.Option(
+            ["--sensor", "sensors"],
+            multiple=True,
+            help="Columns of one of several sensors: NAME=ax,ay,az.",
+        ),
+        click.Option(["--figure/--no-figure"], default=True, help="Draw the log with its holds."),
+    ),
+    sections={
+        "The log": "columns sensors time time_unit rate delimiter variable",
+        "Its numbers": "unit scale offset range frame",
+        "The holds": "threshold window trim shortest exclude join figure",
+        "A log of blocks instead": "block",
+        "A table of means instead": "means robot_sigma robot_unit",
+        "A calibrated sensor beside it": (
+            "reference_log reference reference_columns reference_offset"
+        ),
+        "The campaign": "out name gravity settings",
+    },
+)
+
+
+def run_simulate_campaign(
+    out: Path, truth: Path | None, force: bool, name: str | None, **given: Any
+) -> None:
+    """Write a simulated campaign and, apart from it, the truth."""
+    from accelstudy.campaign.format import write_campaign
+    from accelstudy.campaign.simulated import write_truth
+
+    # The truth enters first and is moved last: it may be meant for a folder that is made here.
+    with (
+        nullcontext() if truth is None else new_file(truth, force=force) as truth_file,
+        result_folder(out, outputs.CAMPAIGN, force=force) as folder,
+        stage("simulation"),
+    ):
+        campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **given)
+        write_campaign(campaign, folder, plausible=not given["gross_errors"])
+        if truth_file is not None:
+            write_truth(dict(campaign.truth), truth_file)
+    click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
+
+
+SIMULATE_CAMPAIGN = command(
+    campaigns.simulate_campaign,
+    'accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"',
+    writes=outputs.CAMPAIGN,
+    out="Folder of the campaign.",
+    more="The truth goes to --truth and nowhere else.",
+    run=run_simulate_campaign,
+    options=(click.Option(["--truth"], type=PATH, help="YAML file for the truth."),),
+    sections={
+        "What is written": "out truth name seed",
+        "The sensor": "model effects size noise_effects gross_errors",
+        "Its noise": "sigma sigma_known sigma_angle n_samples",
+        "The holds": "scheme repeats repeat_first order approach yaw gravity",
+        "Their conditions": "interval temperature temperature_order vibration",
+    },
+    retired={
+        "--gross": "--gross-error takes it",
+        "--sigma-unknown!": "--no-sigma-known says it",
+        "--robot-sigma-mgon": "--sigma-angle takes it with its unit, as 5mgon",
+        "--samples-per-hold": "--n-samples takes it",
+        "--no-time!": "--interval none says it",
+        "--hold": "campaigns have no slopes within holds",
+    },
+    angles=False,
+)
+
+
+def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any) -> None:
+    """Write a log with roll and pitch."""
+    from accelstudy.api.logs import layout_of
+    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.calibration.leveling import level_log
+
+    given = check(calibrations.apply, given)
+    layout = layout_of({name: given[name] for name in LAYOUT if name in given})
+    with new_file(out, [calibration, log], force) as path:
+        read = read_calibration(calibration)
+        leveled = level_log(read, log, path, layout, given["sigma"], given["start"])
+    for warning in leveled.warnings:
+        warn(warning)
+    click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
+
+
+APPLY = command(
+    calibrations.apply,
+    "accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv",
+    writes="file",
+    out="CSV or Parquet file to write.",
+    run=run_apply,
+)
+
+
+def run_data_sheet(source: Path, out: Path, force: bool, **given: Any) -> None:
+    """Write a data sheet, and print what it says of a mean."""
+    from accelstudy.data_sheets.measured import yaml_of
+
+    inputs = [source, *inputs_of(planning.data_sheet, given)]
+    with new_file(out, inputs, force) as path, stage("Allan deviation"):
+        sheet = planning.data_sheet(source, **given)
+        path.write_text(yaml_of(sheet), encoding="utf-8")
+    for duration in (1.0, 10.0, 100.0) if sheet.position_sigma is None else ():
+        sigma = 1e3 * sheet.sigma_mean(duration)
+        click.echo(f"sigma of the mean of {duration:g} s: {sigma:.3g} mm/s²")
+    if sheet.position_sigma is not None:
+        click.echo(f"sigma of the mean of a position: {1e3 * sheet.position_sigma:.3g} mm/s²")
+    say(f"data sheet: {out}")
+
+
+DATA_SHEET = command(
+    planning.data_sheet,
+    "accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml",
+    writes="file",
+    out="YAML file to write.",
+    run=run_data_sheet,
+    angles=False,
+)
+
+
+@verb
+def public(
+    name: str | None = None,
+    *,
+    out: File | None = None,
+    folder: File = "resources/public",
+    force: Force = False,
+) -> None:
+    """Make a campaign of public data, or list what there is.
+
+    A download is checked by its sha256.
+
+    Parameters
+    ----------
+    name : str
+        Name of the data; without it they are listed.
+    out : path
+        Folder of the campaign.
+    folder : path
+        Where the file is, in any subfolder, or is downloaded to.
+    """
+    from accelstudy.campaign.importing.logs import import_to
+    from accelstudy.campaign.importing.public import import_settings, public_data, public_file
+
+    if name is None:
+        for key, entry in public_data().items():
+            click.echo(f"{key}: {entry.description}\n    {entry.licence}, {entry.url}")
+        return
+    settings = import_settings(name)
+    if out is None:
+        raise InputError("--out: give the folder of the campaign")
+    place, downloads = Path(out), Path(folder)
+    with result_folder(place, outputs.CAMPAIGN, [downloads], force) as campaign:
+        imported = import_to(campaign, public_file(name, downloads), settings)
+    show_import(*imported, place)
+
+
+PUBLIC = command(public, "accelstudy public", "accelstudy public xsens-mti --out xsens")
+
+
+def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
+    """Print advice, again and again with --watch."""
+    from accelstudy.api.advice import Adviser
+    from accelstudy.sequential.running import Watch, read_as_it_is
+
+    given, session = check(planning.advise, given), Watch(campaign)
+    if watch:
+        now = next(session.look())
+    else:
+        running = read_as_it_is(campaign)
+        now = running.campaign
+        if running.unfinished:
+            warn(f"{campaign}: the last line of the table is not whole; it is not counted")
+    adviser = Adviser(now, campaign, **given)
+    for warning in now.warnings:
+        warn(warning)
+    show(adviser(now).summary())
+    if not watch:
+        return
+    say("\nwaiting for the next position; Ctrl-C ends")
+    try:
+        while True:
+            time.sleep(POLL)
+            try:
+                sessions = list(session.look())
+            except InputError as error:
+                click.echo("")
+                warn(f"waiting for a whole table: {error}")
+                continue
+            for now in sessions:
+                click.echo("")
+                show(adviser(now).summary())
+    except KeyboardInterrupt:
+        say("\nended")
+
+
+ADVISE = command(
+    planning.advise,
+    "accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon",
+    run=run_advise,
+    options=(
+        click.Option(["--watch"], is_flag=True, help="Wait for further positions until Ctrl-C."),
+    ),
+    sections={
+        "What is wanted": "tilt_accuracy tilt_range",
+        "The calibration": "approach model prior",
+        "Positions to choose from": "attitudes pole_distance max_roll max_pitch",
+        "The session": "watch",
+    },
+)
+
+
+def run_design(out: Path, force: bool, **given: Any) -> None:
+    """Write a design, and print what it brings."""
+    from accelstudy.api.designs import scheme_file
+
+    read = inputs_of(planning.find_positions, given)
+    with new_file(scheme_file(out), read, force) as path:
+        design = planning.find_positions(**given)
+        design.write(path, out)
+    click.echo(design.table())
+    for line in design.lines():
+        say(line)
+    say(f"scheme: {out}")
+
+
+DESIGN = command(
+    planning.find_positions,
+    "accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon --out my-scheme.yaml",
+    "accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign",
+    name="design",
+    writes="file",
+    out="YAML file for the positions.",
+    run=run_design,
+    sections={
+        "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
+        "What the positions are to be good for": (
+            "criterion tilt_range neglect discriminate prior after"
+        ),
+        "What the positions must keep to": (
+            "attitudes mountings roll pitch pole_distance least_angle"
+        ),
+    },
+)

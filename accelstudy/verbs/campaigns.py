@@ -1,0 +1,292 @@
+"""Verbs that make campaigns and logs, of files or of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Annotated
+
+from accelstudy.api.given import GRAVITY
+from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
+from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
+from accelstudy.verbs.kinds import (
+    ApproachName,
+    Columns,
+    ColumnsOf,
+    Delimiter,
+    EffectName,
+    File,
+    Frame,
+    GrossErrorName,
+    ModelName,
+    NoiseEffectName,
+    Numbers,
+    Offset,
+    Quantity,
+    Rate,
+    Scale,
+    SchemeName,
+    Seed,
+    Time,
+    TimeUnit,
+    Unit,
+    Variable,
+    Word,
+    si,
+    verb,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from accelstudy.api.campaigns import SimulatedCampaign
+    from accelstudy.api.logs import Log
+    from accelstudy.campaign.session import Campaign
+
+SIGMA = bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most
+INTERVAL = bounds.INTERVAL.least, bounds.INTERVAL.most
+Seconds = si("s", 1e-9, 1e6)
+
+
+@verb
+def read_log(
+    log: str | PathLike[str] | pd.DataFrame,
+    *,
+    columns: ColumnsOf = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    rate: Rate = None,
+    delimiter: Delimiter = None,
+    variable: Variable = None,
+    unit: Unit = None,
+    scale: Scale = None,
+    offset: Offset = None,
+    frame: Frame = None,
+) -> Log:
+    """Say which log to read, and how.
+
+    Parameters
+    ----------
+    log : path or DataFrame
+        Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS 1 or 2 (extra ros) or a
+        ULog of PX4 (extra px4); a table in memory, of which an index of dates is the time.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or a value is wrong.
+    """
+    layout = {**locals()}
+    from accelstudy.api.logs import open_log
+
+    return open_log(layout.pop("log"), layout)
+
+
+@verb
+def find_holds(
+    log: Log | str | PathLike[str] | pd.DataFrame | Sequence[str | PathLike[str]],
+    *,
+    columns: ColumnsOf = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    rate: Rate = None,
+    delimiter: Delimiter = None,
+    variable: Variable = None,
+    unit: Unit = None,
+    scale: Scale = None,
+    offset: Offset = None,
+    range: Annotated[float | str | None, Word()] = None,
+    frame: Frame = None,
+    threshold: Annotated[Quantity | None, si("m/s^2", *SIGMA)] = None,
+    window: Annotated[Quantity | None, Seconds] = None,
+    trim: Annotated[Quantity | None, si("s", 0, 1e6)] = None,
+    shortest: Annotated[Quantity | None, Seconds] = None,
+    exclude: str | Sequence[str] = (),
+    join: str | Sequence[str] = (),
+    block: Annotated[int, Range(4, 10**9)] | None = None,
+    means: bool = False,
+    robot_sigma: Annotated[Quantity | None, Given("rad", "", 0, 100 * GON)] = None,
+    robot_unit: str | None = None,
+    reference_log: File | None = None,
+    reference: File | None = None,
+    reference_columns: Annotated[Mapping[str, str | int] | str | None, Columns()] = None,
+    reference_offset: Annotated[Quantity | None, si("s", -1e12, 1e12)] = None,
+    name: str | None = None,
+    gravity: Annotated[Quantity | None, GRAVITY] = None,
+    settings: File | None = None,
+) -> Campaign:
+    """Make a campaign of a raw log: find its static holds.
+
+    The noise of the log itself tells what is at rest, unless `threshold` does.
+
+    With `reference_log` and `reference` a calibrated sensor on the same plate takes the place of a
+    robot: it tells roll and pitch of each hold. Its times are of the same clock as those of the
+    log.
+
+    Parameters
+    ----------
+    log : Log or path or DataFrame, or several paths
+        Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS 1 or 2 (extra ros) or a
+        ULog of PX4 (extra px4). Of several files, a folder or a pattern, each file is one position.
+    range : float in m/s², or str
+        Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.
+    threshold : float in m/s², or str with a unit
+        Largest sd at rest, m/s². [default: from the log]
+    window : float in s, or str with a unit
+        Seconds over which rest is judged. [default: 1; of a slow log 9 samples]
+    trim : float in s, or str with a unit
+        Seconds cut from both ends of a hold. [default: 0.2]
+    shortest : float in s, or str with a unit
+        Shortest hold, s, without its ends. [default: 1]
+    exclude : str, or several
+        What to leave out, and why: 13:moved, 120s-135s:moved.
+    join : str, or several
+        Holds that are one: 4,5 or 120s-135s.
+    block : int
+        Samples of each position, in a log without the moves between them.
+    means : bool
+        The log is a table with the mean of each hold.
+    robot_sigma : float in rad, or str with a unit
+        Sd of the robot's roll and pitch, as 3.2mgon.
+    robot_unit : str
+        Unit of the robot's angles: gon, deg, rad. [default: gon]
+    reference_log : path
+        Raw log of a calibrated sensor on one plate with it.
+    reference : path
+        The calibration.json of that sensor.
+    reference_columns : mapping or str
+        Its columns: fx=a,fy=b,fz=c,time=t. [default: as in the log of its calibration]
+    reference_offset : float in s, or str with a unit
+        Seconds to add to its times. [default: 0; without times both logs begin together]
+    name : str
+        Name of the campaign. [default: that of the file]
+    gravity : float in m/s², or str with a unit
+        Local gravity, m/s². [default: 9.80665]
+    settings : path
+        YAML file with settings; options go before it.
+
+    Returns
+    -------
+    Campaign
+        What was found and assumed stands in `notes`, what its user should know in `warnings`.
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, has no holds, or a setting is wrong.
+    """
+    given = {**locals()}
+    from accelstudy.api.campaigns import Import
+
+    return Import.of(given.pop("log"), given).campaign()
+
+
+@verb
+def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Campaign:
+    """Read a campaign from its folder; see `accelstudy.campaign.format.read_campaign`.
+
+    Parameters
+    ----------
+    folder : path
+    plausible : bool
+        Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
+        wrong with it, too.
+    """
+    from accelstudy.api.given import path_of
+    from accelstudy.campaign.format import read_campaign as read_folder
+
+    return read_folder(path_of("folder", folder), plausible=plausible)
+
+
+@verb
+def simulate_campaign(
+    *,
+    name: str | None = None,
+    seed: Seed = 1,
+    scheme: SchemeName = "mclaren-24",
+    repeats: Annotated[int, bounds.POSITIONS] = 1,
+    repeat_first: Annotated[int, Range(0, bounds.POSITIONS.most)] = 0,
+    order: str = "scheme",
+    approach: ApproachName = "robot",
+    model: ModelName = "bias-scale-nonorthogonality",
+    effects: EffectName | Sequence[EffectName] = (),
+    size: Annotated[Quantity, si("1", bounds.SIZE.least, bounds.SIZE.most)] = 1,
+    noise_effects: NoiseEffectName | Sequence[NoiseEffectName] = (),
+    gross_errors: GrossErrorName | Sequence[GrossErrorName] = (),
+    sigma: Annotated[Quantity, si("m/s^2", *SIGMA)] = "2mm/s^2",
+    sigma_known: bool = True,
+    sigma_angle: Annotated[Quantity, Given("rad", "", 0, 100 * GON)] = "3.2mgon",
+    gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
+    interval: Annotated[Quantity | None, si("s", *INTERVAL)] = "60s",
+    temperature: Annotated[
+        tuple[float, float] | str | None, Numbers("two numbers, as 20:40", ":", 2)
+    ] = None,
+    temperature_order: str = "linear",
+    vibration: Annotated[
+        tuple[float, float] | str | None, Numbers("two numbers, as 0:1", ":", 2)
+    ] = None,
+    yaw: str = "none",
+    n_samples: Annotated[int, bounds.SAMPLES] | None = None,
+) -> SimulatedCampaign:
+    """Simulate a campaign with effects of your choice.
+
+    It can have noise effects and gross errors, too; `accelstudy effects` lists them. What is not
+    given is drawn at random, from the seed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the campaign. [default: that of its folder, or simulated]
+    scheme : str
+        Positions; `accelstudy schemes` lists them.
+    repeats : int
+        How often the scheme is measured.
+    repeat_first : int
+        First holds that are measured again at the end.
+    order : str
+        Order of the holds: scheme or random.
+    effects : str, or several
+        An effect beside the model, as 'warm_up(tau=400)' or, with its parameters in SI,
+        'thermal_bias: 0.004, -0.002, 0.001'; one of an effect of the model replaces it.
+    size : float
+        Factor of the typical size of each effect of `effects` without parameters.
+    noise_effects : str, or several
+        A noise effect, as 'heavy_tails(nu=3)'.
+    gross_errors : str, or several
+        A gross error, as 'row_order(first=3, second=4)'.
+    sigma : float in m/s², or str with a unit
+        Sd of a position's mean.
+    sigma_known : bool
+        Whether the campaign states its noise.
+    sigma_angle : float in rad, or str with a unit
+        Sd of the robot's roll and pitch.
+    gravity : float in m/s², or str with a unit
+        Local gravity.
+    interval : float in s, or str with a unit
+        Time between holds; none leaves it out.
+    temperature : two of float, or str
+        First and last temperature, °C, as 20:40.
+    temperature_order : str
+        Course of the temperature: linear, ABBA or random.
+    vibration : two of float, or str
+        Lowest and highest rms, m/s², as 0:1.
+    yaw : str
+        Yaw of the holds: none or random.
+    n_samples : int
+        Samples of a hold; adds columns on them.
+
+    Returns
+    -------
+    Campaign
+        With the truth as `truth`.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or a value is wrong.
+    """
+    settings = {**locals()}
+    from accelstudy.api.campaigns import simulated
+
+    return simulated({**settings, "name": name or "simulated"})
