@@ -49,13 +49,12 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
 
 
 @pytest.mark.parametrize(("sigmas", "dof"), [
-    (UNEQUAL, STATED), (EQUAL, np.full(6, 9.0)),
-    (EQUAL, np.array([1.0, 63, 63, 63, 63, 63])), (UNEQUAL, np.array([63.0, 1, 63, 3, np.inf, 2])),
+    (UNEQUAL, STATED), (EQUAL, np.full(6, 9.0)), (UNEQUAL, np.array([63.0, 1, 63, 3, np.inf, 2])),
 ])  # fmt: skip
 def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     """A change where there is none, and a scatter beside a drift."""
     sure = np.isinf(dof).all()
-    n = N if sure else 150
+    n = 300 if sure else 120
     still = [c.p_values()[0] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
     drifting = [c.p_values()[2] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
