@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from accelstudy.api.advice import Advised
+    from accelstudy.api.advice import SessionAdvice
     from accelstudy.api.calibrations import Calibration
     from accelstudy.api.catalogues import catalogue
     from accelstudy.api.designs import Design
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES = {
-    "api.advice": ("Advised",),
+    "api.advice": ("SessionAdvice",),
     "api.calibrations": ("Calibration",),
     "api.catalogues": ("catalogue",),
     "api.designs": ("Design",),
@@ -58,7 +58,6 @@ _PLACES = {
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
-    "Advised",
     "Calibration",
     "Campaign",
     "Comparison",
@@ -69,6 +68,7 @@ __all__ = [
     "Log",
     "Lot",
     "Plan",
+    "SessionAdvice",
     "Simulation",
     "advise",
     "apply",

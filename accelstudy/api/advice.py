@@ -11,6 +11,7 @@ import numpy as np
 from accelstudy.api.calibrations import as_calibration
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.basics.suggested import calibrate
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.of_type import SensorType, read_type
@@ -28,7 +29,7 @@ TYPES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Advised:
+class SessionAdvice:
     """What to do next in a session.
 
     Attributes
@@ -36,23 +37,39 @@ class Advised:
     advice : accelstudy.sequential.advisor.Advice, all of it
     heading : str, what was advised on
     lines : list of str, the advice, most important last
+    command : str, that calibrates the session if it is enough; else empty
     """
 
     advice: Advice
     heading: str
     lines: list[str]
+    command: str
 
     @property
     def enough(self) -> bool:
         """Whether the accuracy is reached."""
         return self.advice.enough
 
+    @property
+    def state(self) -> str:
+        """State in a word: enough, not yet, or rejected or implausible as the calibration."""
+        if self.enough:
+            return "enough"
+        wrong = self.advice.state in (REJECTED, IMPLAUSIBLE)
+        return self.advice.state if wrong else "not yet"
+
+    @property
+    def verdict(self) -> str:
+        """How far it is to the accuracy that is wanted, in a sentence."""
+        return self.lines[-1]
+
     def summary(self) -> str:
         """Return the advice as text."""
-        return "\n".join([self.heading, *(f"  {line}" for line in self.lines)])
+        more = [f"calibrate: {self.command}"] if self.command else []
+        return "\n".join([self.heading, *(f"  {line}" for line in (*self.lines, *more))])
 
     def __repr__(self) -> str:
-        return f"Advised({self.heading!r})"
+        return f"SessionAdvice({self.heading!r}, {self.state})"
 
 
 class Adviser:
@@ -88,15 +105,20 @@ class Adviser:
         self.prior = _prior(prior, self.model)
         self.type = prior if prior is not None and prior.suffix in TYPES else None
 
-    def __call__(self, session: Campaign) -> Advised:
+    def __call__(self, session: Campaign) -> SessionAdvice:
         """Advise on the session as it is now."""
         known = self.model, self.approach, self.promise, self.directions, self.prior
         advice = advise(session, *known)
-        said = lines(advice, session, self.model, self.promise)
+        command = ""
         if advice.enough:
             place, approach = self.place or Path("CAMPAIGN"), self.approach.name
-            said.append(f"calibrate: {calibrate(place, self._called, approach, self.type)}")
-        return Advised(advice, heading(advice, session, self.model, self.approach.name), said)
+            command = calibrate(place, self._called, approach, self.type)
+        return SessionAdvice(
+            advice,
+            heading(advice, session, self.model, self.approach.name),
+            lines(advice, session, self.model, self.promise),
+            command,
+        )
 
 
 def _prior(given: Any, wanted: SensorModel) -> Prior | SensorType:

@@ -42,7 +42,7 @@ from accelstudy.verbs.kinds import (
 )
 
 if TYPE_CHECKING:
-    from accelstudy.api.advice import Advised
+    from accelstudy.api.advice import SessionAdvice
     from accelstudy.api.designs import Design
     from accelstudy.api.plans import Plan
     from accelstudy.api.simulations import Simulation
@@ -271,7 +271,7 @@ def advise(
     pole_distance: Annotated[Quantity, Given("rad", "", 0.0, 2.0)] | None = None,
     max_roll: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
     max_pitch: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
-) -> Advised:
+) -> SessionAdvice:
     """Say in a session where to go next, and when to stop.
 
     The positions so far are calibrated and judged as `calibrate` does. The advice says what is not

@@ -148,6 +148,8 @@ def test_a_function_gives_what_its_command_writes(tmp_path):
     said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
     advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")
     assert (said.strip(), advice.enough) == (advice.summary().strip(), True)
+    assert advice.state == "enough"
+    assert advice.verdict in said
 
 
 @pytest.mark.parametrize("verb", ["calibrate", "diagnose", "compare", "history", "lot"])
