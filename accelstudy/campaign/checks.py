@@ -135,8 +135,9 @@ def check_norm(
     if not better and unit != "counts" and given > 100:
         better = ["counts"]
     if better:
+        needs = ", and need a scale" if better == ["counts"] else ""
         advice = remedies.unit.format(unit=better[0])
-        raise InputError(f"{what}: these look like {better[0]}, not {unit}; {advice}")
+        raise InputError(f"{what}: these look like {better[0]}, not {unit}{needs}; {advice}")
     raise InputError(f"{what}, nowhere near gravity, {gravity:g} m/s²; {remedies.other}")
 
 

@@ -161,7 +161,7 @@ def test_sigma_does_not_depend_on_the_offset():
 @pytest.mark.parametrize(("factor", "options", "message"), [
     (1 / G, [], "look like g, not m/s^2; give --unit g"),
     (1, ["--unit", "g"], "look like m/s^2, not g; give --unit m/s^2"),
-    (1e3, [], "look like counts, not m/s^2; give --unit counts"),
+    (1e3, [], "look like counts, not m/s^2, and need a scale; give --unit counts"),
     (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
     (1, ["--threshold", "1e300"], "--threshold: '1e300': must be at least 1e-09"),
     (1, ["--frame", "fru"], "is left-handed"),

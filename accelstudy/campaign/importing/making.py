@@ -35,7 +35,7 @@ COUNTS = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
 REMEDIES = Remedies(
-    unit="give `unit` {unit}, and `scale` if these are counts",
+    unit="give `unit` {unit}",
     gravity="give `gravity`",
     other="give other `unit`, `scale`, `offset` or `columns`",
 )
