@@ -199,7 +199,7 @@ class Command(click.Command):
                 formatter.write_dl(records)
 
 
-METAVARS = {"given": "quantity", "word": "text", "place": "column"}
+METAVARS = {"given": "quantity", "word": "text", "place": "column", "pairs": "columns"}
 """What the help calls a value of a kind that has another name."""
 
 

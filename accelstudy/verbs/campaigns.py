@@ -11,8 +11,8 @@ from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
 from accelstudy.verbs.kinds import (
+    COLUMNS,
     ApproachName,
-    Columns,
     ColumnsOf,
     Delimiter,
     EffectName,
@@ -110,7 +110,7 @@ def find_holds(
     robot_unit: str | None = None,
     reference_log: File | None = None,
     reference: File | None = None,
-    reference_columns: Annotated[Mapping[str, str | int] | str | None, Columns()] = None,
+    reference_columns: Annotated[Mapping[str, str | int] | str | None, COLUMNS] = None,
     reference_offset: Annotated[Quantity | None, si("s", -1e12, 1e12)] = None,
     name: str | None = None,
     gravity: Annotated[Quantity | None, GRAVITY] = None,

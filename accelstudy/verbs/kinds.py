@@ -126,28 +126,25 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Values:
-    """Values by their names."""
+class Pairs:
+    """Names with values, as a mapping, or as text.
+
+    Attributes
+    ----------
+    example : str, as they are written
+    """
+
+    example: str
 
     def read(self, name: str, value: Any) -> dict[str, Any]:
         """Mapping; the verb knows the names and what their values may be."""
-        of_type(name, value, Mapping, expected="a mapping of names to values")
-        return dict(value)
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Columns of a log, as text ``fx=1,fy=2,fz=3``, or a mapping."""
-
-    def read(self, name: str, value: Any) -> dict[str, Any]:
-        """Mapping of a quantity to the name or number of its column."""
         if isinstance(value, Mapping):
             return dict(value)
-        of_type(name, value, str, expected="a mapping, as {'fx': 'ax'}")
+        of_type(name, value, str, expected=f"a mapping, or a text as {self.example}")
         pairs = [part.split("=", 1) for part in value.split(",")]
         if any(len(pair) != 2 for pair in pairs):
-            raise InputError(f"{name}: expected fx=1,fy=2,fz=3 or names, not {shown(value)}")
-        return {axis.strip(): column.strip() for axis, column in pairs}
+            raise InputError(f"{name}: expected {self.example} or the like, not {shown(value)}")
+        return {key.strip(): said.strip() for key, said in pairs}
 
 
 Quantity = float | str
@@ -193,9 +190,10 @@ Force = Annotated[bool, "Overwrite files of the same names, but never an input."
 Seed = Annotated[int, bounds.SEED, "Seed of all random numbers."]
 
 # How the numbers of a log are read.
+COLUMNS = Pairs("fx=1,fy=2,fz=3")
 ColumnsOf = Annotated[
     Mapping[str, str | int] | str | None,
-    Columns(),
+    COLUMNS,
     "Columns of fx, fy, fz, temperature and vibration, by name, or by number from 0: "
     "fx=1,fy=2,fz=3.",
 ]
@@ -274,7 +272,7 @@ class Keyword:
             FileOrFolder: "path",
             Share: "float or str",
             Numbers: "str, or several float",
-            Columns: "mapping or str",
+            Pairs: "mapping or str",
             Place: "str or int",
             Word: "str",
         }

@@ -59,7 +59,7 @@ def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
     out = [] if verb in ("check-sigmas", "export", "advise") else ["--out", tmp_path / "out.yaml"]
     needed = NEEDED.get(verb, {})
     for keyword in kinds.keywords(function(verb)):
-        checked = Given | Range | kinds.Share | kinds.Numbers | kinds.Columns
+        checked = Given | Range | kinds.Share | kinds.Numbers | kinds.Pairs
         if keyword.ends or not isinstance(keyword.kind, checked):
             continue
         given = {**needed, keyword.name: "5 parsec"}
