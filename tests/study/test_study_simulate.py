@@ -211,14 +211,8 @@ def test_nothing_is_left_when_the_disk_is_full(monkeypatch, tmp_path):
     assert files(tmp_path) == []
 
 
-def test_a_whole_file_appears_at_once_and_overwrites_remains(tmp_path):
+def test_a_whole_file_appears_at_once(tmp_path):
     path = tmp_path / "page.html"
-    with whole_file(path) as temporary:
-        temporary.write_text("remains of a killed job")
-        remains, text = temporary, temporary.read_text()
-    path.unlink()
-    remains.parent.mkdir()
-    remains.write_text(text)
     with whole_file(path) as temporary:
         temporary.write_text("new")
         assert not path.exists()
