@@ -8,14 +8,17 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
 from tempfile import mkdtemp
+from time import time
 
 from accelstudy.basics.errors import InputError
 
+DAY = 86400.0
+"""s"""
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
 
 
@@ -196,11 +199,16 @@ def is_temporary(path: Path) -> bool:
 def _staging(near: Path) -> Iterator[Path]:
     """A private folder in `near` or, if that does not exist, in the nearest folder above it.
 
-    Its name cannot be predicted, so nobody can place a link there.
+    Its name cannot be predicted, so nobody can place a link there. What a killed run left goes
+    after a day, in which any other run is over.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
         raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
+    for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
+        with suppress(OSError):  # another run may remove it as well
+            if time() - left.stat().st_mtime > DAY:
+                shutil.rmtree(left)
     stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
     try:
         yield stage

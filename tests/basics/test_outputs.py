@@ -205,6 +205,17 @@ def test_a_planted_link_is_not_followed(tmp_path):
     assert not (tmp_path / "out.csv").is_symlink()
 
 
+def test_what_a_killed_run_left_goes_after_a_day(tmp_path):
+    """But not what another run may still be writing."""
+    old, new = (tmp_path / f".accelstudy-{name}.part" for name in ("old", "new"))
+    for left in (old, new):
+        write(left, calibration_json="half")
+    os.utime(old, (1e9, 1e9))
+    with whole_file(tmp_path / "file") as path:
+        path.write_text("whole")
+    assert (old.exists(), new.exists()) == (False, True)
+
+
 def test_two_runs_that_write_one_file_do_not_meet(tmp_path):
     """As a job of a killed run and the same job of the next one."""
     target = tmp_path / "table"
