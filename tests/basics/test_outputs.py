@@ -3,6 +3,9 @@
 import errno
 import os
 import resource
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -205,15 +208,24 @@ def test_a_planted_link_is_not_followed(tmp_path):
     assert not (tmp_path / "out.csv").is_symlink()
 
 
-def test_what_a_killed_run_left_goes_after_a_day(tmp_path):
-    """But not what another run may still be writing."""
-    old, new = (tmp_path / f".accelstudy-{name}.part" for name in ("old", "new"))
-    for left in (old, new):
-        write(left, calibration_json="half")
-    os.utime(old, (1e9, 1e9))
-    with whole_file(tmp_path / "file") as path:
-        path.write_text("whole")
-    assert (old.exists(), new.exists()) == (False, True)
+def test_what_a_killed_run_left_is_removed(tmp_path):
+    """But not what a run beside this one is writing."""
+    with result_folder(tmp_path / "beside", CALIBRATION) as beside:
+        program = (
+            "import sys, time\nfrom accelstudy.files.outputs import whole_file\n"
+            f"with whole_file({str(tmp_path / 'file')!r}) as path:\n"
+            "    path.write_text('x'); print(path.parent, flush=True); time.sleep(60)"
+        )
+        with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
+            left = Path(process.stdout.readline().decode().strip())
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        assert left.exists()
+        with whole_file(tmp_path / "file") as path:
+            path.write_text("whole")
+        assert not left.exists()
+        write(beside, calibration_json="1")
+    assert content(tmp_path) == {"file": b"whole", "beside/calibration.json": b"1"}
 
 
 def test_two_runs_that_write_one_file_do_not_meet(tmp_path):

@@ -155,7 +155,7 @@ def test_a_gap_keeps_the_clock_and_the_blocks(tmp_path):
     lines = rows_of(table()[["ax", "ay", "az"]])
     for i in range(60, N, 50):
         lines[i] = "nan,nan,nan"
-    campaign = found(written(tmp_path, lines), rate_hz=RATE)
+    campaign = found(written(tmp_path, lines), rate=RATE)
     middles = (MOVE + HOLD) * np.arange(HOLDS) + MOVE + HOLD / 2
     np.testing.assert_allclose(campaign.time, middles, atol=0.1)
     still = np.tile(np.arange(200) >= 50, HOLDS)
