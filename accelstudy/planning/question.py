@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -15,7 +15,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.reference import ReferenceSensor
-from accelstudy.data_sheets import DataSheet, get_data_sheet, of_sigma, read_data_sheet
+from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
@@ -76,13 +76,6 @@ BY_HAND = Equipment("gravity", QUANTITIES["moving_time"].value, 0.0)
 ROBOT = Equipment(
     "robot", QUANTITIES["robot_moving_time"].value, QUANTITIES["robot_setup_time"].value
 )
-
-
-def equipment_of(
-    name: str, by_hand: Equipment = BY_HAND, robot: Equipment = ROBOT
-) -> tuple[Equipment, ...]:
-    """Equipment that is compared: gravity, robot or both."""
-    return {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[name]
 
 
 @dataclass(frozen=True)
@@ -153,58 +146,6 @@ class Question:
             if is_scheme_file(text) and get_scheme(text).name == scheme.name:
                 return str(Path(text).resolve())
         return scheme.name
-
-
-def question_of(
-    *,
-    tilt_accuracy: float,
-    tilt_range: float,
-    sensor: str | None,
-    sigma: float | None,
-    equipment: str,
-    confidence: float | None,
-    holds: Iterable[float],
-    schemes: Iterable[str],
-    max_time: float | None,
-    max_positions: int,
-    moving_time: float,
-    robot_moving_time: float,
-    robot_setup_time: float,
-    robot_accuracy: float,
-    reference: str | None = None,
-) -> Question:
-    """Make a question of what the options of `accelstudy plan` say, in SI.
-
-    Raises
-    ------
-    InputError
-        If there is no such sensor, or not one of `sensor` and `sigma` is given.
-    """
-    if (sensor is None) == (sigma is None):
-        raise InputError(
-            "plan: give the sensor by `sensor`, or its noise by `sigma`"
-            + (", not both" if sensor else "")
-        )
-    by_hand = Equipment("gravity", moving_time, 0.0)
-    robot = Equipment("robot", robot_moving_time, robot_setup_time)
-    sheet = of_sigma(sigma) if sigma is not None else get_sensor(str(sensor))
-    beside = None
-    if reference is not None:
-        sensor_beside = planned_reference(reference, sheet)
-        beside = Equipment("reference", moving_time, MOUNTING, sensor_beside)
-    return Question(
-        tilt_accuracy,
-        tilt_range,
-        sheet,
-        equipment_of(equipment, by_hand, robot),
-        confidence,
-        tuple(sorted(set(holds))),
-        robot_accuracy,
-        math.inf if max_time is None else max_time,
-        max_positions,
-        tuple(schemes),
-        beside,
-    )
 
 
 def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:

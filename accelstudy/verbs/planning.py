@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from accelstudy.api.given import GRAVITY
+from accelstudy.api.given import GRAVITY, each
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import key
@@ -129,34 +130,43 @@ def plan(
         If a quantity or a name is wrong, or not one of `sigma` and `sensor` is given.
     """
     from accelstudy.api.plans import Plan
-    from accelstudy.basics.errors import UnknownNameError
+    from accelstudy.basics.errors import InputError, UnknownNameError
     from accelstudy.basics.progress import begin
+    from accelstudy.data_sheets import of_sigma
     from accelstudy.data_sheets.measured import with_history
     from accelstudy.planning.answer import answer
-    from accelstudy.planning.question import question_of
+    from accelstudy.planning.question import (
+        MOUNTING,
+        Equipment,
+        Question,
+        get_sensor,
+        planned_reference,
+    )
 
     if equipment not in EQUIPMENT:
         raise UnknownNameError("equipment", equipment, EQUIPMENT)
-    asked: dict[str, Any] = {  # which `verb` has checked
-        "tilt_accuracy": tilt_accuracy,
-        "tilt_range": tilt_range,
-        "sigma": sigma,
-        "confidence": confidence,
-        "max_time": max_time,
-        "moving_time": moving_time,
-        "robot_moving_time": robot_moving_time,
-        "robot_setup_time": robot_setup_time,
-        "robot_accuracy": robot_accuracy,
-        "holds": holds,
-        "schemes": schemes,
-    }
-    question = question_of(
-        **asked,
-        sensor=sensor,
-        equipment=equipment,
-        reference=None if reference is None else str(reference),
-        max_positions=max_positions,
+    if (sensor is None) == (sigma is None):
+        both = ", not both" if sensor else ""
+        raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
+    sheet = get_sensor(str(sensor)) if sigma is None else of_sigma(in_si(sigma))
+    by_hand = Equipment("gravity", in_si(moving_time), 0.0)
+    robot = Equipment("robot", in_si(robot_moving_time), in_si(robot_setup_time))
+    question = Question(
+        in_si(tilt_accuracy),
+        in_si(tilt_range),
+        sheet,
+        {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
+        None if confidence is None else float(confidence),
+        tuple(sorted({in_si(hold) for hold in each(holds)})),
+        in_si(robot_accuracy),
+        math.inf if max_time is None else in_si(max_time),
+        max_positions,
+        tuple(each(schemes)),
     )
+    if reference is not None:
+        beside = planned_reference(str(reference), sheet)
+        beside_it = Equipment("reference", by_hand.moving, MOUNTING, beside)
+        question = replace(question, beside=beside_it)
     if history is not None:
         question = replace(question, sheet=with_history(question.sheet, Path(history)))
     begin("comparing calibrations, which takes some seconds ...")

@@ -9,7 +9,7 @@ from places import ROOT
 
 PACKAGE = "accelstudy"
 REGISTRIES = (
-    *("approaches", "campaign.gross_errors", "commands", "effects", "noise_effects", "schemes"),
+    *("approaches", "campaign.gross_errors", "effects", "noise_effects", "schemes"),
     "study.figures",
 )
 """Rooms in which each idea has a file, however small."""
