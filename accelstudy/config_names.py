@@ -21,7 +21,16 @@ def _scheme_name(text: str) -> str:
     return get_scheme(text).name if is_scheme_file(text) else text
 
 
+def _known_model(name: str) -> str:
+    from accelstudy.sensors.models import get_model  # as above
+
+    get_model(name)
+    return name
+
+
 ModelName = Annotated[str, AfterValidator(_model_name)]
 """The name of a model; a composition and a file get the name that follows from their effects."""
+KnownModel = Annotated[ModelName, AfterValidator(_known_model)]
+"""The name of a model where a configuration defines none of its own."""
 SchemeName = Annotated[str, AfterValidator(_scheme_name)]
 """The name of a scheme; that of a file contains a digest of its directions."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.api.given import LAYOUT, each, path_of
+from accelstudy.api.given import each, path_of
 from accelstudy.api.logs import Log, keys_of, log_of, names_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import natural
@@ -62,7 +62,7 @@ class Import:
         beside = _beside(*(given[name] for name in OTHERS[:-1]))
         if not isinstance(log, Log | pd.DataFrame):
             return cls([*files_of(each(log))], settings, beside)
-        log = log_of(log, {name: given[name] for name in LAYOUT})
+        log = log_of(log, given)
         layout = settings.model_dump(exclude_unset=True) | log.layout
         return cls([log.file], parse_settings(layout), beside)
 

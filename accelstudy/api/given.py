@@ -61,6 +61,11 @@ def quantity(name: str, value: Any, given: Given) -> float:
         raise InputError(f"{name}: {error}") from None
 
 
+def tidy(value: float) -> float:
+    """Round a quantity in the unit of a file, so that 3.2 mgon stays that number."""
+    return float(f"{value:.12g}")
+
+
 def each(value: Any) -> Sequence[Any]:
     """One or several values as a sequence; a text is one."""
     several = not isinstance(value, str | bytes | Mapping) and hasattr(value, "__iter__")

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from accelstudy.api.given import path_of
+from accelstudy.api.given import LAYOUT, path_of, tidy
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
@@ -87,7 +87,8 @@ def log_of(log: Any, given: Mapping[str, Any] | None = None) -> Log:
 
 
 def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of a layout that keywords say, checked."""
+    """Keys of a layout that keywords say, checked; other keywords do not count."""
+    given = {name: given[name] for name in LAYOUT if name in given}
     layout = checked(LogLayout, keys_of(given), "log", names=names_of(given))
     return layout.model_dump(exclude_unset=True)
 
@@ -104,8 +105,6 @@ KEYS = {
     "robot_unit": "robot.unit",
 }
 """Keywords whose keys in a file have other names, of which some say a unit."""
-DIGITS = 12
-"""Of a quantity in the unit of a file, so that 3.2 mgon stays that number."""
 
 
 def keys_of(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,7 +114,7 @@ def keys_of(given: Mapping[str, Any]) -> dict[str, Any]:
         if value is None or value == ():
             continue
         if name == "robot_sigma":
-            value = float(f"{value / MGON:.{DIGITS}g}")
+            value = tidy(value / MGON)
         block, _, inner = KEYS.get(name, name).rpartition(".")
         part = content.setdefault(block, {}) if block else content
         part[inner] = list(value) if isinstance(value, tuple) else value

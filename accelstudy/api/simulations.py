@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.api.given import drawing, of_type, quantity
+from accelstudy.api.given import drawing, of_type, quantity, tidy
 from accelstudy.api.results import Result
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -239,17 +239,17 @@ def simulated(
         "models": [get_model(one).name for one in names["model"]],
         "schemes": [get_scheme(one).name for one in names["scheme"]],
         "approaches": [get_approach(one).name for one in names["approach"]],
-        "sensor_sigma_mps2": [_tidy(one) for one in sigma],
+        "sensor_sigma_mps2": [tidy(one) for one in sigma],
         "replicates": replicates,
     }
     study = parse_study(
         {
             "study": "python",
             "seed": seed,
-            "gravity_mps2": _tidy(gravity),
+            "gravity_mps2": tidy(gravity),
             "noise": {
-                "sensor": {"sigma_mps2": _tidy(sigma[0])},
-                "robot": {"sigma_mgon": _tidy(robot_accuracy / MGON)},
+                "sensor": {"sigma_mps2": tidy(sigma[0])},
+                "robot": {"sigma_mgon": tidy(robot_accuracy / MGON)},
             },
             "grids": [grid],
         },
@@ -259,11 +259,6 @@ def simulated(
     if not any(cell.estimability.estimable for cell in cells):
         raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
     return Simulation([simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
-
-
-def _tidy(value: float) -> float:
-    """Quantity of a configuration, so that 3.2 mgon stays that number."""
-    return float(f"{value:.12g}")
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from accelstudy.api.given import LAYOUT
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.basics.wording import counted
@@ -163,7 +162,7 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
     from accelstudy.campaign.calibration.leveling import level_log
 
     given = check(calibrations.apply, given)
-    layout = layout_of({name: given[name] for name in LAYOUT if name in given})
+    layout = layout_of(given)
     with new_file(out, [calibration, log], force) as path:
         read = read_calibration(calibration)
         leveled = level_log(read, log, path, layout, given["sigma"], given["start"])

@@ -1,4 +1,4 @@
-"""The quantities of a plan: the options of `accelstudy plan`, and keys of its configuration."""
+"""The quantities that the keywords of a plan are, with their limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REPLICATES = (20, 1_000_000)
 
 QUANTITIES = {
     "tilt_accuracy": Given("rad", "", 1e-4 * MGON, 100 * GON),
-    "tilt_range": Given("rad", "30gon", 0.1 * GON, 90 * GON),
+    "tilt_range": Given("rad", "", 0.1 * GON, 90 * GON),
     "sigma": Given("m/s^2", "", 1e-9, 10.0),
     "hold": Given("s", "", 0.01, DAY),
     "max_time": Given("s", "", 0.01, DAY),

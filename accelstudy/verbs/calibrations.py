@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
-from accelstudy.api.given import LAYOUT, SIGMA_READING, START
+from accelstudy.api.given import SIGMA_READING, START
 from accelstudy.basics.bounds import Range
 from accelstudy.verbs.kinds import (
     ColumnsOf,
@@ -176,8 +176,7 @@ def apply(
     from accelstudy.api.calibrations import as_calibration
     from accelstudy.api.logs import log_of
 
-    layout = {name: given[name] for name in LAYOUT if name in given}
-    return as_calibration(calibration).apply(log_of(log, layout), start=start, sigma=sigma)
+    return as_calibration(calibration).apply(log_of(log, given), start=start, sigma=sigma)
 
 
 @verb

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -151,10 +150,14 @@ def plan(
     sheet = get_sensor(str(sensor)) if sigma is None else of_sigma(in_si(sigma))
     by_hand = Equipment("gravity", in_si(moving_time), 0.0)
     robot = Equipment("robot", in_si(robot_moving_time), in_si(robot_setup_time))
+    beside = None
+    if reference is not None:
+        sensor_beside = planned_reference(str(reference), sheet)
+        beside = Equipment("reference", by_hand.moving, MOUNTING, sensor_beside)
     question = Question(
         in_si(tilt_accuracy),
         in_si(tilt_range),
-        sheet,
+        sheet if history is None else with_history(sheet, Path(history)),
         {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
         None if confidence is None else float(confidence),
         tuple(sorted({in_si(hold) for hold in each(holds)})),
@@ -162,13 +165,8 @@ def plan(
         math.inf if max_time is None else in_si(max_time),
         max_positions,
         tuple(each(schemes)),
+        beside,
     )
-    if reference is not None:
-        beside = planned_reference(str(reference), sheet)
-        beside_it = Equipment("reference", by_hand.moving, MOUNTING, beside)
-        question = replace(question, beside=beside_it)
-    if history is not None:
-        question = replace(question, sheet=with_history(question.sheet, Path(history)))
     begin("comparing calibrations, which takes some seconds ...")
     return Plan(answer(question, seed, replicates))
 

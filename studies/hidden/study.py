@@ -15,18 +15,17 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, TypeAdapter, model_validator
+from pydantic import Field, TypeAdapter, model_validator
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.session import Campaign
-from accelstudy.config_names import ModelName
+from accelstudy.config_names import KnownModel
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import config_hash
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, Seed
-from accelstudy.sensors.models import get_model
 from studies.hidden.physics import oracle
 from studies.hidden.physics.atlas import atlas, invisible_effects, visible_effects
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
@@ -36,7 +35,6 @@ from studies.hidden.physics.gross import GROSS, visible_gross
 from studies.hidden.physics.measuring import NOISES
 from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
 
-Known = Annotated[ModelName, AfterValidator(lambda name: get_model(name) and name)]
 Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]
 Numbered = tuple[Case, int]
@@ -128,7 +126,7 @@ class Study(Block):
 
     study: PathName = Field(description="name; results go to results/<study>/")
     seed: Seed = Field(description="of all that is random")
-    model: Known = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
+    model: KnownModel = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
     diagnosis_seed: Seed = Field(1, description="of each diagnosis, as the option --seed")
 
     @property

@@ -16,17 +16,11 @@ from accelstudy.basics.names import natural, path_name
 from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
-from accelstudy.config_names import ModelName
+from accelstudy.config_names import KnownModel
 from accelstudy.files.reading import config_hash, overlay
 from accelstudy.files.validation import Block, Configuration, PathName, checked
-from accelstudy.sensors.models import get_model
 
 KINDS = ("campaign", "log", "public")
-
-
-def _known_model(name: str) -> str:
-    get_model(name)
-    return name
 
 
 def _known_approach(name: str) -> str:
@@ -34,7 +28,6 @@ def _known_approach(name: str) -> str:
     return name
 
 
-Model = Annotated[ModelName, AfterValidator(_known_model)]
 Approach = Annotated[str, AfterValidator(_known_approach)]
 
 
@@ -47,7 +40,7 @@ class Entry(Block):
     name: PathName | None = Field(
         None, description="name of the results; by default that of the source"
     )
-    model: Model | None = Field(None, description="model; by default that of the batch")
+    model: KnownModel | None = Field(None, description="model; by default that of the batch")
     approach: Approach | None = Field(None, description="approach; by default that of the batch")
     gravity: GravitySettings | None = Field(None, description="instead of the campaign's own")
     settings: ImportSettings | None = Field(
@@ -97,13 +90,13 @@ class Task(Entry):
     """One campaign to calibrate: an entry without patterns, and with all that it inherits."""
 
     name: PathName
-    model: Model
+    model: KnownModel
 
 
 class LotSettings(Block):
     """How the campaigns of a batch are evaluated together, as those of sensors of one type."""
 
-    model: Model | None = Field(None, description="model; by default that of the batch")
+    model: KnownModel | None = Field(None, description="model; by default that of the batch")
     approach: Approach | None = Field(
         None, description="approach; by default robot where a campaign has the robot's angles"
     )
@@ -114,7 +107,7 @@ class BatchConfig(Configuration):
     """Campaigns that are calibrated and summarised together."""
 
     batch: PathName = Field(description="name; results go to results/<batch>/")
-    model: Model = Field("bias-scale-nonorthogonality", description="model of all campaigns")
+    model: KnownModel = Field("bias-scale-nonorthogonality", description="model of all campaigns")
     approach: Approach | None = Field(
         None, description="approach of all; by default robot where a campaign has its angles"
     )

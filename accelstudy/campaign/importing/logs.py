@@ -43,7 +43,7 @@ def import_sensors(
 
     Parameters
     ----------
-    paths : raw logs, see `open_log`; if there are several, the longest hold of each is
+    paths : raw logs, see `read_log`; if there are several, the longest hold of each is
         its one position
     settings : ImportSettings
     beside : Beside, optional, a calibrated sensor on the same plate, whose roll and pitch the
