@@ -1,30 +1,40 @@
 """Where, how warm and when to measure next, to separate two explanations best.
 
-Of a learned function, where to measure to know it better: a position with the whitened rows A turns
-the covariance Q of the parameters into Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q, and so its mean variance.
+Two explanations of the same residuals predict different things of a new position. If one of them is
+right, the other one is fitted to that position as well, and then misses it by less than they differ
+by, d. Its sum of squares grows by
+
+    dᵀ (I + A Q Aᵀ)⁻¹ d,
+
+with A its rows of unit weight for the new position and Q its cofactors so far. The noncentrality of
+the test of one against the other grows by as much, so the size from which they can be told apart
+(MIB) falls. Either may be the right one, so the mean of both counts. With the position Q becomes
+Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q.
+
+Of a learned function, where to measure to know it better: where its mean variance falls most.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
-from accelstudy.diagnosis.space.signatures import Signature, signature
-from accelstudy.effects import Effect, HoldConditions
+from accelstudy.diagnosis.space.residuals import at_an_ideal_sensor
+from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.effects import HoldConditions
 from accelstudy.effects.learned import Learned
-from accelstudy.leveling.angles import roll_pitch
+from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.choice import TIED, first_best
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
-Columns = tuple[Array, Array]
-"""Derivatives of the predictions of either explanation by its p parameters, each (..., c, p)."""
 
 COUNT = 3
 GRID = "fibonacci-60"
@@ -71,8 +81,8 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     Both are fitted to all positions, each together with the parameters of the model. The candidates
     are a grid of attitudes, at the lowest, middle and highest temperature so far, right after the
     session or later. Temperature and time vary only where one of the effects depends on them. One
-    after the other, the candidate is chosen that adds most to the separation. The wrong explanation
-    is fitted to the new positions as well (`accelstudy.diagnosis.next_positions`).
+    after the other, the candidate is chosen that adds most to the separation, in an attitude of its
+    own. The wrong explanation is fitted to the new positions as well.
 
     Where the attitude hardly matters, the first attitudes of the session are repeated, so that
     readings can be compared without any model.
@@ -88,22 +98,33 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     repeated = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
     attitudes = np.concatenate([repeated, -g * get_scheme(GRID).directions])
     forces, hold, later = _grid(frame, attitudes, needed, frame.forces[-1])
-    rivals = _Rivals.of(frame, first, second)
-    gain = np.sqrt(rivals.separation.gains(rivals.columns(forces, hold)))
-
-    start = first_best(-gain, TIED * gain.max()) // len(attitudes) * len(attitudes)
-    there = gain[start : start + len(attitudes)]  # at the best temperature and time
-    anywhere = bool(there.min() >= ANYWHERE * there.max())
-    if anywhere:
-        chosen = [start + i for i in range(len(repeated))]
-    else:
-        chosen = _one_after_the_other(rivals, attitudes, needed)
-    roll, pitch = roll_pitch(tuple(forces.T))
+    rivals = [_fitted(frame, one) for one in (first, second)]
+    told = [one.values for one in rivals]
+    alone, chosen, anywhere, free = np.zeros(0), list[int](), False, np.ones(len(forces), bool)
+    while len(chosen) < COUNT and free.any():
+        # Steps are those from the position before.
+        before = forces[chosen[-1]] if chosen else frame.forces[-1]
+        forces, hold_then, _ = _grid(frame, attitudes, needed, before)
+        rows = [_rows(frame, forces, hold_then, one) for one in (first, second)]
+        seen = [a @ values for a, values in zip(rows, told, strict=True)]
+        gains = (rivals[1].growth(rows[1], seen[0]) + rivals[0].growth(rows[0], seen[1])) / 2
+        if not chosen:
+            alone = np.sqrt(gains)
+            start = first_best(-alone, TIED * alone.max()) // len(attitudes) * len(attitudes)
+            there = alone[start : start + len(attitudes)]  # at the best temperature and time
+            if anywhere := bool(there.min() >= ANYWHERE * there.max()):
+                chosen = [start + i for i in range(len(repeated))]
+                break
+        gains = np.where(free, gains, -np.inf)
+        i = first_best(-gains, TIED * gains.max())
+        chosen.append(i)
+        free &= np.linalg.norm(forces - forces[i], axis=1) > DIFFERENT * g
+        rivals = [one.after(rows[k][i], seen[1 - k][i]) for k, one in enumerate(rivals)]
     names = [tuple(one.name for one in explanation) for explanation in (first, second)]
     return [
         NextPosition(
-            roll=float(roll[i]),
-            pitch=float(pitch[i]),
+            roll=float(hold.column("roll")[i]),
+            pitch=float(hold.column("pitch")[i]),
             temperature=float(hold.column("temperature")[i]) if "temperature" in needed else None,
             later=None if later is None else float(later[i]),
             anywhere=anywhere,
@@ -111,7 +132,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
                 tuple(name for name in names[0] if name not in names[1]),
                 tuple(name for name in names[1] if name not in names[0]),
             ),
-            gain=float(gain[i]),
+            gain=float(alone[i]),
         )
         for i in chosen
     ]
@@ -137,29 +158,25 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
     """
     if learned.coordinate not in LEARNABLE:
         return []
-    model, g = frame.solution.model, frame.solution.gravity
+    model, solution = frame.solution.model, frame.solution
     needed = {*compose(learned.spec, (learned.spec,)).hold_columns}
-    attitudes = -g * get_scheme(GRID).directions
+    attitudes = -solution.gravity * get_scheme(GRID).directions
     yaws, by_heat = YAWS if "yaw" in needed else np.zeros(1), "temperature" in needed
-    u = model.n_parameters + _shared(frame)
-    cofactors, weights = frame.solution.cofactors[:u, :u], np.zeros((u, u))
+    weights = np.zeros_like(solution.cofactors)
     own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
     weights[np.ix_(own, own)] = _mean_squares(learned)
-    whole, before, chosen = float(np.sum(weights * cofactors)), frame.forces[-1], []
+    fit, before, chosen = Fit(solution.parameters, solution.cofactors), frame.forces[-1], []
+    whole = float(np.sum(weights * fit.cofactors))
     for _ in range(COUNT):
         forces, hold, _ = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
-        columns = _whitening(frame, forces) @ _derivatives(frame, (), forces, hold)
-        cross = columns @ cofactors
-        noise = np.eye(columns.shape[1]) + cross @ columns.swapaxes(1, 2)
-        seen = np.linalg.solve(noise, cross)
-        gains = np.einsum("kcu,uv,kcv->k", seen, weights, cross)
+        rows = _rows(frame, forces, hold)
+        gains = fit.fall(rows, weights)
         i = first_best(-gains, TIED * gains.max())
-        roll, pitch = hold.column("roll")[i], hold.column("pitch")[i]
         chosen.append(
             NextPosition(
-                roll=float(roll),
-                pitch=float(pitch),
-                temperature=(float(hold.column("temperature")[i]) if by_heat else None),
+                roll=float(hold.column("roll")[i]),
+                pitch=float(hold.column("pitch")[i]),
+                temperature=float(hold.column("temperature")[i]) if by_heat else None,
                 later=None,
                 anywhere=False,
                 separates=((learned.name,), ()),
@@ -167,7 +184,7 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
                 yaw=float(hold.column("yaw")[i]) if "yaw" in needed else None,
             )
         )
-        cofactors, before = cofactors - cross[i].T @ seen[i], forces[i]
+        fit, before = fit.after(rows[i], rows[i] @ fit.values), forces[i]
     return chosen
 
 
@@ -179,25 +196,6 @@ def _mean_squares(learned: Learned) -> Array:
     grid, k = np.linspace(low, high, VALUES), len(learned.parameters)
     shown = [learned.function(grid, unit, np.zeros((k, k)))[0].ravel() for unit in np.eye(k)]
     return np.asarray(np.array(shown) @ np.array(shown).T / VALUES)
-
-
-def _one_after_the_other(rivals: _Rivals, attitudes: Array, needed: set[str]) -> list[int]:
-    """Places that add most to the separation, each after those before it, in other attitudes."""
-    frame, separation = rivals.frame, rivals.separation
-    chosen: list[int] = []
-    taken = [frame.forces[-1]]  # steps are those from the position before
-    while len(chosen) < COUNT:
-        forces, hold, _ = _grid(frame, attitudes, needed, taken[-1])
-        columns = rivals.columns(forces, hold)
-        apart = [np.linalg.norm(forces - force, axis=1) for force in taken[1:]]
-        free = np.all(np.array(apart) > DIFFERENT * frame.solution.gravity, axis=0)
-        if not np.any(free):
-            break
-        gains = np.where(free, separation.gains(columns), -np.inf)
-        chosen.append(first_best(-gains, TIED * gains.max()))
-        taken.append(forces[chosen[-1]])
-        separation = separation.taking((columns[0][chosen[-1]], columns[1][chosen[-1]]))
-    return chosen
 
 
 def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
@@ -226,201 +224,113 @@ def _grid(
     temperatures lie evenly between the lowest and the highest; by default there are three of those
     that were measured.
     """
-    yaws = np.zeros(1) if yaws is None else yaws
-    yaw, attitudes = np.repeat(yaws, len(attitudes)), np.tile(attitudes, (len(yaws), 1))
-    measured, n, m = frame.hold, len(frame.forces), len(attitudes)
-    delays, levels, later = np.zeros(1), np.zeros(1), None
+    measured, n = frame.hold, len(frame.forces)
+    delays: Array = np.zeros(1)
+    levels: Array = np.zeros(1)
     if measured.time is not None:
-        length = float(measured.time[-1] - measured.time[0])
-        chosen = LATER if "time" in needed else LATER[:1]
-        delays = length * (np.array(chosen) + 1 / max(n - 1, 1))
+        shares = LATER if "time" in needed else LATER[:1]
+        delays = np.ptp(measured.time) * (np.array(shares) + 1 / max(n - 1, 1))
     if measured.temperature is not None:
-        shares = [0.0, 0.5, 1.0] if "temperature" in needed else [0.5]
-        levels = np.quantile(measured.temperature, shares)
+        of_all = [0.0, 0.5, 1.0] if "temperature" in needed else [0.5]
+        levels = np.quantile(measured.temperature, of_all)
         if temperatures:
             levels = np.linspace(levels[0], levels[-1], temperatures)
-    rounds = len(delays) * len(levels)
-    grid = np.tile(attitudes, (rounds, 1))
-    delay = np.repeat(delays, len(levels) * m)
-    time = None if measured.time is None else measured.time[-1] + delay
-    if "time" in needed and time is not None:
-        later = delay
+    yaws = np.zeros(1) if yaws is None else yaws
+    counts = (len(delays), len(levels), len(yaws), len(attitudes))
+    of_delay, of_level, of_yaw, of_attitude = np.indices(counts).reshape(4, -1)
+    forces, delay = attitudes[of_attitude], delays[of_delay]
+    last = measured.take(np.full(len(forces), n - 1))
+    roll, pitch = angles_of(forces).T
+    step_x, step_y, step_z = (forces - before).T
+    time = None if last.time is None else last.time + delay
     vibration = measured.vibration
-    roll, pitch = roll_pitch(tuple(grid.T))
-    step = grid - before
-    hold = HoldConditions(
-        temperature=(
-            None if measured.temperature is None else np.tile(np.repeat(levels, m), len(delays))
-        ),
+    hold = replace(
+        last,
+        temperature=None if last.temperature is None else levels[of_level],
         time=time,
-        vibration=None if vibration is None else np.full(len(grid), np.median(vibration)),
+        vibration=None if vibration is None else np.full(len(forces), np.median(vibration)),
         roll=roll,
         pitch=pitch,
-        yaw=np.tile(yaw, rounds),
-        step_x=step[:, 0],
-        step_y=step[:, 1],
-        step_z=step[:, 2],
-        order=np.full(len(grid), n + 1.0) if time is None else time,
-        course=frame.hold.take(np.arange(n)).course,
+        yaw=yaws[of_yaw],
+        step_x=step_x,
+        step_y=step_y,
+        step_z=step_z,
+        order=np.full(len(forces), n + 1.0) if time is None else time,
     )
-    return grid, hold, later
+    return forces, hold, None if time is None or "time" not in needed else delay
 
 
 @dataclass(frozen=True, eq=False)
-class Explained:
-    """An explanation, fitted to the positions so far.
+class Fit:
+    """A fit to the positions so far.
 
     Attributes
     ----------
     values : (p,) array, its parameters
-    cofactors : (p, p) array
+    cofactors : (p, p) array, Q
     """
 
     values: Array
     cofactors: Array
 
-    def growth(self, columns: Array, seen: Array) -> Array:
+    def growth(self, rows: Array, seen: Array) -> Array:
         """How much the sum of squares grows, (k,), if candidates (k, c, p) show `seen` (k, c)."""
-        missed = seen - columns @ self.values
-        noise = np.eye(columns.shape[1]) + columns @ self.cofactors @ columns.swapaxes(1, 2)
-        return np.asarray(
-            np.einsum("kc,kc->k", missed, np.linalg.solve(noise, missed[..., None])[..., 0])
-        )
+        missed = (seen - rows @ self.values)[..., None]
+        return np.asarray(np.sum(missed * np.linalg.solve(self._noise(rows), missed), axis=(1, 2)))
 
-    def after(self, columns: Array, seen: Array) -> Explained:
+    def fall(self, rows: Array, weights: Array) -> Array:
+        """How much tr(W Q) falls by candidates (k, c, p), (k,), with weights W (p, p)."""
+        cross = rows @ self.cofactors
+        taken = np.linalg.solve(self._noise(rows), cross)
+        return np.asarray(np.einsum("kcu,uv,kcv->k", taken, weights, cross))
+
+    def after(self, rows: Array, seen: Array) -> Fit:
         """Fit a position (c, p) that shows `seen` (c,), too."""
-        cross = columns @ self.cofactors
-        weight = np.linalg.solve(np.eye(len(columns)) + cross @ columns.T, cross).T
-        values = self.values + weight @ (seen - columns @ self.values)
-        return Explained(values, self.cofactors - weight @ cross)
+        cross = rows @ self.cofactors
+        gain = np.linalg.solve(self._noise(rows), cross).T
+        values = self.values + gain @ (seen - rows @ self.values)
+        return Fit(values, self.cofactors - gain @ cross)
+
+    def _noise(self, rows: Array) -> Array:
+        """I + A Q Aᵀ of rows A (..., c, p)."""
+        return np.eye(rows.shape[-2]) + rows @ self.cofactors @ np.swapaxes(rows, -1, -2)
 
 
-@dataclass(frozen=True, eq=False)
-class Separation:
-    """Two explanations, each in the role of the right one and of the wrong one.
-
-    Their predictions for a new position differ by d. If one of them is right, the other is fitted
-    to the new position as well, and then misses it by less than d. Its sum of squares grows by
-
-        dᵀ (I + G C Gᵀ)⁻¹ d,
-
-    with the predictions in units of their noise, their derivatives G by the parameters of the wrong
-    explanation, and its cofactors C so far. The noncentrality of the test of one against the other
-    grows by the same amount, so the size from which they can be told apart (MIB) falls. Either may
-    be the right one, so the mean of both counts.
-
-    Attributes
-    ----------
-    right : (p,) arrays, parameters by which either predicts
-    wrong : Explained, either one, fitted to the positions taken so far
-    """
-
-    right: tuple[Array, Array]
-    wrong: tuple[Explained, Explained]
-
-    @classmethod
-    def of(cls, first: Explained, second: Explained) -> Separation:
-        """Begin with two explanations of the same positions."""
-        return cls((first.values, second.values), (first, second))
-
-    def gains(self, columns: Columns) -> Array:
-        """What each of k candidates would add to the separation, (k,)."""
-        seen = [c @ values for c, values in zip(columns, self.right, strict=True)]
-        first, second = self.wrong
-        return (second.growth(columns[1], seen[0]) + first.growth(columns[0], seen[1])) / 2
-
-    def taking(self, columns: Columns) -> Separation:
-        """Return the separation after one more position."""
-        seen = [c @ values for c, values in zip(columns, self.right, strict=True)]
-        first, second = self.wrong
-        after = first.after(columns[0], seen[1]), second.after(columns[1], seen[0])
-        return Separation(self.right, after)
-
-
-@dataclass(frozen=True, eq=False)
-class _Rivals:
-    """Two explanations, each fitted together with the parameters of the model."""
-
-    frame: Frame
-    effects: tuple[Explanation, Explanation]
-    separation: Separation
-
-    @classmethod
-    def of(cls, frame: Frame, first: Explanation, second: Explanation) -> _Rivals:
-        return cls(frame, (first, second), Separation.of(_fit(frame, first), _fit(frame, second)))
-
-    def columns(self, forces: Array, hold: HoldConditions) -> tuple[Array, Array]:
-        """Derivatives of what candidates show, in units of their noise, (k, c, p) of either."""
-        white = _whitening(self.frame, forces)
-        one, two = (_derivatives(self.frame, e, forces, hold) for e in self.effects)
-        return np.asarray(white @ one), np.asarray(white @ two)
-
-
-def _fit(frame: Frame, explanation: Explanation) -> Explained:
-    residuals = frame.residuals
-    shown = _derivatives(frame, explanation, frame.forces, frame.hold)
-    rows = residuals.rows(residuals.jac_observations[..., :3] @ shown)
-    # What angles share is known to be 0 ± 1.
-    u, k = frame.solution.model.n_parameters, _shared(frame)
-    known = -np.eye(k, rows.shape[1], u)
-    errors = np.concatenate([residuals.errors, frame.solution.parameters[u : u + k]])
-    inverse = np.linalg.pinv(np.concatenate([rows, known]), rcond=1e-10)
-    return Explained(inverse @ errors, inverse @ inverse.T)
-
-
-def _shared(frame: Frame) -> int:
-    """Number of the errors that the angles of all positions share."""
-    common = frame.solution.observed.common
-    return 0 if common is None or not frame.solution.approach.uses_angles else common.shape[-1]
-
-
-def _derivatives(
-    frame: Frame, explanation: Explanation, forces: Array, hold: HoldConditions
-) -> Array:
-    """Derivatives of the output by the parameters of the model and by those of the effects.
-
-    Between them are those by the errors that the angles of all positions share.
-    """
-    g, turning = frame.solution.gravity, _force_by_angles(forces, frame.solution.gravity)
-    angles = np.column_stack([hold.column("roll"), hold.column("pitch")])
-
-    def shown(effect: Effect) -> Signature:
-        return signature(effect, forces, angles, g, hold)
-
-    def in_output(one: Signature) -> Array:
-        return one.force + turning @ one.angles
-
-    columns = [in_output(shown(effect)) for effect in frame.solution.model.effects]
-    errors = frame.solution.observed.angle_errors
-    if errors is not None and _shared(frame):
-        columns.append(-turning @ errors(angles)[1])
+def _fitted(frame: Frame, explanation: Explanation) -> Fit:
+    """Fit an explanation to all positions, together with the parameters of the model."""
+    residuals, columns = frame.residuals, [frame.residuals.design]
     for one in explanation:
         assert one.effect is not None
-        columns.append(in_output(shown(one.effect).reduced(one.directions)))
-    return np.concatenate(columns, axis=2)
+        columns.append(-residuals.whitened(frame.signature(one.effect)) @ one.directions)
+    inverse = np.linalg.pinv(np.concatenate(columns, axis=1), rcond=1e-10)
+    return Fit(inverse @ residuals.errors, inverse @ inverse.T)
 
 
-def _whitening(frame: Frame, forces: Array) -> Array:
-    """Matrices (k, c, 3) that scale an output to the noise of what the approach sees of it."""
-    sigmas = np.mean(frame.residuals.sigmas, axis=0)
-    force = np.mean(sigmas[:3])
-    if not frame.solution.approach.uses_angles:
-        unit = forces / np.linalg.norm(forces, axis=1, keepdims=True)
-        return np.asarray(unit[:, None] / force)
-    of_angles = sigmas[3:5]
-    if (errors := frame.solution.observed.angle_errors) is not None:
-        angles = np.column_stack(roll_pitch(tuple(forces.T)))
-        of_angles = errors(angles)[0][:, None]
-    turning = _force_by_angles(forces, frame.solution.gravity) * of_angles
-    noise = force**2 * np.eye(3) + turning @ turning.swapaxes(1, 2)
-    return np.linalg.inv(np.linalg.cholesky(noise))
+def _rows(
+    frame: Frame, forces: Array, hold: HoldConditions, explanation: Explanation = ()
+) -> Array:
+    """Rows of unit weight of candidates, (k, c, p), by the parameters of the model and effects.
 
-
-def _force_by_angles(forces: Array, g: float) -> Array:
-    """Derivatives of the specific force by roll and pitch, (n, 3, 2)."""
-    roll, pitch = roll_pitch(tuple(forces.T))
-    sin_r, cos_r, sin_p, cos_p = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    zero = np.zeros_like(roll)
-    by_roll = g * np.stack([zero, -cos_p * cos_r, cos_p * sin_r], axis=1)
-    by_pitch = g * np.stack([cos_p, sin_p * sin_r, sin_p * cos_r], axis=1)
-    return np.stack([by_roll, by_pitch], axis=2)
+    They are those of an ideal sensor, with the noise that the positions have on average.
+    """
+    solution, angles = frame.solution, angles_of(forces)
+    first, sigmas, common = solution.observed, frame.residuals.sigmas.mean(axis=0), None
+    sigma_angle: Any = sigmas[3:5]
+    if first.angle_errors is not None:
+        sigma_angle, common = first.angle_errors(angles)
+    observed = replace(
+        first,
+        forces=forces[None],
+        sigma_force=float(np.mean(sigmas[:3])),
+        angles=angles[None],
+        sigma_angle=sigma_angle,
+        common=common,
+        hold=hold,
+    )
+    space = at_an_ideal_sensor(solution.model, solution.approach, observed)
+    columns, (k, c) = [space.design], space.whitening.shape[:2]
+    for one in explanation:
+        assert one.effect is not None
+        shown = signature(one.effect, forces, angles, solution.gravity, hold)
+        columns.append(-space.whitened(shown) @ one.directions)
+    return np.concatenate(columns, axis=1)[: k * c].reshape(k, c, -1)

@@ -15,7 +15,7 @@ from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.next_positions import _fit
+from accelstudy.diagnosis.next_positions import _rows
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
@@ -166,9 +166,11 @@ def test_the_next_position_shares_the_errors(campaign):
 
 def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
     solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
-    fitted = _fit(Frame.of(solution), ())
-    sigma, expected = (np.sqrt(np.diag(q)) for q in (fitted.cofactors, solution.cofactors))
-    np.testing.assert_allclose(sigma, expected, rtol=0.05)
+    frame = Frame.of(solution)
+    found, expected = _rows(frame, frame.forces, frame.hold), solution.design[: 3 * 20]
+    size = np.linalg.norm(expected, axis=0)
+    normal = np.einsum("kcu,kcv->uv", found / size, found / size)
+    np.testing.assert_allclose(normal, (expected / size).T @ (expected / size), atol=0.05)
 
 
 def test_a_reference_has_no_errors_of_a_robot(campaign):

@@ -29,7 +29,6 @@ from accelstudy.design.spaces import (
     listed_in,
 )
 from accelstudy.design.task import Task, information, position_rows
-from accelstudy.diagnosis.next_positions import Explained, Separation
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.schemes import get_scheme
 from accelstudy.schemes.optimal import stored_designs
@@ -352,30 +351,6 @@ def test_what_cannot_be_is_said_in_one_line():
 
 
 # Telling two explanations apart
-
-
-def test_the_separation_grows_by_what_the_wrong_explanation_misses():
-    """One after the other, positions add what a fit of all of them together misses more."""
-    rng = np.random.default_rng(7)
-    old, new = rng.standard_normal((2, 12, 4)), rng.standard_normal((2, 3, 2, 4))
-    seen = rng.standard_normal(12)
-    inverses = [np.linalg.pinv(rows) for rows in old]
-    first, second = (Explained(i @ seen, i @ i.T) for i in inverses)
-    separation, grown = Separation.of(first, second), 0.0
-    for k in range(3):
-        columns = (new[0, k], new[1, k])
-        grown += separation.gains((columns[0][None], columns[1][None]))[0]
-        separation = separation.taking(columns)
-
-    def left(rows, values):
-        return values @ (values - rows @ np.linalg.lstsq(rows, values, rcond=None)[0])
-
-    expected = 0.0
-    for right, wrong, one in ((0, 1, first), (1, 0, second)):
-        shown = np.concatenate([seen, new[right].reshape(6, 4) @ one.values])
-        rows = np.concatenate([old[wrong], new[wrong].reshape(6, 4)])
-        expected += (left(rows, shown) - left(old[wrong], seen)) / 2
-    assert grown == pytest.approx(expected, rel=1e-9)
 
 
 def test_positions_that_hardly_differ_are_one_that_is_repeated(free):

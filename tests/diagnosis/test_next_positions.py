@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G, shuffled
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, shuffled
 from norm_model import SHOWN, nine
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.next_positions import GRID, next_positions
+from accelstudy.diagnosis.next_positions import GRID, _rows, next_positions
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
@@ -92,6 +92,18 @@ def test_each_position_adds_most_of_all_candidates(rivals):
     assert not found[0].anywhere
     assert found[0].temperature is found[0].later is None
     assert found[0].separates == (("quadratic_scale",), ("cubic_scale",))
+
+
+@pytest.mark.parametrize("name", ["quadratic_scale", "encoder_eccentricity"])
+def test_candidates_show_an_effect_as_an_adjustment_with_it_does(name):
+    """In the positions of a session, beside its parameters; a reading has a sign, too."""
+    observed = session(NINE, np.zeros(9), shuffled("fibonacci-24"), G).observations(Noise())
+    extended = solve(compose("with it", (*(e.spec for e in NINE.effects), name)), ROBOT, observed)
+    frame = (examined := examine(solve(NINE, ROBOT, observed))).frame
+    effect = examined.candidates[name][0]
+    found = _rows(frame, frame.forces, frame.hold, [effect]).reshape(72, -1)
+    expected = np.hstack([extended.design[:, :9], extended.design[:, 9:] @ effect.directions])
+    np.testing.assert_allclose(found.T @ found, expected.T @ expected, rtol=1e-6, atol=1e-3)
 
 
 def test_effects_of_time_are_told_apart_by_repeats_later():

@@ -12,16 +12,19 @@ The rows are those of the positions and of what was observed of the parameters t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
+from accelstudy.approaches import Approach
 from accelstudy.diagnosis.space.signatures import Signature
 from accelstudy.leveling.angles import angles_of, specific_force
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -175,20 +178,39 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
         forces = model.correct(observed.forces[0], p, g, observed.hold)
         forces = g * forces / np.linalg.norm(forces, axis=1, keepdims=True)
         angles = angles_of(forces)
-    problem = CalibrationProblem.of(model, approach, observed)
-    x = np.zeros(problem.initial.shape[1])
-    if problem.with_gravity:
-        x[-1] = g
-    values = [forces, angles] if approach.uses_angles else [forces]
-    at = problem.linearised(x[None], np.concatenate(values, axis=1)[None])
-    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     # Weights that are taken from the residuals could hide an axis.
     variances = solution.variances.copy()
     variances[:, :3] = variances[:, :3].mean()
+    ideal = replace(observed, forces=forces[None], angles=angles[None], gravity=g)
+    return at_an_ideal_sensor(model, approach, ideal, variances), forces
+
+
+def at_an_ideal_sensor(
+    model: SensorModel,
+    approach: Approach,
+    observed: Observations,
+    variances: Array | None = None,
+) -> Residuals:
+    """Residual space of an ideal sensor, of which these are the true observations.
+
+    Parameters
+    ----------
+    model, approach, observed : as in `calibrate`, one session
+    variances : (n, o) array, of the observations; by default as they say
+    """
+    problem = CalibrationProblem.of(model, approach, observed)
+    if variances is None:
+        variances = problem.cofactors
+    x = np.zeros(problem.initial.shape[1])
+    if problem.with_gravity:
+        x[-1] = np.ravel(observed.gravity)[0]
+    at = problem.linearised(x[None], problem.observations)
+    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     whitening = whitening_of(b, variances)
     a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
-    design = np.concatenate([a.reshape(-1, a.shape[-1]), solution.prior[0]])
-    return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances)), forces
+    prior = np.diag(np.sqrt(problem.weights))[problem.weights > 0]
+    design = np.concatenate([a.reshape(-1, a.shape[-1]), prior])
+    return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances))
 
 
 def spans(
