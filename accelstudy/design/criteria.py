@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -302,13 +302,20 @@ def rivals(task: Task, first: str, second: str) -> Rivals:
     return Rivals(task.estimated, masks[0], masks[1])
 
 
+@cache
+def _ridge(u: int) -> Array:
+    return RIDGE * np.eye(u)
+
+
 def _ridged(normal: Array) -> Array:
-    return normal + RIDGE * np.eye(normal.shape[-1])
+    return normal + _ridge(normal.shape[-1])
 
 
 def _kept(normal: Array, chosen: NDArray[np.bool_]) -> Array:
-    places = np.flatnonzero(chosen)
-    return _ridged(normal[..., places[:, None], places])
+    if not chosen.all():
+        places = np.flatnonzero(chosen)
+        normal = normal[..., places[:, None], places]
+    return _ridged(normal)
 
 
 def _placed(block: Array, chosen: NDArray[np.bool_]) -> Array:
