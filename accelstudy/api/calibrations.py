@@ -33,7 +33,7 @@ from accelstudy.campaign.calibration.applying import (
     dof_of,
     read_calibration_content,
 )
-from accelstudy.campaign.calibration.assessment import assess, tilt_left
+from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.leveling import level_frame
@@ -88,7 +88,10 @@ class Calibration(Result):
     @classmethod
     def of_fit(cls, fit: CampaignFit, source: Path | None = None) -> Calibration:
         """Return the calibration that an adjustment gives."""
-        return cls(calibration_content(fit, assess(fit)), fit, source)
+        assessment = assess(fit)
+        calibration = cls(calibration_content(assessment), fit, source)
+        calibration._assessment = assessment
+        return calibration
 
     @property
     def content(self) -> Mapping[str, Any]:
@@ -168,7 +171,11 @@ class Calibration(Result):
     @cached_property
     def residuals(self) -> pd.DataFrame:
         """Residuals, tests and reliability of each position, as positions.parquet has them."""
-        return assessed_positions(assess(self._fitted("residuals")))
+        return assessed_positions(self._assessment)
+
+    @cached_property
+    def _assessment(self) -> Assessment:
+        return assess(self._fitted("residuals"))
 
     def tilt_error(self, tilt_range: float | str = MAX_TILT_GON * GON) -> pd.Series:
         """Return the rms tilt error that the calibration leaves, rad, of roll and of pitch.
@@ -225,7 +232,7 @@ class Calibration(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
         if self.fit is not None:
-            write_calibration(self.fit, folder, self.source, place)
+            write_calibration(self._assessment, folder, self.source, place)
         # That of a diagnosis knows of what was mended.
         write_json(folder / "calibration.json", dict(self.content))
 

@@ -185,7 +185,7 @@ def write_lot(report: LotReport, folder: str | Path, place: str | Path) -> None:
         if isinstance(fit, CampaignFit):
             its_own = folder / EACH / f"{i:04d}-{path_name(fit.campaign.name, 'sensor')}"
             its_own.mkdir(parents=True)
-            write_json(its_own / "calibration.json", calibration_content(fit, assess(fit)))
+            write_json(its_own / "calibration.json", calibration_content(assess(fit)))
     steps = []
     if write_type(lot, fits, folder):
         of_type = Path(place) / TYPE_FILE

@@ -21,6 +21,7 @@ from accelstudy.adjustment.quality import (
     variance_components,
 )
 from accelstudy.approaches import get_approach
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -155,7 +156,7 @@ def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
     with composed("residuals"):
-        write_calibration(fit, tmp_path)
+        write_calibration(assess(fit), tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert "200 of 1200 positions that fit worst" in page
     assert '<tr class="suspect"><td>77</td>' in page

@@ -25,6 +25,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number, p_value
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
@@ -471,7 +472,7 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(
         "accelstudy.campaign.calibration.output.correlation_figure", lambda _: 1 / 0
     )
-    write_calibration(fit, tmp_path / "calibrated")
+    write_calibration(assess(fit), tmp_path / "calibrated")
     said = said.replace("evidence", "correlations")
     assert capsys.readouterr().err == f"warning: {said}\n"
     page = (tmp_path / "calibrated/report.html").read_text(encoding="utf-8")

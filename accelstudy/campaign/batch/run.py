@@ -12,6 +12,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.batch.config import Task
+from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import read_campaign
@@ -69,7 +70,7 @@ def _calibrate(
         campaign = _measured(task, folder / "campaign", record)
         named = None if task.approach is None else get_approach(task.approach)
         fit = fit_campaign(campaign, get_model(task.model), named)
-        write_calibration(fit, folder)
+        write_calibration(assess(fit), folder)
     except InputError as error:
         _remove_results(folder)
         return " ".join(str(error).split()).removeprefix(f"{task.name}: ")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from accelstudy.basics.levels import REFUTED
 from accelstudy.basics.suggested import HERE
-from accelstudy.campaign.calibration.assessment import Assessment, assess
+from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.document import (
     assessed_positions,
     calibration_document,
@@ -32,19 +32,19 @@ LISTED = 200
 
 
 def write_calibration(
-    fit: CampaignFit,
+    assessment: Assessment,
     folder: str | Path,
     source: str | Path = "CAMPAIGN",
     place: str | Path = "",
 ) -> dict[str, Any]:
-    """Assess a fit and write calibration.json, positions.parquet, figures/ and report.html.
+    """Write calibration.json, positions.parquet, figures/ and report.html.
 
     Each file is whole or not there; calibration.json comes last. If the page fails, the numbers are
     written all the same.
 
     Parameters
     ----------
-    fit : CampaignFit
+    assessment : Assessment, of a fit
     folder : path, to write to
     source, place : paths of the campaign and of the results, for the commands that the page gives
 
@@ -53,9 +53,8 @@ def write_calibration(
     dict
         The content of calibration.json.
     """
-    folder = Path(folder)
-    assessment = assess(fit)
-    content = calibration_content(fit, assessment)
+    folder, fit = Path(folder), assessment.fit
+    content = calibration_content(assessment)
     positions = assessed_positions(assessment)
     drawn = save_all(
         {
@@ -84,9 +83,9 @@ def write_calibration(
     return content
 
 
-def calibration_content(fit: CampaignFit, assessment: Assessment) -> dict[str, Any]:
+def calibration_content(assessment: Assessment) -> dict[str, Any]:
     """Content of calibration.json."""
-    return {**calibration_document(fit), "quality": quality_document(assessment)}
+    return {**calibration_document(assessment.fit), "quality": quality_document(assessment)}
 
 
 def _listed(positions: pd.DataFrame) -> pd.DataFrame:
