@@ -5,7 +5,9 @@
 Prints, for each kind, how often something is found, named rightly (and by an oracle that knows all
 but the name, and always gives one) and named wrongly, how often intervals of shares hold them, how
 many sensors are judged rightly, and how often sensors are odd. Each lot has a design, an approach
-and an effect at random.
+and an effect at random. Of lots of mixed noise some sensors were held for a second and others for a
+minute, and all, none or half of them state their sigma; if nothing is missing, each sensor has a
+design of its own as well.
 """
 
 import logging
@@ -31,6 +33,8 @@ from timing import table
 
 MODEL = "bias-scale-nonorthogonality"
 SENSORS = 20
+MIXED = (0.15, 1.0)
+"""Factors of the noise of position means."""
 UNNAMED = "unknown"
 
 
@@ -43,7 +47,8 @@ class Kind:
     shares: tuple[float, ...] = ()
     lam: float = 0.0
     named: bool = True
-    noise: bool = False
+    noises: tuple[str, ...] = ()
+    mixed: bool = False
 
 
 def single(design, approach):
@@ -65,12 +70,16 @@ def elsewhere(design, approach):
 
 KINDS = (
     Kind("nothing"),
-    Kind("the noise is wrong, in all", noise=True),
+    Kind("the noise is wrong, in all", noises=tuple(NOISES)),
     *(Kind("one effect, in all", single, (1.0,), lam) for lam in (6.0, 10.5, 16.0, 100.0)),
     Kind("one effect, in half", single, (0.5,), 10.5),
     Kind("two effects, in all and in a third", pairs, (1.0, 1 / 3), 16.0),
     Kind("one sensor is odd", single, (0.0,), 60.0),
     Kind("physics outside of the catalogue, in all", elsewhere, (1.0,), 60.0, named=False),
+    Kind("nothing, mixed noise and positions", mixed=True),
+    Kind("each sigma is stated wrongly, mixed noise", noises=("level",), mixed=True),
+    Kind("one effect, in all, mixed noise", single, (1.0,), 10.5, mixed=True),
+    Kind("one sensor is odd, mixed noise", single, (0.0,), 60.0, mixed=True),
 )
 
 
@@ -81,12 +90,23 @@ def lot_of(kind, seed):
         design, approach = rng.choice(DESIGNS), rng.choice(APPROACHES)
         choices = kind.choices(str(design), str(approach))
         known = bool(rng.integers(2))
+        if kind.mixed:
+            # What is not stated cannot be stated wrongly.
+            known = True if kind.noises else (True, False, None)[rng.integers(3)]
         if not choices:
             continue
         effects = choices[rng.integers(len(choices))]
-        noise = str(rng.choice([*NOISES])) if kind.noise else None
         case = LotCase(
-            kind.title, str(design), str(approach), known, effects, kind.shares, kind.lam, noise
+            kind.title,
+            str(design),
+            str(approach),
+            known,
+            effects,
+            kind.shares,
+            kind.lam,
+            str(rng.choice(kind.noises)) if kind.noises else None,
+            MIXED if kind.mixed else (1.0,),
+            DESIGNS if kind.mixed and not effects else (),
         )
         try:
             return case, list(generate_lot(case, SENSORS, seed.spawn(1)[0]))
@@ -128,7 +148,7 @@ def judged(job):
             bool({*names} & classes[case.effects[0]]) for _, names, _ in lot.each()
         ] if kind.shares == (1.0,) and kind.named else [],
         "oracle": same_effects(lot_oracle(case, made).told, [*classes.values()])
-                  if kind.named and len(kind.shares) == 1 and of_type else None,
+                  if kind.named and len(kind.shares) == 1 and of_type and not kind.mixed else None,
         "odd": None if of_type else carriers <= odd,
         "odd wrongly": bool(odd - carriers),
     }  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level, log_mean
 from accelstudy.effects import Effect
-from accelstudy.lots.noise import LEAST_SIGMA, LotNoise, sigma_stated, with_noise
+from accelstudy.lots.noise import LEAST_SIGMA, SensorNoise, with_noise
 from accelstudy.lots.sizes import visible
 from accelstudy.sensors.sensor import SensorModel
 
@@ -103,6 +104,7 @@ class SensorEvidence:
     square : float, ‖z‖² of all residuals, in units of the noise: of the type where it is known
     shown : dict of effect to what its shapes would show in the residuals, in the same units
     pair_specs : dict of two names to their best settings beside each other
+    variance : float, (m/s²)², of a position mean, by the noise of the lot and the residuals
     """
 
     campaign: str
@@ -117,6 +119,7 @@ class SensorEvidence:
     square: float = 0.0
     shown: dict[str, Shown] = field(default_factory=dict)
     pair_specs: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
+    variance: float = 1.0
 
     def nearest(self, name: str, settings: Array) -> tuple[Shown, int] | None:
         """What is shown of an effect with these settings, or nearly so."""
@@ -145,7 +148,7 @@ def sensor_evidence(
     model: SensorModel | None,
     approach: Approach | None = None,
     seed: int = 1,
-    noise: LotNoise | None = None,
+    noise: SensorNoise | None = None,
 ) -> tuple[SensorEvidence, AnythingOdds]:
     """Weigh everything that a model may lack to explain a campaign.
 
@@ -155,7 +158,7 @@ def sensor_evidence(
     model : SensorModel; None for one that the campaign does not determine: then it says nothing
     approach : Approach; by default robot-aided if the campaign has the robot's angles
     seed : int, of the draws
-    noise : LotNoise, in place of what the campaign says of its noise
+    noise : SensorNoise, in place of what the campaign says of its noise
 
     Raises
     ------
@@ -177,7 +180,7 @@ def sensor_evidence(
     z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
-    if noise is not None:
+    if noise is not None and noise.said:
         any_level = Evidence(Level((1.0,), (DOUBTED,), known=True), problem.evidence.redundancy)
         odds[LEVEL_OF_NOISE] = float(any_level.of_noise(z @ z)[0]) - nothing
     if unknown is not None:
@@ -192,7 +195,8 @@ def sensor_evidence(
             one, other = effects
             pairs[one.name, other.name] = together.log_density - nothing
             pair_specs[one.name, other.name] = one.spec, other.spec
-    variance = max(problem.evidence.variance(float(z @ z)), SMALLEST) if noise is None else 1.0
+    of_unit_weight = max(problem.evidence.variance(float(z @ z)), SMALLEST)
+    variance = of_unit_weight if noise is None else 1.0
     evidence = SensorEvidence(
         campaign=campaign.name,
         p_value=detection.p_value,
@@ -206,8 +210,9 @@ def sensor_evidence(
         },
         pair_specs=pair_specs,
         redundancy=problem.residuals.redundancy,
-        residuals=of_means.z * sigma_stated(base.solution),
+        residuals=of_means.z * base.sigma,
         freedom=of_means.redundancy,
+        variance=base.sigma**2 * of_unit_weight,
         square=float(z @ z) / variance,
         shown={
             name: Shown.of(problem, effects, variance)
@@ -223,12 +228,15 @@ def sensor_evidence(
 
 
 def mean_sensor(
-    campaigns: Sequence[Campaign], sensors: Sequence[SensorEvidence]
-) -> tuple[Campaign, LotNoise] | None:
+    campaigns: Sequence[Campaign],
+    sensors: Sequence[SensorEvidence],
+    noises: Sequence[SensorNoise | None],
+) -> tuple[Campaign, SensorNoise] | None:
     """Average sensors that were in the same positions and conditions, in one order.
 
     What all of them have is as large in their mean, and the noise is smaller by the root of their
-    number. It is told by their scatter about the mean. None if the positions differ.
+    number. Sensors whose noise is known by that of the lot have weights by it, and the others equal
+    ones. The noise of the mean is told by their scatter about it. None if the positions differ.
     """
     if (n := len(campaigns)) < 2:
         return None
@@ -238,20 +246,28 @@ def mean_sensor(
     if len({each.residuals.shape for each in sensors}) > 1:
         return None
     table = np.array([each.residuals for each in sensors])
+    variances = np.array([each.variance for each in sensors])
+    alone = np.array([noise is None for noise in noises])
+    if alone.any():  # an estimate of its own is no weight: one that is small by chance would count
+        variances[alone] = variances[alone].mean()
+    weights = variances.mean() / variances
     freedom = (n - 1) * min(each.freedom for each in sensors)
-    within = float(np.sum((table - table.mean(axis=0)) ** 2)) / freedom
-    sigma = max(float(np.sqrt(within / n)), LEAST_SIGMA)
-    columns = {
-        name: np.mean([getattr(one, name) for one in campaigns], axis=0)
+    apart = table - np.average(table, axis=0, weights=weights)
+    within = float(np.sum(weights @ apart**2)) / freedom
+    sigma = max(float(np.sqrt(within / weights.sum())), LEAST_SIGMA)
+    columns: dict[str, Any] = {
+        name: np.average([getattr(one, name) for one in campaigns], axis=0, weights=weights)
         for name in ("forces", *COLUMNS)
         if getattr(first, name) is not None
     }
-    angle = None if first.sigma_angle is None else first.sigma_angle / np.sqrt(n)
+    angle = None
+    if first.sigma_angle is not None:
+        angle = first.sigma_angle * float(np.linalg.norm(weights) / weights.sum())
     mean = replace(
         first, name="mean of the lot", sd=None, n_samples=None,
         sigma_force=sigma, sigma_angle=angle, **columns,
     )  # fmt: skip
-    return mean, LotNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
+    return mean, SensorNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
 
 
 @dataclass(frozen=True)
@@ -344,7 +360,7 @@ def is_noise(name: str) -> bool:
     return name in NOISES
 
 
-def _by_chance(problem: Problem, chance: Chance, noise: LotNoise | None) -> Array:
+def _by_chance(problem: Problem, chance: Chance, noise: SensorNoise | None) -> Array:
     """Log odds of what is tested in noise alone, whose level is that of a sensor of the lot."""
     field, evidence = problem.field, problem.evidence
     of_levels = np.random.SeedSequence(chance.seed.entropy, spawn_key=(*chance.seed.spawn_key, 1))

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign, usual_approach
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.diagnosis.decision.problem import BaseFit, fit_base
 from accelstudy.lots.evidence import (
     AnythingOdds,
     SensorEvidence,
@@ -34,7 +33,7 @@ from accelstudy.lots.evidence import (
     together,
 )
 from accelstudy.lots.mixture import Anything
-from accelstudy.lots.noise import LotNoise, noise_of_type
+from accelstudy.lots.noise import SensorNoise, noises_of_lot
 from accelstudy.lots.passes import LEVEL, ODD, Found, Odd, Pass, Size
 from accelstudy.lots.sizes import TypeSizes, told
 from accelstudy.sensors.models import compose, composition_name
@@ -54,7 +53,7 @@ class Lot:
 
     Attributes
     ----------
-    passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the type,
+    passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the lot,
         with the model and all that was found before, until nothing new is found
     model : SensorModel, with `effects`
     effects : tuple of (Found, spec or None), in the order in which they were found
@@ -72,6 +71,14 @@ class Lot:
     def sensors(self) -> tuple[SensorEvidence, ...]:
         """Evidence of each campaign by itself."""
         return self.passes[0].sensors
+
+    @property
+    def noises(self) -> dict[str, SensorNoise | None]:
+        """Noise of each campaign by that of the lot; None where it speaks for itself."""
+        last = self.passes[-1]
+        noises = last.noises or [None] * len(last.sensors)
+        names = [sensor.campaign for sensor in last.sensors]
+        return dict(zip(names, noises, strict=True))
 
     def model_of(self, i: int) -> SensorModel:
         """Model of the type for a sensor, with its own times of what is sudden."""
@@ -193,11 +200,13 @@ def _weigh_lot(
     mapped: Callable[..., Iterator[Any]],
 ) -> Lot:
     def weighed(
-        models: Sequence[SensorModel | None], with_: SensorModel, noise: LotNoise | None
+        models: Sequence[SensorModel | None],
+        with_: SensorModel,
+        noises: Sequence[SensorNoise | None],
     ) -> Pass:
         n = len(campaigns)
         seeds, of_its_own = range(seed, seed + n), seed - 1 if seed else n
-        each = mapped(sensor_evidence, campaigns, models, [approach] * n, seeds, [noise] * n)
+        each = mapped(sensor_evidence, campaigns, models, [approach] * n, seeds, noises)
         sensors, anything = [], Anything()
         # What noise alone would say is most of what a sensor gives, and is not kept.
         for sensor, of_test in track(each, "evidence of the sensors", n):
@@ -205,15 +214,19 @@ def _weigh_lot(
             anything.add(of_test.names, of_test.odds)
 
         def retested(i: int) -> AnythingOdds:
-            return sensor_evidence(campaigns[i], models[i], approach, seeds[i], noise)[1]
+            return sensor_evidence(campaigns[i], models[i], approach, seeds[i], noises[i])[1]
 
-        now, mean = Pass(tuple(sensors), anything, retested, noise=noise), None
+        now, mean = Pass(tuple(sensors), anything, retested, noises=tuple(noises)), None
         odd = {one.campaign for one in now.odd}
         usual = [k for k, one in enumerate(sensors) if models[k] and one.campaign not in odd]
         of_mean = None
         # What happens to each sensor at a time of its own has no mean.
         if not any(effect.sudden for effect in with_.effects):
-            of_mean = mean_sensor([campaigns[k] for k in usual], [sensors[k] for k in usual])
+            of_mean = mean_sensor(
+                [campaigns[k] for k in usual],
+                [sensors[k] for k in usual],
+                [noises[k] for k in usual],
+            )
         if of_mean is not None:
             with suppress(InputError):  # the positions do not determine the model
                 mean, _ = sensor_evidence(of_mean[0], with_, approach, of_its_own, of_mean[1])
@@ -224,27 +237,25 @@ def _weigh_lot(
         if len(usual) < 2 or not (shapes := now.strongest()):
             return now
         specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
-        each = mapped(told, campaigns, models, [approach] * n, [noise] * n, [specs] * n)
+        each = mapped(told, campaigns, models, [approach] * n, noises, [specs] * n)
         return replace(now, sizes=TypeSizes.of(list(each), specs, usual), shapes=shapes)
 
     def again(with_: SensorModel) -> Pass | None:
         own = [_own(with_, passes, i) for i in range(len(campaigns))]
 
-        def fits_of(measured: Sequence[Campaign]) -> list[Solution | None]:
-            return [
-                _fitted(campaign, of_sensor, approach)
-                for campaign, of_sensor in zip(measured, own, strict=True)
-            ]
+        def refit(i: int, sigma: float) -> BaseFit | None:
+            measured = replace(campaigns[i], sigma_force=sigma, sigma_dof=None)
+            return _fitted(measured, own[i], approach)
 
-        fits = fits_of(campaigns)
+        fits = [_fitted(one, of_it, approach) for one, of_it in zip(campaigns, own, strict=True)]
         # A campaign that does not determine the model says nothing of what else is missing.
-        models = [None if fit is None else fit.model for fit in fits]
+        models = [None if fit is None else fit.solution.model for fit in fits]
         if not any(models):
             return None
-        return weighed(models, with_, noise_of_type(fits, fits_of, campaigns))
+        return weighed(models, with_, noises_of_lot(fits, refit))
 
     passes: list[Pass] = []
-    now, whole = weighed([model] * len(campaigns), model, None), model
+    now, whole = weighed([model] * len(campaigns), model, [None] * len(campaigns)), model
     passes.append(now)
     effects: list[tuple[Found, str | None]] = []
     new = _new(now, whole, effects)
@@ -275,10 +286,10 @@ def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
     return compose(whole.name, tuple(effects))
 
 
-def _fitted(campaign: Campaign, model: SensorModel, approach: Approach | None) -> Solution | None:
+def _fitted(campaign: Campaign, model: SensorModel, approach: Approach | None) -> BaseFit | None:
     """Calibrate a sensor; None if it does not determine the model."""
     with suppress(InputError):
-        return fit_base(campaign, model, approach or usual_approach(campaign)).solution
+        return fit_base(campaign, model, approach or usual_approach(campaign))
     return None
 
 
@@ -351,7 +362,7 @@ def variances(lot: Lot, fit: CampaignFit) -> Array:
     Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
     would look like scatter of the parameters.
     """
-    own, noise = fit.sigma**2, lot.passes[-1].noise
+    own, noise = fit.sigma**2, lot.noises[fit.campaign.name]
     if fit.trusts_sigma or noise is None:
         return own
     r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2

@@ -1,16 +1,27 @@
-"""The noise of a type, as the calibrations of its sensors tell it together."""
+"""The noise of a lot: how its sensors scatter about what their campaigns say of it.
+
+A campaign states the sigma uᵢ of its position means, or the samples within its holds tell one, or
+it says nothing, uᵢ = 1 m/s². Sensors of a type may be held for 2 s or for 60, so that their noise
+differs; what they share is a factor c of what each campaign says:
+
+    sᵢ² / (c uᵢ)² ~ 0.9 F(rᵢ, ν) + 0.1 F(rᵢ, 1),
+
+with the variances sᵢ² of their calibrations by rᵢ degrees of freedom. The second term are sensors
+whose sigma is wrong. Of a sensor that states nothing, nothing can be wrong: there is no such term.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from accelstudy.adjustment.quality import Solution
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Level
 
 Array = NDArray[np.float64]
@@ -18,60 +29,37 @@ Array = NDArray[np.float64]
 LEAST_SIGMA = 1e-9
 """m/s², of readings that are their own model."""
 FREEDOMS = (AS_GIVEN, 60.0, 20.0, 8.0, DOUBTED)
-"""ν of a type, the most first."""
+"""ν of a lot, the most first; with the last one sensors have nothing in common."""
 ALIKE = 1.0
 """Difference of log likelihoods that says nothing."""
 ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
+FEWEST = 3
+"""Sensors that tell a noise in common."""
+STEP = 0.1
+"""Of the logarithm of c² in the search for its most probable value: there may be several maxima."""
 AGREE = 0.02
-"""Relative change below which the noise of a type is found."""
+"""Relative change below which the noise of a lot is found."""
 REFITS = 8
 """Most calibrations of all sensors for it."""
 
 
 @dataclass(frozen=True)
-class LotNoise:
-    """The noise of a type: variances of its sensors are σ² times an inverse-gamma(ν/2, ν/2).
+class SensorNoise:
+    """The noise of a sensor by that of the lot: its variance is σ² times inverse-gamma(ν/2, ν/2).
 
     Attributes
     ----------
     sigma : float, m/s², of a position mean
     freedom : float, ν: few where sensors differ in noise
-    doubt : float, prior probability that a sensor has a noise of its own
+    doubt : float, prior probability that the sensor has a noise of its own
+    said : bool, whether its campaign says how large the noise is, which may be wrong then
     """
 
     sigma: float
     freedom: float
     doubt: float = 0.02
-
-    @classmethod
-    def of(cls, sigmas: Array, redundancies: Array) -> LotNoise:
-        """Of the variances s² of calibrations, of which s²/σ² is of F(r, ν), but for odd ones.
-
-        Of the ν that explain them equally well the largest one is taken.
-
-        Parameters
-        ----------
-        sigmas, redundancies : (n,) arrays, s in m/s² and r, of the sensors
-        """
-        squares = np.square(sigmas)
-
-        def less_likely(log: float, freedom: float) -> float:
-            ratios = squares / np.exp(log)
-            usual, odd = (stats.f.logpdf(ratios, redundancies, nu) for nu in (freedom, ODD_FREEDOM))
-            usual, odd = usual + np.log(1 - ODD_SHARE), odd + np.log(ODD_SHARE)
-            return float(len(squares) * log - np.sum(np.logaddexp(usual, odd)))
-
-        middle = float(np.median(np.log(squares)))
-        best = [
-            optimize.minimize_scalar(less_likely, (middle - 0.2, middle + 0.2), args=(nu,))
-            for nu in FREEDOMS
-        ]
-        least = min(one.fun for one in best)
-        log, freedom = next(
-            (one.x, nu) for one, nu in zip(best, FREEDOMS, strict=True) if one.fun < least + ALIKE
-        )
-        return cls(float(np.exp(log / 2)), freedom)
+    said: bool = True
 
     @property
     def level(self) -> Level:
@@ -81,48 +69,151 @@ class LotNoise:
         return Level((1 - self.doubt, self.doubt), (self.freedom, DOUBTED), known=True)
 
 
-def with_noise(campaign: Campaign, noise: LotNoise | None) -> Campaign:
-    """Return a campaign with the noise of its type, if it is known, in place of its own."""
+def with_noise(campaign: Campaign, noise: SensorNoise | None) -> Campaign:
+    """Return a campaign with the noise that the lot tells, if it does, in place of its own."""
     return campaign if noise is None else replace(campaign, sigma_force=noise.sigma, sigma_dof=None)
 
 
-def noise_of_type(
-    fits: Sequence[Solution | None],
-    fits_of: Callable[[Sequence[Campaign]], list[Solution | None]],
-    campaigns: Sequence[Campaign],
-) -> LotNoise:
-    """Noise of the type by the calibrations of its sensors, as far as there are any.
+class Source(Enum):
+    """What tells the noise of a campaign by itself."""
 
-    Beside angles the noise of the forces is not in proportion to the residuals, and is searched
-    for: with it the residuals are as large as it says.
+    STATED = 1
+    WITHIN = 2
+    NOTHING = 3
+
+    @classmethod
+    def of(cls, fit: BaseFit) -> Source:
+        """Source of the noise of a calibration."""
+        if fit.level.known:
+            return cls.STATED
+        return cls.NOTHING if fit.within is None else cls.WITHIN
+
+    def sigma(self, fit: BaseFit) -> float:
+        """Sigma u that a campaign says, m/s²."""
+        if self is Source.STATED:
+            return fit.sigma
+        return 1.0 if fit.within is None else float(np.sqrt(np.mean(fit.within)))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How sensors agree in noise.
+
+    Attributes
+    ----------
+    factor : float, c, by which the noise is larger than is said
+    freedom : float, ν
+    log_likelihood : float, of the variances of the calibrations
     """
-    noise, before = lot_noise(fits), None
-    beside = any(fit is not None and fit.approach.uses_angles for fit in fits)
+
+    factor: float
+    freedom: float
+    log_likelihood: float
+
+    @classmethod
+    def of(
+        cls, sigmas: Array, redundancies: Array, said: Array, odd_share: float = ODD_SHARE
+    ) -> Agreement:
+        """Find the most probable factor, and the largest ν that explains as much.
+
+        Parameters
+        ----------
+        sigmas, redundancies : (n,) arrays, s in m/s² and r, of the sensors
+        said : (n,) array, u in m/s²
+        odd_share : float, share of sensors whose sigma is wrong
+        """
+        squares = np.square(sigmas / said)
+
+        def log_likelihood(log: Array | float, freedom: float) -> Array:
+            logs = np.asarray(log, dtype=float)[..., None]
+            ratios = squares / np.exp(logs)
+            each = stats.f.logpdf(ratios, redundancies, freedom)
+            if odd_share:
+                odd = stats.f.logpdf(ratios, redundancies, ODD_FREEDOM) + np.log(odd_share)
+                each = np.logaddexp(each + np.log(1 - odd_share), odd)
+            return np.asarray(np.sum(each - logs - 2 * np.log(said), axis=-1))
+
+        ends = np.log(squares.min()), np.log(squares.max())
+        grid = np.arange(ends[0] - STEP, ends[1] + 2 * STEP, STEP)
+        found = []
+        for freedom in FREEDOMS:
+            near = grid[np.argmax(log_likelihood(grid, freedom))]
+            best = optimize.minimize_scalar(
+                lambda log, nu: -float(log_likelihood(log, nu)),
+                (near - STEP, near + STEP),
+                args=(freedom,),
+            )
+            found.append(cls(float(np.exp(best.x / 2)), freedom, -float(best.fun)))
+        most = max(one.log_likelihood for one in found)
+        usual = next(one for one in found if one.log_likelihood > most - ALIKE)
+        return replace(usual, log_likelihood=most)
+
+
+def noises_of_lot(
+    fits: Sequence[BaseFit | None], refit: Callable[[int, float], BaseFit | None]
+) -> list[SensorNoise | None]:
+    """Noise of each sensor, by what all those tell whose campaigns say it in the same way.
+
+    Parameters
+    ----------
+    fits : calibrations of the sensors; None where there is none
+    refit : function that calibrates a sensor, by its place, with another sigma in m/s²
+
+    Returns
+    -------
+    list
+        None for sensors that speak for themselves, as their noise has nothing in common.
+    """
+    noises: list[SensorNoise | None] = [None] * len(fits)
+    for source in Source:
+        group = {
+            i: fit for i, fit in enumerate(fits) if fit is not None and Source.of(fit) is source
+        }
+        if len(group) < FEWEST:
+            continue
+        agreement, said = _agreement(group, source, refit)
+        if agreement.freedom > DOUBTED:
+            for i, u in zip(group, said.tolist(), strict=True):
+                noises[i] = SensorNoise(
+                    agreement.factor * u, agreement.freedom, said=source is not Source.NOTHING
+                )
+    return noises
+
+
+def _agreement(
+    group: dict[int, BaseFit], source: Source, refit: Callable[[int, float], BaseFit | None]
+) -> tuple[Agreement, Array]:
+    """Find how some sensors agree in noise, and of which sigmas their noise is a multiple.
+
+    Sensors may have the same noise whatever their campaigns say of it: if that explains more, it is
+    a multiple of one. Beside angles the noise of the forces is not in proportion to the residuals,
+    and is searched for: with it the residuals are as large as it says.
+    """
+
+    def agreement(fits: Sequence[BaseFit], said: Array) -> Agreement:
+        sigmas = np.maximum([fit.sigma_posteriori for fit in fits], LEAST_SIGMA)
+        redundancies = np.array([fit.solution.redundancy for fit in fits])
+        share = 0.0 if source is Source.NOTHING else ODD_SHARE
+        return Agreement.of(sigmas, redundancies, said, share)
+
+    fits = list(group.values())
+    said = np.array([source.sigma(fit) for fit in fits])
+    now, same = agreement(fits, said), agreement(fits, np.ones(len(fits)))
+    if same.log_likelihood > now.log_likelihood + ALIKE:
+        now, said = same, np.ones(len(fits))
+    before = None
+    beside = any(fit.solution.approach.uses_angles for fit in fits)
     for _ in range(REFITS if beside else 0):
-        sigma = noise.sigma
-        again = lot_noise(
-            fits_of([replace(one, sigma_force=sigma, sigma_dof=None) for one in campaigns])
-        )
-        off = float(np.log(again.sigma / sigma))
+        factor = now.factor
+        again = [refit(i, factor * u) for i, u in zip(group, said.tolist(), strict=True)]
+        there = np.array([one is not None for one in again])
+        now = agreement([one for one in again if one is not None], said[there])
+        off = float(np.log(now.factor / factor))
         if abs(off) < AGREE:
-            return again
+            break
         step = off
-        if before is not None and (off - before[1]) * (np.log(sigma) - before[0]) < 0:
-            step = -off * (np.log(sigma) - before[0]) / (off - before[1])
-        before = float(np.log(sigma)), off
-        noise = replace(again, sigma=sigma * float(np.exp(np.clip(step, -2, 2))))
-    return noise
-
-
-def lot_noise(each: Sequence[Solution | None]) -> LotNoise:
-    """Noise of a type by the calibrations of its sensors."""
-    fits = [fit for fit in each if fit is not None]
-    redundancies = np.array([fit.redundancy for fit in fits])
-    factors = np.sqrt(np.array([fit.omega for fit in fits]) / redundancies)
-    sigmas = np.array([sigma_stated(fit) for fit in fits]) * factors
-    return LotNoise.of(np.maximum(sigmas, LEAST_SIGMA), redundancies)
-
-
-def sigma_stated(fit: Solution) -> float:
-    """Return the sigma of forces that a fit took, m/s²."""
-    return float(np.mean(np.asarray(fit.observed.sigma_force)))
+        if before is not None and (off - before[1]) * (np.log(factor) - before[0]) < 0:
+            step = -off * (np.log(factor) - before[0]) / (off - before[1])
+        before = float(np.log(factor)), off
+        now = replace(now, factor=factor * float(np.exp(np.clip(step, -2, 2))))
+    return now, said

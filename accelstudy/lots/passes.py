@@ -23,14 +23,14 @@ from accelstudy.lots.evidence import (
     lot_classes,
 )
 from accelstudy.lots.mixture import Anything, Mixture, Names
-from accelstudy.lots.noise import LotNoise
+from accelstudy.lots.noise import SensorNoise
 from accelstudy.lots.sizes import OfType, TypeSizes
 
 Array = NDArray[np.float64]
 
 LEVEL = 0.05
 """Level of the test whether anything is missing in a lot: half of it by what each campaign says of
-its noise, and half by the noise of the type."""
+its noise, and half by the noise of the lot."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 FEW = 0.1
@@ -124,7 +124,7 @@ class Pass:
     anything : Anything, the test of them
     retested : function of a sensor's place that gives what it added to the test
     mean : SensorEvidence, of their mean; None if they were in different positions
-    noise : LotNoise, of the type; None where each campaign says its own
+    noises : tuple of SensorNoise, by all sensors; None where a campaign says its own
     together : mapping of effects to what all campaigns say of them together
     sizes : TypeSizes, of the effects of `shapes`; None where there are none
     shapes : mapping of the names of one or two effects to the shape of each
@@ -134,7 +134,7 @@ class Pass:
     anything: Anything
     retested: Callable[[int], AnythingOdds]
     mean: SensorEvidence | None = None
-    noise: LotNoise | None = None
+    noises: tuple[SensorNoise | None, ...] = ()
     together: Mapping[str, Joint] = field(default_factory=dict)
     sizes: TypeSizes | None = None
     shapes: Mapping[frozenset[str], Mapping[str, str]] = field(default_factory=dict)
@@ -321,9 +321,21 @@ class Pass:
 
     @cached_property
     def odd(self) -> list[Odd]:
-        """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly."""
+        """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly.
+
+        A sensor is odd by whatever nothing accounts for that is found in the lot. If that makes
+        more than few sensors odd, the lot has something that has no sure name, and what is rare
+        makes them so.
+        """
+        found = {k for k, _ in self.found}
+        nameless = np.array([k not in found for k in range(len(self.classes))], dtype=bool)
+        odd = self._odd_by(nameless)
+        return odd if len(odd) <= self._few else self._odd_by(self._rare)
+
+    def _odd_by(self, strange: NDArray[np.bool_]) -> list[Odd]:
+        """Sensors that are odd if they have one of some classes, (K,)."""
         of_sets, odd = self.mixture.sensors
-        alone = sum((p for names, p in of_sets.items() if any(self._rare[k] for k in names)), odd)
+        alone = sum((p for names, p in of_sets.items() if any(strange[k] for k in names)), odd)
         # Sensors of which nobody doubts it stay in their order.
         order = np.argsort(-np.round(alone, 3), kind="stable")
         wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)

@@ -27,7 +27,7 @@ from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.residuals import VISIBLE
 from accelstudy.effects import get_effect
-from accelstudy.lots.noise import LotNoise, with_noise
+from accelstudy.lots.noise import SensorNoise, with_noise
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def told(
     campaign: Campaign,
     model: SensorModel | None,
     approach: Approach | None,
-    noise: LotNoise | None,
+    noise: SensorNoise | None,
     specs: Sequence[str],
 ) -> Told:
     """Say what a campaign tells of effects; nothing of those that it cannot show.

@@ -56,7 +56,7 @@ def write_type(lot: Lot, fits: Sequence[CampaignFit | InputError], folder: str |
     parameters = _typical(lot, lasting, used)
     content = {
         **as_a_key(),
-        **_sheet(lot, parameters, f"{len(used)} sensors of a type").content,
+        **_sheet(lot, parameters, used).content,
         **TypeFile(
             schema_version=1,
             models={"type": [effect.spec for effect in lasting]},
@@ -104,11 +104,17 @@ def _typical(
     return typical
 
 
-def _sheet(lot: Lot, parameters: dict[str, TypicalParameter], title: str) -> DataSheet:
-    """Noise of a position mean, and errors before calibration."""
-    noise = lot.passes[-1].noise
-    assert noise is not None
-    values: dict[str, Any] = {"position_sigma": noise.sigma}
+def _sheet(
+    lot: Lot, parameters: dict[str, TypicalParameter], fits: Sequence[CampaignFit]
+) -> DataSheet:
+    """Noise of a position mean, which is that of the median sensor, and errors when it is new."""
+    title = f"{len(fits)} sensors of a type"
+    sigmas = [
+        fit.sigma_position if noise is None else noise.sigma
+        for fit in fits
+        for noise in [lot.noises[fit.campaign.name]]
+    ]
+    values: dict[str, Any] = {"position_sigma": float(np.median(sigmas))}
     for effect in lot.model.effects:
         if (quantity := SHEET.get(effect.name)) is not None:
             of_effect = [parameters[parameter.name] for parameter in effect.parameters]

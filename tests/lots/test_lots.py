@@ -27,7 +27,7 @@ from accelstudy.lots.evidence import (
 )
 from accelstudy.lots.lot import Lot, weigh_lot
 from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Anything, Mixture
-from accelstudy.lots.noise import LotNoise
+from accelstudy.lots.noise import Agreement
 from accelstudy.lots.passes import LEVEL, Pass
 from accelstudy.lots.run import _own_names
 from accelstudy.lots.sizes import Told, TypeSizes
@@ -236,6 +236,15 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     assert rest.mixture.share(rest.classes.index(("warm_up",)))[0] > 0.9
 
 
+def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
+    """Two of sixteen are too many for odd ones, and too few for a type."""
+    odds = np.full((16, 3), -1.0)
+    odds[9, 1], odds[4, 1] = 35.0, 2.8
+    one = weighed(odds, np.random.default_rng(6))
+    assert one.found == []
+    assert [(o.campaign, o.names) for o in one.odd] == [("sensor 9", ("quadratic_scale",))]
+
+
 def test_names_that_no_campaign_tells_apart_are_one_class():
     def shows(*classes):
         odds = {name: 1.0 - i / 10 for i, name in enumerate(sorted(n for c in classes for n in c))}
@@ -256,8 +265,9 @@ def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
     rng = np.random.default_rng(7)
     squares = 0.002**2 * (freedom / rng.chisquare(freedom, 400)) * rng.chisquare(12, 400) / 12
     squares[:8] *= 100
-    noise = LotNoise.of(np.sqrt(squares), np.full(400, 12))
-    assert noise.sigma == pytest.approx(0.002, rel=0.05)
+    said = rng.choice([3e-4, 2e-3], 400)
+    noise = Agreement.of(np.sqrt(squares) * said / 0.002, np.full(400, 12), 2 * said)
+    assert noise.factor == pytest.approx(0.5, rel=0.05)
     assert noise.freedom == pytest.approx(min(freedom, 200.0), rel=0.5)
 
 
@@ -271,13 +281,14 @@ def test_the_mean_of_sensors_has_their_noise_over_the_root_of_their_number():
     made = campaigns(3)
     lot = weigh_lot(made, get_model("bias-scale-nonorthogonality"), seed=0)
     assert lot.passes[0].mean is not None
-    mean, noise = mean_sensor(made, lot.sensors)
+    mean, noise = mean_sensor(made, lot.sensors, [None] * 3)
     sigma = np.sqrt(np.mean([np.sum(e.residuals**2) / e.redundancy for e in lot.sensors]) / 3)
     assert noise.sigma == pytest.approx(sigma, rel=0.2)
     np.testing.assert_allclose(mean.forces, np.mean([one.forces for one in made], axis=0))
     turned = replace(made[0], forces=made[0].forces[::-1])
-    assert mean_sensor([turned, *made[1:]], lot.sensors) is None
-    assert mean_sensor([replace(made[0], time=None), *made[1:]], lot.sensors) is None
+    untimed = replace(made[0], time=None)
+    assert mean_sensor([turned, *made[1:]], lot.sensors, [None] * 3) is None
+    assert mean_sensor([untimed, *made[1:]], lot.sensors, [None] * 3) is None
 
 
 def test_names_of_campaigns_are_their_own():

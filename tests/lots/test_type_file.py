@@ -16,7 +16,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.of_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.noise import LotNoise
+from accelstudy.lots.noise import SensorNoise
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -48,7 +48,7 @@ def type_of(sensors, folder):
     named = [SimpleNamespace(campaign=one.name) for one in sensors]
     lot = SimpleNamespace(
         odd=[], sensors=named, effects=(), model=MODEL,
-        passes=[SimpleNamespace(noise=LotNoise(0.002, 200.0))],
+        noises={one.name: SensorNoise(0.002, 200.0) for one in sensors},
         each=lambda: [(one.name, (), 1.0) for one in sensors], usual=lambda fits: fits,
     )  # fmt: skip
     assert write_type(lot, fits, folder)

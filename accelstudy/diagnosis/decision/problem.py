@@ -46,6 +46,16 @@ class BaseFit:
     level: Level
     within: Array | None
 
+    @property
+    def sigma(self) -> float:
+        """Sigma of the forces that the fit took, m/s²."""
+        return float(np.mean(np.asarray(self.solution.observed.sigma_force)))
+
+    @property
+    def sigma_posteriori(self) -> float:
+        """Sigma of the forces by the residuals, m/s²."""
+        return self.sigma * float(np.sqrt(self.solution.omega / self.solution.redundancy))
+
 
 def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> BaseFit:
     """Fit a model to a campaign; where no sigma is given, weights take that of the residuals.

@@ -146,7 +146,10 @@ Known = tuple[Cause, tuple[str, ...]]
 
 
 def generate(
-    case: Case, seed: np.random.SeedSequence, given: Mapping[str, Known] | None = None
+    case: Case,
+    seed: np.random.SeedSequence,
+    given: Mapping[str, Known] | None = None,
+    roughness: float = 1.0,
 ) -> tuple[Campaign, Truth]:
     """Simulate a campaign.
 
@@ -155,6 +158,7 @@ def generate(
     case : Case
     seed : numpy.random.SeedSequence, from which all that is random follows
     given : mapping of effects of the case to what they are; the others are drawn
+    roughness : float, factor of the noise of a position mean, by longer or shorter holds
 
     Raises
     ------
@@ -166,7 +170,12 @@ def generate(
     planned = knowing.atlas.session
     # No joint comes to rest exactly where it was sent.
     arrived = planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape)
-    session = replace(planned, joints=arrived)
+    session = replace(
+        planned,
+        joints=arrived,
+        sigma=planned.sigma * roughness,
+        n_samples=round(planned.n_samples / roughness**2),
+    )
     sensor = Sensor.drawn(rng)
     conditions = Conditions(session, case.approach, sensor)
     sizes = case.lam or (0.0,) * len(case.effect)

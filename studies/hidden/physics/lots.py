@@ -26,21 +26,26 @@ class LotCase:
     set : str, name of the kind
     design : str
     approach : str, "gravity" or "robot"
-    sigma_known : bool, whether the campaigns state their sigma
+    sigma_known : bool, whether the campaigns state their sigma; None where half of them do
     effects : tuple of str, what is missing
     shares : tuple of float, how many of the sensors have each; 0 for one sensor
     lam : float, noncentrality of each effect in a typical sensor
     noise : str, kind of wrong noise of all sensors; None where it is right
+    roughness : tuple of float, factors of the noise of a position mean; each sensor has one of them
+        at random, by long holds or short ones
+    designs : tuple of str, of which each sensor has one at random; none where all have `design`
     """
 
     set: str
     design: str
     approach: str
-    sigma_known: bool
+    sigma_known: bool | None
     effects: tuple[str, ...] = ()
     shares: tuple[float, ...] = ()
     lam: float = 0.0
     noise: str | None = None
+    roughness: tuple[float, ...] = (1.0,)
+    designs: tuple[str, ...] = ()
 
 
 def generate_lot(
@@ -66,17 +71,17 @@ def generate_lot(
         has[rng.permutation(sensors)[: max(round(share * sensors), 1)], k] = True
     for i, its_seed in enumerate(seeds):
         names = tuple(name for name, there in zip(case.effects, has[i], strict=True) if there)
-        one = Case(
-            "lot", case.design, case.approach, case.sigma_known, names, (case.lam,) * len(names),
-            case.noise,
-        )  # fmt: skip
+        design = str(rng.choice(case.designs)) if case.designs else case.design
+        known = bool(rng.integers(2)) if case.sigma_known is None else case.sigma_known
+        one = Case("lot", design, case.approach, known, names, (case.lam,) * len(names), case.noise)
+        rough = float(rng.choice(case.roughness)) if len(case.roughness) > 1 else case.roughness[0]
         given = {}
         for name in names:
-            if (known := of_type.get(name)) is not None:
-                cause, same = known
+            if (shared := of_type.get(name)) is not None:
+                cause, same = shared
                 factors = np.exp(SCATTER * rng.standard_normal(cause.parameters.shape))
                 given[name] = replace(cause, parameters=cause.parameters * factors), same
-        campaign, truth = generate(one, its_seed, given)
+        campaign, truth = generate(one, its_seed, given, rough)
         yield replace(campaign, name=f"sensor-{i + 1}"), truth
 
 

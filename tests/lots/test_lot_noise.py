@@ -1,0 +1,117 @@
+"""The noise of a lot as a factor of what each campaign says of it, by made-up calibrations."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Level
+from accelstudy.lots.evidence import SensorEvidence, mean_sensor
+from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
+
+N, REDUNDANCY = 16, 40
+QUIET, ROUGH = 3e-4, 2e-3
+"""m/s², of sensors that were held for a minute, and for a second."""
+MIXED = np.where(np.arange(N) % 3 == 0, QUIET, ROUGH)
+
+
+def fit(true, k, stated=None, within=None):
+    """Calibration number k of a sensor with some noise; what its residuals tell is spread evenly.
+
+    A chi-square variable of 40 degrees of freedom is within ±13 % of its mean in 2 of 3 cases.
+    """
+    ratio = 1 + 0.11 * np.linspace(-1.5, 1.5, N)[k * 7 % N]
+    return SimpleNamespace(
+        level=Level.unknown() if stated is None else Level.given(),
+        within=None if within is None else np.full(3, within**2),
+        sigma=stated or true * ratio,
+        sigma_posteriori=true * ratio,
+        solution=SimpleNamespace(
+            redundancy=REDUNDANCY, approach=SimpleNamespace(uses_angles=False)
+        ),
+    )
+
+
+def noises_of(fits):
+    return noises_of_lot(fits, lambda i, sigma: pytest.fail("angles alone need it"))
+
+
+def test_sensors_whose_stated_noise_differs_have_a_factor_in_common():
+    noises = noises_of([fit(true, k, stated=2 * true) for k, true in enumerate(MIXED)])
+    assert all(noise.said and noise.freedom >= 60 for noise in noises)
+    np.testing.assert_allclose([noise.sigma for noise in noises], MIXED, rtol=0.03)
+    # So has what the samples within the holds tell.
+    noises = noises_of([fit(true, k, within=true / 3) for k, true in enumerate(MIXED)])
+    np.testing.assert_allclose([noise.sigma for noise in noises], MIXED, rtol=0.03)
+
+
+def test_a_wrongly_stated_sigma_changes_that_of_no_other_sensor():
+    stated = np.where(np.arange(N) == 5, MIXED / 8, MIXED)
+    noises = noises_of(
+        [fit(true, k, stated=u) for k, (true, u) in enumerate(zip(MIXED, stated, strict=True))]
+    )
+    np.testing.assert_allclose([noise.sigma for noise in noises], stated, rtol=0.05)
+    assert noises[5].freedom >= 20  # so its residuals are far beyond what it states
+
+
+def test_sensors_of_equal_noise_are_equal_whatever_they_state():
+    stated = ROUGH * np.geomspace(0.5, 2, N)[np.arange(N) * 5 % N]
+    noises = noises_of([fit(ROUGH, k, stated=u) for k, u in enumerate(stated)])
+    np.testing.assert_allclose([noise.sigma for noise in noises], ROUGH, rtol=0.03)
+
+
+def test_sensors_that_say_nothing_pool_only_if_they_agree():
+    """What is not said cannot be wrong."""
+    noises = noises_of([fit(ROUGH, k) for k in range(N)])
+    np.testing.assert_allclose([noise.sigma for noise in noises], ROUGH, rtol=0.03)
+    assert not any(noise.said for noise in noises)
+    assert noises_of([fit(true, k) for k, true in enumerate(MIXED)]) == [None] * N
+    # Those that say it are judged apart from those that do not.
+    half = [fit(true, k, stated=true if k < N / 2 else None) for k, true in enumerate(MIXED)]
+    noises = noises_of(half)
+    assert noises[N // 2 :] == [None] * (N // 2)
+    np.testing.assert_allclose(
+        [noise.sigma for noise in noises[: N // 2]], MIXED[: N // 2], rtol=0.05
+    )
+    assert noises_of([None, *half[:2]]) == [None] * 3  # two are no lot
+
+
+def test_of_several_maxima_the_highest_is_found():
+    """Two groups of sensors, of which the larger one is the usual one."""
+    for few in (3, 13):
+        sigmas = np.where(np.arange(N) < few, QUIET, ROUGH)
+        found = Agreement.of(sigmas, np.full(N, REDUNDANCY), np.ones(N))
+        assert found.freedom == DOUBTED or found.factor == pytest.approx(
+            QUIET if few > N / 2 else ROUGH, rel=0.1
+        )
+
+
+def test_the_mean_has_weights_by_known_noise_and_its_variance():
+    """Readings that differ by ±1 in units of their own noise, and those of two that have none."""
+    base, _ = simulate_campaign(CampaignSettings(name="s", seed=1))
+    sigmas = np.array([1e-3, 2e-3, 2e-3, 4e-3])
+    signs = np.array([1.0, -1.0, 1.0, -1.0])
+    campaigns = [
+        replace(base, forces=base.forces + s * e) for s, e in zip(sigmas, signs, strict=True)
+    ]
+    sensors = [
+        SensorEvidence("c", 1.0, {}, {}, (), {}, 30, np.full(30, s * e), 30, variance=s**2)
+        for s, e in zip(sigmas, signs, strict=True)
+    ]
+
+    def expected(variances):
+        weights = (1 / variances) / np.sum(1 / variances)
+        shift = weights @ (sigmas * signs)
+        squares = 30 * np.sum((sigmas * signs - shift) ** 2 / variances) / 90
+        return shift, np.sqrt(squares / np.sum(1 / variances)), weights
+
+    known = [SensorNoise(s, AS_GIVEN) for s in sigmas]
+    alone = np.append(sigmas[:2] ** 2, np.full(2, np.mean(sigmas[2:] ** 2)))
+    for noises, variances in ((known, sigmas**2), ([*known[:2], None, None], alone)):
+        shift, sigma, weights = expected(variances)
+        mean, noise = mean_sensor(campaigns, sensors, noises)
+        np.testing.assert_allclose(mean.forces - base.forces, shift, rtol=1e-6)
+        assert noise.sigma == pytest.approx(sigma)
+        assert mean.sigma_angle == pytest.approx(base.sigma_angle * np.sqrt(np.sum(weights**2)))
