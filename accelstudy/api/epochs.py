@@ -18,12 +18,10 @@ from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.wording import counted
 from accelstudy.drawing.style import FULL
-from accelstudy.epochs import comparison as comparing
-from accelstudy.epochs.history import History as Course
+from accelstudy.epochs import output
+from accelstudy.epochs.history import History as Calibrations
 from accelstudy.epochs.history import history_of
-from accelstudy.epochs.history_output import history_document, history_table, write_history
 from accelstudy.epochs.interval import Interval
-from accelstudy.epochs.output import comparison_document, draw_changes, write_comparison
 from accelstudy.files.outputs import COMPARISON, HISTORY
 
 if TYPE_CHECKING:
@@ -35,13 +33,14 @@ class Comparison(Result):
 
     Attributes
     ----------
-    result : accelstudy.epochs.comparison.Comparison, all of it
+    result : accelstudy.epochs.history.History, all of it
+    tilt_range : float, rad, over which tilts are compared
     """
 
     kind = COMPARISON
 
-    def __init__(self, result: comparing.Comparison) -> None:
-        self.result = result
+    def __init__(self, result: Calibrations, tilt_range: float) -> None:
+        self.result, self.tilt_range = result, tilt_range
 
     @property
     def name(self) -> str:
@@ -51,7 +50,7 @@ class Comparison(Result):
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of comparison.json."""
-        return comparison_document(self.result)
+        return output.comparison_document(self.result, self.tilt_range)
 
     def to_frame(self) -> pd.DataFrame:
         """Return both values of each parameter, the change with its sigma, and what was found."""
@@ -61,12 +60,12 @@ class Comparison(Result):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the change of each parameter over its sigma."""
         with drawing(ax, FULL, 62) as ax:
-            draw_changes(ax, self.result)
+            output.draw_changes(ax, self.result)
         return ax
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy compare` does."""
-        write_comparison(self.result, folder)
+        output.write_comparison(self.result, self.tilt_range, folder)
 
 
 class History(Result):
@@ -81,7 +80,7 @@ class History(Result):
 
     kind = HISTORY
 
-    def __init__(self, result: Course, interval: Interval | None) -> None:
+    def __init__(self, result: Calibrations, interval: Interval | None) -> None:
         self.result, self.interval = result, interval
 
     @property
@@ -92,12 +91,12 @@ class History(Result):
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of history.json."""
-        return history_document(self.result, self.interval)
+        return output.history_document(self.result, self.interval)
 
     @property
     def values(self) -> pd.DataFrame:
         """Value and sigma of each parameter in each calibration, as history.parquet has them."""
-        return history_table(self.result)
+        return output.history_table(self.result)
 
     def to_frame(self) -> pd.DataFrame:
         """Return value, rate a year and scatter of each parameter, and what was found."""
@@ -129,12 +128,12 @@ class History(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy history` does."""
-        write_history(self.result, folder, self.interval)
+        output.write_history(self.result, self.interval, folder)
 
 
 def follow(
     calibrations: Sequence[Calibration], dates: Sequence[str | datetime], given: Sequence[Any]
-) -> Course:
+) -> Calibrations:
     """Follow a sensor over its calibrations, which messages call as they were given."""
     if dates and len(dates) != len(calibrations):
         raise InputError(

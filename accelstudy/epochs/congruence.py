@@ -84,6 +84,11 @@ class Epochs:
         """Covariance matrix of the differences."""
         return self.covariances[0] + self.covariances[1]
 
+    @property
+    def sigmas(self) -> Array:
+        """Sigmas of the differences, (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
     def of(self, chosen: Sequence[int]) -> Epochs:
         """Differences of some of the parameters, whatever the others do."""
         first, second = (c[np.ix_(chosen, chosen)] for c in self.covariances)
@@ -107,11 +112,12 @@ class Epochs:
         They are in directions in which the covariance matrices of both epochs are diagonal.
         """
         # Parameters may differ in size by many powers of ten.
-        size = np.sqrt(np.diag(self.covariance))
+        size = self.sigmas
         first, second = (c / np.outer(size, size) for c in self.covariances)
         shares, directions = linalg.eigh(first, first + second)
         return (directions.T @ (self.differences / size)) ** 2, np.clip(shares, 0.0, 1.0)
 
+    @cached_property
     def changed(self) -> tuple[int, ...]:
         """Fewest parameters that changed: all others are congruent, at one level for all.
 
@@ -126,9 +132,9 @@ class Epochs:
                 left, found = sorted([*left, i]), [k for k in found if k != i]
         return tuple(sorted(found))
 
-    def instead_of(self, one: int, found: Sequence[int]) -> tuple[int, ...]:
-        """Parameters that may have changed instead of one that was found."""
-        others = [i for i in range(len(self.differences)) if i not in found]
+    def instead_of(self, one: int) -> tuple[int, ...]:
+        """Parameters that may have changed instead of one of `changed`."""
+        others = [i for i in range(len(self.differences)) if i not in self.changed]
         kept = [[*(i for i in others if i != other), one] for other in others]
         tests = [self.of(sorted(each)).test() for each in kept]
         return tuple(other for other, test in zip(others, tests, strict=True) if test.congruent)

@@ -1,39 +1,37 @@
-"""A sensor over time: whether its parameters change, drift, and scatter between sessions.
+"""Two or more calibrations of one sensor: what changed, what drifts, and what scatters.
 
-A parameter of session i at time tᵢ is a + r tᵢ + sᵢ + eᵢ: a line, the scatter of the sessions with
-the sd τ, as by switching off and on, and the noise of the calibration.
-
-* It changes if its squares about the mean are more than noise leaves: χ² with stated noise. Where
-  noise was estimated the limit allows for it as that of the congruence test (`congruence.py`).
-* It scatters if its squares about the line are.
-* The rate is a t variable with n − 2 degrees of freedom, as the scatter is estimated by the squares
-  about the line, whether or not there is scatter (Knapp & Hartung 2003, Statistics in Medicine 22,
-  2693; exact where all sigmas are equal).
-* That is so if the scatter of each session is independent of that of the others. If instead it adds
-  up from session to session, a random walk with the variance q t, a line is hardly seen in it. The
-  rate is given for that, too: by generalized least squares, with q by the squares, as τ is.
-
-Each of p parameters has the p-th part of the level. What changes is tested further for rate and for
-scatter: one of the two is not zero then, so that the other may take the same part.
+Calibrations by different models are brought to the effects that all of them have. If one has more,
+its sensor is calibrated again without them, as another one was: noise-free readings that it would
+give in evenly spread attitudes, under the conditions of the other session, by the approach of that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize, stats
 
-from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.adjustment import calibrate
+from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.applying import SensorCalibration
+from accelstudy.campaign.calibration.device import KNOWN, USUAL
+from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Parameter
-from accelstudy.epochs.common import Common, in_common
-from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, noncentrality, tail
+from accelstudy.epochs.congruence import LEVEL, Epochs
+from accelstudy.epochs.course import Course
+from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+from accelstudy.positions.points import evenly_spread
+from accelstudy.sensors.models import compose, composition_name
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
@@ -41,159 +39,84 @@ YEAR = 365.25 * 86400.0
 """s"""
 FEWEST = 3
 """Calibrations of which a line leaves a degree of freedom."""
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """A parameter over time.
-
-    Attributes
-    ----------
-    years : (n,) array, time
-    values, variances : (n,) arrays, of the calibrations
-    dof : (n,) array, degrees of freedom of the variances; inf if the noise was stated
-    """
-
-    years: Array
-    values: Array
-    variances: Array
-    dof: Array
-
-    @cached_property
-    def line(self) -> RandomEffects:
-        """Value at the time 0, and rate per year."""
-        design = np.column_stack([np.ones_like(self.years), self.years])
-        return RandomEffects(self.values, self.variances, design)
-
-    @cached_property
-    def mean(self) -> RandomEffects:
-        """The same without a rate."""
-        return RandomEffects(self.values, self.variances, np.ones((len(self.years), 1)))
-
-    @property
-    def rate(self) -> tuple[float, float]:
-        """Rate and its sigma, per year."""
-        return float(self.line.estimates[1]), float(np.sqrt(self.line.covariance[1, 1]))
-
-    @property
-    def sigmas_95(self) -> float:
-        """Number of sigmas on either side of the line that hold 95 %."""
-        return float(stats.t.isf(0.025, self.line.dof))
-
-    @property
-    def rate_interval(self) -> tuple[float, float]:
-        """Interval that holds the rate with a probability of 95 %, if sessions are independent."""
-        (rate, sigma), half = self.rate, self.sigmas_95
-        return rate - half * sigma, rate + half * sigma
-
-    @cached_property
-    def wandering_rate(self) -> tuple[float, float]:
-        """Rate and its sigma, per year, if the parameter walks at random instead of scattering."""
-        design, f = self.line.design, self.line.dof
-        since = self.years - self.years.min()
-        noise, walk = np.diag(self.variances), np.minimum.outer(since, since)
-        # Contrasts without value and rate, of which the noise is white and the walk diagonal.
-        free = linalg.null_space((design * [1.0, 1 / np.ptp(since)]).T)
-        sizes, turned = linalg.eigh(free.T @ walk @ free, free.T @ noise @ free)
-        squares = (turned.T @ (free.T @ self.values)) ** 2
-
-        def too_many(q: float) -> float:
-            return float(np.sum(squares / (1 + q * np.maximum(sizes, 0.0)))) - f
-
-        q = 0.0
-        if too_many(0.0) > 0:
-            most = 1 / float(sizes.max())
-            while too_many(most) > 0:
-                most *= 4
-            q = optimize.brentq(too_many, 0.0, most)
-        weighted = np.linalg.solve(noise + q * walk, design).T
-        covariance = np.linalg.inv(weighted @ design)
-        return float((covariance @ weighted @ self.values)[1]), float(np.sqrt(covariance[1, 1]))
-
-    @property
-    def wandering_interval(self) -> tuple[float, float]:
-        """Interval of the rate as `rate_interval`, if the parameter walks at random."""
-        (rate, sigma), half = self.wandering_rate, self.sigmas_95
-        return rate - half * sigma, rate + half * sigma
-
-    def may_wander(self, level: float) -> bool:
-        """Whether a random walk without any rate would explain it as well, at some level."""
-        rate, sigma = self.wandering_rate
-        return abs(rate) <= float(stats.t.isf(level / 2, self.line.dof)) * sigma
-
-    def p_values(self, level: float = LEVEL) -> tuple[float, float, float]:
-        """Whether nothing changes, nothing drifts, and nothing scatters; exact at some level."""
-        rate, sigma = self.rate
-        drifts = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
-        return self._exceeds(self.mean, level), drifts, self._exceeds(self.line, level)
-
-    def found(self, level: float) -> tuple[str, ...]:
-        """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""
-        change, drift, scatter = (p <= level for p in self.p_values(level))
-        if not change:
-            return ()
-        named = {"drifts": drift, "scatters": scatter}
-        return tuple(word for word, is_so in named.items() if is_so) or ("changed",)
-
-    def detectable_rate(self, level: float) -> float:
-        """Rate that by itself is found to be a change with a probability of `POWER`."""
-        other = self._other_dof(self.mean, level)
-        # Squares about the mean that a rate of 1 adds.
-        each = RandomEffects(self.years, self.variances, self.mean.design).squares(0.0)
-        return float(np.sqrt(noncentrality(self.mean.dof, other, level) / each))
-
-    def detectable_scatter(self, level: float) -> float:
-        """Scatter that by itself is found to be a change with a probability of `POWER`.
-
-        Squares are taken as a scaled χ² variable of the same mean and variance.
-        """
-        other = self._other_dof(self.mean, level)
-        f, root, design = self.mean.dof, np.sqrt(self.variances), self.mean.design
-        limit = stats.chi2.isf(level, f) if np.isinf(other) else f * stats.f.isf(level, f, other)
-        apart = (np.eye(f + 1) - design @ self.mean.combination(0.0)) * root / root[:, None]
-        sizes = np.linalg.eigvalsh((apart / self.variances) @ apart.T)[1:] * self.variances.min()
-
-        def missed(ratio: float) -> float:
-            each = 1 + ratio**2 * sizes
-            scale = np.sum(each**2) / np.sum(each)
-            return float(stats.chi2.sf(limit / scale, np.sum(each) / scale)) - POWER
-
-        most = 1.0
-        while missed(most) < 0:
-            most *= 2
-        return float(root.min() * optimize.brentq(missed, 0.0, most))
-
-    def _exceeds(self, fit: RandomEffects, level: float) -> float:
-        """Probability that noise alone leaves such squares."""
-        return tail(fit.squares(0.0) / fit.dof, fit.dof, self._other_dof(fit, level))
-
-    def _other_dof(self, fit: RandomEffects, level: float) -> float:
-        """Second degrees of freedom ν: squares of noise alone are f F(f, ν)."""
-        root = np.sqrt(self.variances)
-        smooth = fit.design @ fit.combination(0.0) * root / root[:, None]
-        left = np.eye(len(root)) - smooth
-        return dof_of_squares(np.diag(left), left**2, self.dof, level)
+NOTHING = 1e-12
+"""rad, difference that is rounding alone."""
+POSITIONS = 60
+"""Attitudes of the calibration that leaves out effects."""
+STEP = 1e-2
+"""Step of its derivatives, of the sigmas."""
+GOLDEN = (np.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Calibrations of one sensor in the order of time.
+    """Calibrations of one sensor in the order of time, and what they have in common.
+
+    Two of them are a comparison: what changed is told by all parameters together, with their whole
+    covariance matrices. Three or more have rates, and a scatter, of each parameter.
 
     Attributes
     ----------
     calibrations : tuple of n SensorCalibration
-    dates : tuple of n datetime
-    common : Common, the effects that all have
+    model : SensorModel, the effects that all have
+    values : (n, p) array, SI
+    covariances : (n, p, p) array
+    dates : tuple of n datetime; empty in a comparison
     """
 
     calibrations: tuple[SensorCalibration, ...]
-    dates: tuple[datetime, ...]
-    common: Common
+    model: SensorModel
+    values: Array
+    covariances: Array
+    dates: tuple[datetime, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters that all have."""
-        return self.common.model.parameters
+        return self.model.parameters
+
+    @property
+    def dof(self) -> Array:
+        """Degrees of freedom by which the noise was estimated, (n,); inf if it is known."""
+        return np.array([one.dof for one in self.calibrations])
+
+    @property
+    def sigmas(self) -> Array:
+        """Sigmas of `values`."""
+        return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
+
+    def left_out(self, one: SensorCalibration) -> list[str]:
+        """Effects of the sensor that a calibration has, and another one lacks."""
+        common = [effect.spec for effect in self.model.effects]
+        return [spec for spec in _effects(one) if spec not in common]
+
+    @cached_property
+    def change(self) -> Epochs:
+        """The last calibration less the first, for the test of congruence."""
+        first, *_, last = self.dof.tolist()
+        covariances = self.covariances[0], self.covariances[-1]
+        return Epochs(self.values[-1] - self.values[0], covariances, (first, last))
+
+    def instead_of(self, place: int) -> list[str]:
+        """Names of parameters that may have changed instead of one that did."""
+        return [self.model.parameter_names[i] for i in self.change.instead_of(place)]
+
+    def tilt(self, tilt_range: float) -> Array:
+        """Rms by which roll and pitch differ, and that which chance would give, (2, 2), rad.
+
+        Readings are those of the sensor as it was at first; they are leveled as if it had not
+        changed, and as it is at last.
+
+        Parameters
+        ----------
+        tilt_range : float, rad
+        """
+        last, first = self.calibrations[-1], self.values[0]
+        g, forces = last.gravity, cap_forces(tilt_range, ATTITUDES, last.gravity)
+        hold = session_like(last, -forces / g).hold
+        error = tilt_error(self.model, first, self.model, self.values[-1], forces, g, hold)
+        by_chance = np.einsum("auw,uw->a", error.quadratic, self.change.covariance)
+        return np.sqrt([np.where(error.constant > NOTHING**2, error.constant, 0.0), by_chance])
 
     @cached_property
     def years(self) -> Array:
@@ -203,21 +126,30 @@ class History:
     @cached_property
     def courses(self) -> tuple[Course, ...]:
         """Each parameter over time."""
-        variances = np.diagonal(self.common.covariances, axis1=1, axis2=2)
-        return tuple(
-            Course(self.years, values, variance, self.common.dof)
-            for values, variance in zip(self.common.values.T, variances.T, strict=True)
-        )
+        variances = np.diagonal(self.covariances, axis1=1, axis2=2)
+        each = zip(self.values.T, variances.T, strict=True)
+        return tuple(Course(self.years, *parameter, self.dof) for parameter in each)
 
     @property
     def level(self) -> float:
-        """Level of the tests of one parameter."""
+        """Level of the tests of one parameter over time."""
         return LEVEL / len(self.parameters)
 
     @cached_property
     def found(self) -> tuple[tuple[str, ...], ...]:
-        """What each parameter does, in words, at one level for all."""
+        """What each parameter does over time, in words, at one level for all."""
         return tuple(course.found(self.level) for course in self.courses)
+
+
+def compare(first: SensorCalibration, second: SensorCalibration) -> History:
+    """Compare two calibrations of one sensor, the older one first.
+
+    Raises
+    ------
+    InputError
+        As `history_of`.
+    """
+    return _in_common((first, second))
 
 
 def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[datetime]) -> History:
@@ -226,7 +158,9 @@ def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[dateti
     Raises
     ------
     InputError
-        If they are fewer than three, of one date, or cannot be compared; see `in_common`.
+        If they are fewer than three or of one date; if one of them has no sigmas, if they have no
+        effect in common, or if their parameters do not mean the same because the readings were
+        converted in another way. The line names the calibration by its number and its campaign.
     """
     if len(calibrations) < FEWEST:
         raise InputError(
@@ -235,9 +169,101 @@ def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[dateti
         )
     if len(set(dates)) < 2:
         raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
-    common = in_common(calibrations)
-    order = sorted(range(len(dates)), key=dates.__getitem__)
-    ordered = Common(
-        common.model, common.values[order], common.covariances[order], common.dof[order]
+    unordered, order = _in_common(calibrations), sorted(range(len(dates)), key=dates.__getitem__)
+    return History(
+        tuple(calibrations[i] for i in order),
+        unordered.model,
+        unordered.values[order],
+        unordered.covariances[order],
+        tuple(dates[i] for i in order),
     )
-    return History(tuple(calibrations[i] for i in order), tuple(dates[i] for i in order), ordered)
+
+
+def session_like(like: SensorCalibration, directions: Array) -> Campaign:
+    """Session in which gravity has some directions, under the conditions of a calibration."""
+    n, forces = len(directions), -like.gravity * directions
+    columns = {}
+    for k, (column, name) in enumerate(KNOWN.items(), start=1):
+        low, high = like.ranges.get(name, USUAL[column])
+        columns[column] = low + (high - low) * (GOLDEN * k * np.arange(n) % 1.0)
+    return Campaign(
+        "comparison",
+        np.arange(1, n + 1),
+        forces,
+        like.gravity,
+        sigma_force=Noise().sigma_force,
+        angles=angles_of(forces),
+        sigma_angle=Noise().sigma_angle,
+        yaw=np.zeros(n),
+        **columns,
+    )
+
+
+def _effects(calibration: SensorCalibration) -> list[str]:
+    """Effects of the sensor: the rig of a session stays behind."""
+    return [effect.spec for effect in calibration.model.effects if effect.part == "sensor"]
+
+
+def _in_common(calibrations: Sequence[SensorCalibration]) -> History:
+    """Bring calibrations of one sensor to the effects that all of them have."""
+    common = _effects(calibrations[0])
+    for number, one in enumerate(calibrations, start=1):
+        where = f"calibration {number} ({one.content['campaign']})"
+        if not np.isfinite(one.covariance).all():
+            raise InputError(
+                f"{where}: no sigmas; calibrate with more positions, or state the noise of the "
+                "campaign"
+            )
+        if one.content["nominal"] != calibrations[0].content["nominal"]:
+            raise InputError(
+                f"{where}: nominal: other scales or offsets from counts to m/s^2 than in the first "
+                "calibration, so their parameters do not mean the same; import both logs with the "
+                "same ones"
+            )
+        left = [spec for spec in common if spec in _effects(one)]
+        if not left:
+            raise InputError(
+                f"{where}: effects: none in common with those before: {comma_list(_effects(one))} "
+                f"here, {comma_list(common)} there"
+            )
+        common = left
+    model = compose(composition_name(compose("common", tuple(common)).effects), tuple(common))
+    fewest = sorted(calibrations, key=lambda one: len(_effects(one)))[:2]
+    values, covariances = zip(
+        *(_brought_to(one, model, fewest[one is fewest[0]]) for one in calibrations), strict=True
+    )
+    return History(tuple(calibrations), model, np.array(values), np.array(covariances))
+
+
+def _brought_to(
+    calibration: SensorCalibration, model: SensorModel, like: SensorCalibration
+) -> tuple[Array, Array]:
+    """Parameters (p,) and covariance matrix (p, p) of a model with fewer effects."""
+    own = calibration.model
+    part = compose("sensor", tuple(_effects(calibration)))
+    kept = [own.parameter_names.index(name) for name in part.parameter_names]
+    given, covariance = calibration.parameters[kept], calibration.covariance[np.ix_(kept, kept)]
+    if len(part.effects) == len(model.effects):
+        order = [part.parameter_names.index(name) for name in model.parameter_names]
+        return given[order], covariance[np.ix_(order, order)]
+    session = session_like(like, evenly_spread(POSITIONS))
+    approach = get_approach(str(like.content["approach"] or "gravity"))
+
+    def readings(parameters: Array) -> Array:
+        forces = -session.gravity * evenly_spread(POSITIONS)
+        return part.sense(forces, parameters, session.gravity, session.hold)
+
+    fit = fit_campaign(replace(session, forces=readings(given)), model, approach)
+    steps = STEP * np.sqrt(np.diag(covariance))
+    stepped = np.concatenate([given + np.diag(steps), given - np.diag(steps)])
+    angles = fit.observed.angles
+    observed = replace(
+        fit.observed,
+        forces=np.array([readings(parameters) for parameters in stepped]),
+        angles=None if angles is None else np.repeat(angles, len(stepped), axis=0),
+        initial=fit.parameters,
+    )
+    found = calibrate(model, approach, observed).parameters[:, : model.n_parameters]
+    above, below = np.split(found, 2)
+    slopes = ((above - below) / (2 * steps[:, None])).T
+    return fit.parameters, slopes @ covariance @ slopes.T

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from accelstudy.epochs.common import session_like
-from accelstudy.epochs.history import YEAR, History
+from accelstudy.epochs.history import YEAR, History, session_like
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 
 Array = NDArray[np.float64]
@@ -96,12 +95,12 @@ class Interval:
         weights : (u,) array, squared tilt error by a parameter that is wrong by 1
         """
         history, rng = self.history, np.random.default_rng(SEED)
-        common, last = history.common, history.calibrations[-1]
-        noise = [_normal(rng, c) for c in common.covariances]
+        last = history.calibrations[-1]
+        noise = [_normal(rng, c) for c in history.covariances]
         at_once, drift = _normal(rng, last.covariance), np.zeros(len(weights))
         per_year = np.zeros_like(at_once)
         names = last.model.parameter_names
-        places = [names.index(name) for name in common.model.parameter_names]
+        places = [names.index(name) for name in history.model.parameter_names]
         noise[-1] = at_once[:, places]
         for k, (place, course) in enumerate(zip(places, history.courses, strict=True)):
             scatter = course.line.scatter

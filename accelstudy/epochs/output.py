@@ -1,13 +1,15 @@
-"""What a comparison of two calibrations writes: JSON, a figure and a page."""
+"""What a comparison or a history of calibrations writes: JSON, a table, figures and a page."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -15,27 +17,182 @@ from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.drawing.saving import save_all
-from accelstudy.drawing.style import FULL, INK, group_colour, group_of, new_figure, symbol
+from accelstudy.drawing.style import COLUMN, FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.effects import Parameter
-from accelstudy.epochs.comparison import Comparison
 from accelstudy.epochs.congruence import LEVEL
+from accelstudy.epochs.history import YEAR, History
+from accelstudy.epochs.interval import LONGEST, SHOWN, Interval
+from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines, write_page
 
 STATES = {True: "unchanged", False: "changed"}
-"""States by whether the calibrations are congruent, as `pages.BADGES` has them."""
+"""States by whether the calibrations agree, as `pages.BADGES` has them."""
+COLUMNS = 3
+"""Panels side by side."""
+WRONG = "#C2247A"
+"""Colour of what must not be exceeded."""
+GRID = 50
+"""Points of a line."""
 
 
-def said(comparison: Comparison) -> list[str]:
+def comparison_said(history: History, tilt_range: float) -> list[str]:
     """Say whether the sensor changed, in what, and what it matters; the verdict comes first."""
-    c = comparison
-    worst = largest(c.parameters, c.epochs.detectable())
-    changes = [_change(c, place) for place in c.changed]
+    h, change = history, history.change
+    changes = [
+        _change_of(h.parameters[i], float(change.differences[i]), float(change.sigmas[i]))
+        for i in change.changed
+    ]
+    least = _largest(h.parameters, change.detectable())
+    tilts = h.tilt(tilt_range).tolist()
+    return lines("epochs/wording.txt.j2", "comparison", h, changes, least, tilts, tilt_range)
+
+
+def history_said(history: History, interval: Interval | None = None) -> list[str]:
+    """Say what drifts and what scatters; the verdict comes first."""
+    h, level = history, history.level
+    each = list(zip(h.courses, h.parameters, h.found, strict=True))
+    drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
+    rates = [_change_of(parameter, *course.rate) for course, parameter in drifting]
+    unsure = [
+        _change_of(parameter, *course.wandering_rate)
+        for course, parameter in drifting
+        if course.may_wander(level)
+    ]
+    scatters = [
+        f"{parameter.name} by {_size(course.line.scatter, parameter.unit)}"
+        for course, parameter, found in each
+        if "scatters" in found
+    ]
+    others = [parameter.name for _, parameter, found in each if "changed" in found]
+    least = [
+        _largest(h.parameters, [course.detectable_rate(level) for course in h.courses]),
+        _largest(h.parameters, [course.detectable_scatter(level) for course in h.courses]),
+    ]
     return lines(
-        "epochs/wording.txt.j2", "verdict", c, changes, *c.tilt.tolist(), c.tilt_range, worst
+        "epochs/wording.txt.j2", "history", h, rates, unsure, scatters, others, least, interval
     )
 
 
-def largest(
+def comparison_document(history: History, tilt_range: float) -> dict[str, Any]:
+    """Describe a comparison of two calibrations, in SI but for keys that name another unit.
+
+    Parameters
+    ----------
+    history : History
+    tilt_range : float, rad, over which tilts are compared
+    """
+    h, change = history, history.change
+    test, changed, (first, second) = change.test(), change.changed, h.calibrations
+    (roll, pitch), (roll_by_chance, pitch_by_chance) = h.tilt(tilt_range) / MGON
+    return {
+        "schema_version": 1,
+        "first": first.content["campaign"],
+        "second": second.content["campaign"],
+        "state": STATES[test.congruent],
+        "test": {
+            "statistic": test.statistic,
+            "dof": [test.dof[0], json_number(test.dof[1])],
+            "p_value": test.p_value,
+            "level": LEVEL,
+        },
+        "parameters": [
+            {
+                "name": parameter.name,
+                "first": float(h.values[0, i]),
+                "second": float(h.values[1, i]),
+                "change": float(change.differences[i]),
+                "sigma": float(change.sigmas[i]),
+                "detectable": float(detectable),
+                "unit": parameter.unit,
+                "changed": i in changed,
+                "or": h.instead_of(i) if i in changed else [],
+            }
+            for i, (parameter, detectable) in enumerate(
+                zip(h.parameters, change.detectable(), strict=True)
+            )
+        ],
+        "covariance": change.covariance.tolist(),
+        "only_first": h.left_out(first),
+        "only_second": h.left_out(second),
+        "tilt": {
+            "roll_mgon": roll,
+            "pitch_mgon": pitch,
+            "roll_by_chance_mgon": roll_by_chance,
+            "pitch_by_chance_mgon": pitch_by_chance,
+            "max_tilt_gon": tilt_range / GON,
+        },
+        "verdict": " ".join(comparison_said(h, tilt_range)),
+    }
+
+
+def history_document(history: History, interval: Interval | None = None) -> dict[str, Any]:
+    """Describe a history, in SI but for keys that name another unit; rates are per year."""
+    h = history
+    return {
+        "schema_version": 1,
+        "sensor": next((c.content["sensor"] for c in h.calibrations if c.content["sensor"]), None),
+        "calibrations": [
+            {
+                "campaign": one.content["campaign"],
+                "date": date.isoformat(),
+                "left_out": h.left_out(one),
+            }
+            for one, date in zip(h.calibrations, h.dates, strict=True)
+        ],
+        "effects": [effect.spec for effect in h.model.effects],
+        "state": STATES[not any(h.found)],
+        "level": LEVEL,
+        "parameters": [
+            {
+                "name": parameter.name,
+                "unit": parameter.unit,
+                "value": float(course.line.estimates[0]),
+                "sigma": float(np.sqrt(course.line.covariance[0, 0])),
+                "found": found,
+                "p_value": course.p_values(h.level)[0],
+                "rate": {
+                    "per_year": course.rate[0],
+                    "sigma": course.rate[1],
+                    "ci95": course.rate_interval,
+                    "ci95_wandering": course.wandering_interval,
+                    "p_value": course.p_values(h.level)[1],
+                    "detectable": course.detectable_rate(h.level),
+                },
+                "scatter": {
+                    "sd": course.line.scatter,
+                    "ci95": course.line.scatter_interval(),
+                    "p_value": course.p_values(h.level)[2],
+                    "detectable": course.detectable_scatter(h.level),
+                },
+            }
+            for course, parameter, found in zip(h.courses, h.parameters, h.found, strict=True)
+        ],
+        "interval": interval
+        and {
+            "years": interval.years,
+            "until": interval.until.date().isoformat(),
+            "accuracy_mgon": interval.accuracy / MGON,
+            "max_tilt_gon": interval.tilt_range / GON,
+            "confidence": interval.confidence,
+            "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN],
+        },
+        "verdict": " ".join(history_said(h, interval)),
+    }
+
+
+def _size(size: float, unit: str) -> str:
+    """Show a size to two digits."""
+    return f"{estimate(size, size, unit)[1]} {shown_unit(unit)}".strip()
+
+
+def _change_of(parameter: Parameter, value: float, sigma: float) -> str:
+    """Name a parameter with its change, or its rate, and the sigma of that; in SI."""
+    shown, uncertain = estimate(value, sigma, parameter.unit)
+    sign = "" if shown.startswith("−") else "+"
+    return f"{parameter.name} by {sign}{shown} ± {uncertain} {shown_unit(parameter.unit)}".strip()
+
+
+def _largest(
     parameters: Sequence[Parameter], sizes: Sequence[float] | NDArray[np.float64]
 ) -> list[str]:
     """Name the largest of the sizes in each unit, with its parameter."""
@@ -43,126 +200,150 @@ def largest(
     for parameter, size in zip(parameters, sizes, strict=True):
         before = found.get(parameter.unit, (0.0, ""))
         found[parameter.unit] = max(before, (float(size), parameter.name))
-    return [
-        f"{estimate(size, size, unit)[1]} {shown_unit(unit)} in {name}".replace("  ", " ")
-        for unit, (size, name) in found.items()
-    ]
+    return [f"{_size(size, unit)} in {name}" for unit, (size, name) in found.items()]
 
 
-def _change(c: Comparison, place: int) -> str:
-    """Name a parameter with its change."""
-    sigma = float(np.sqrt(c.epochs.covariance[place, place]))
-    return change_of(c.parameters[place], float(c.epochs.differences[place]), sigma)
-
-
-def change_of(parameter: Parameter, value: float, sigma: float) -> str:
-    """Name a parameter with its change, or its rate, and the sigma of that; in SI."""
-    shown, uncertain = estimate(value, sigma, parameter.unit)
-    sign = "" if shown.startswith("−") else "+"
-    return f"{parameter.name} by {sign}{shown} ± {uncertain} {shown_unit(parameter.unit)}".strip()
-
-
-def comparison_document(comparison: Comparison) -> dict[str, Any]:
-    """Describe a comparison, in SI but for keys that name another unit."""
-    c, sigma = comparison, np.sqrt(np.diag(comparison.epochs.covariance))
-    (roll, pitch), (roll_by_chance, pitch_by_chance) = c.tilt / MGON
-    return {
-        "schema_version": 1,
-        "first": c.first.content["campaign"],
-        "second": c.second.content["campaign"],
-        "state": STATES[c.test.congruent],
-        "test": {
-            "statistic": c.test.statistic,
-            "dof": [c.test.dof[0], json_number(c.test.dof[1])],
-            "p_value": c.test.p_value,
-            "level": LEVEL,
-        },
-        "parameters": [
+def history_table(history: History) -> pd.DataFrame:
+    """Return a row per calibration and parameter, in SI."""
+    h = history
+    return pd.DataFrame(
+        [
             {
-                "name": parameter.name,
-                "first": float(c.values[0, i]),
-                "second": float(c.values[1, i]),
-                "change": float(c.epochs.differences[i]),
-                "sigma": float(sigma[i]),
-                "detectable": float(detectable),
+                "calibration": i + 1,
+                "campaign": one.content["campaign"],
+                "date": date.isoformat(),
+                "parameter": parameter.name,
+                "value": float(h.values[i, k]),
+                "sigma": float(h.sigmas[i, k]),
                 "unit": parameter.unit,
-                "changed": i in c.changed,
-                "or": c.instead_of(i) if i in c.changed else [],
             }
-            for i, (parameter, detectable) in enumerate(
-                zip(c.parameters, c.epochs.detectable(), strict=True)
-            )
-        ],
-        "covariance": c.epochs.covariance.tolist(),
-        "only_first": c.only_in(c.first),
-        "only_second": c.only_in(c.second),
-        "tilt": {
-            "roll_mgon": roll,
-            "pitch_mgon": pitch,
-            "roll_by_chance_mgon": roll_by_chance,
-            "pitch_by_chance_mgon": pitch_by_chance,
-            "max_tilt_gon": c.tilt_range / GON,
-        },
-        "verdict": " ".join(said(c)),
-    }
+            for i, (one, date) in enumerate(zip(h.calibrations, h.dates, strict=True))
+            for k, parameter in enumerate(h.parameters)
+        ]
+    )
 
 
-def write_comparison(comparison: Comparison, folder: str | Path) -> dict[str, Any]:
-    """Write comparison.json, report.html and the figure into a folder; returns the content."""
-    folder, content = Path(folder), comparison_document(comparison)
-    figures = {"changes": lambda: changes_figure(comparison)}
-    drawn = save_all(figures, folder / "figures")
-    sentences = said(comparison)
+def write_comparison(history: History, tilt_range: float, folder: Path) -> None:
+    """Write comparison.json, report.html and the figure into a folder."""
+    content, said = comparison_document(history, tilt_range), comparison_said(history, tilt_range)
+    drawn = save_all({"changes": lambda: parameters_figure(history)}, folder / "figures")
+    _write_page(history, folder, content, said, drawn)
+    write_json(folder / "comparison.json", content)
+
+
+def write_history(history: History, interval: Interval | None, folder: Path) -> None:
+    """Write history.json, history.parquet, report.html and the figures into a folder."""
+    content, said = history_document(history, interval), history_said(history, interval)
+    figures = {"history": lambda: parameters_figure(history)}
+    if interval is not None:
+        figures["interval"] = lambda: interval_figure(interval)
+    _write_page(history, folder, content, said, save_all(figures, folder / "figures"))
+    write_frame(folder / "history.parquet", history_table(history))
+    write_json(folder / "history.json", content)
+
+
+def _write_page(
+    history: History,
+    folder: Path,
+    content: dict[str, Any],
+    said: Sequence[str],
+    figures: Mapping[str, str],
+) -> None:
     write_page(
         folder / "report.html",
         "epochs/report.html.j2",
-        " ".join(sentences),
+        content["verdict"],
         doc=content,
-        c=comparison,
-        lines=sentences,
-        figures=drawn,
+        h=history,
+        lines=said,
+        figures=figures,
     )
-    write_json(folder / "comparison.json", content)
-    return content
 
 
-def draw_changes(ax: Axes, comparison: Comparison) -> None:
+def draw_changes(ax: Axes, history: History) -> None:
     """Draw the change of each parameter over its sigma, with the interval that holds 95 %."""
-    c = comparison
-    change = c.epochs.differences / np.sqrt(np.diag(c.epochs.covariance))
+    change = history.change
     ax.axhline(0, color=INK, linewidth=0.8)
-    for i, parameter in enumerate(c.parameters):
+    for i, parameter in enumerate(history.parameters):
         colour = group_colour(group_of(parameter.name))
-        filled = colour if i in c.changed else "white"
-        ax.errorbar(i, change[i], 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
-    ax.set_xticks(range(len(c.parameters)), [symbol(p.name) for p in c.parameters])
+        filled = colour if i in change.changed else "white"
+        size = change.differences[i] / change.sigmas[i]
+        ax.errorbar(i, size, 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
+    ax.set_xticks(range(len(history.parameters)), [symbol(p.name) for p in history.parameters])
     ax.set(ylabel="change / sigma")
 
 
-def changes_figure(comparison: Comparison) -> Figure:
-    """Draw the change of each parameter with its 95 % interval, an effect a panel."""
-    c = comparison
-    sigma = np.sqrt(np.diag(c.epochs.covariance))
-    sizes = [len(effect.parameters) for effect in c.model.effects]
-    figure = new_figure(FULL, 62)
-    panels = figure.subplots(
-        1, len(sizes), width_ratios=[size + 1 for size in sizes], squeeze=False
+def parameters_figure(history: History) -> Figure:
+    """Draw each parameter in all calibrations with 95 % intervals; over time, with its line."""
+    h, names = history, history.parameters
+    rows = -(-len(names) // COLUMNS)
+    figure = new_figure(FULL, 12 + 36 * rows)
+    panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+    at = np.array(h.dates, dtype="datetime64[us]") if h.dates else np.arange(2)
+    found = (
+        h.found if h.dates else [("changed",) * (k in h.change.changed) for k in range(len(names))]
     )
-    ends = np.cumsum([0, *sizes])
-    for ax, effect, first, last in zip(panels[0], c.model.effects, ends, ends[1:], strict=False):
-        each = range(first, last)
-        unit = effect.parameters[0].unit
-        names = [c.parameters[i].name for i in each]
-        change = to_display(c.epochs.differences[first:last], unit)
-        half = 1.96 * to_display(sigma[first:last], unit)
-        colour = group_colour(group_of(names[0]))
-        ax.axhline(0, color=INK, linewidth=0.8)
-        ax.errorbar(range(len(names)), change, half, fmt="none", color=colour, capsize=2.5)
-        for k, i in enumerate(each):
-            filled = colour if i in c.changed else "white"
-            ax.plot(k, change[k], "o", color=colour, markerfacecolor=filled)
-        ax.set_xticks(range(len(names)), [symbol(name) for name in names])
-        ax.set(ylabel=f"change / {shown_unit(unit)}", xlim=(-0.6, len(names) - 0.4))
-        ax.set_title(effect.name.replace("_", " "))
-    figure.suptitle("Change with its 95 % interval; full: changed")
+    for k, (ax, parameter) in enumerate(zip(panels, names, strict=False)):
+        unit = parameter.unit
+        values, halves = (to_display(v[:, k], unit) for v in (h.values, 1.96 * h.sigmas))
+        ax.errorbar(at, values, halves, fmt="o", color=INK, capsize=2, linewidth=0.8, ms=3)
+        if h.dates:
+            _draw_line(ax, h, k)
+        else:
+            ax.set_xticks(at, ["first", "second"])
+            ax.set_xlim(-0.5, 1.5)
+        ax.set_title(symbol(parameter.name) + (f" ({' and '.join(found[k])})" if found[k] else ""))
+        ax.set_ylabel(shown_unit(unit))
+        ax.tick_params(axis="x", labelbottom=k + COLUMNS >= len(names))
+    for ax in panels[len(names) :]:
+        ax.set_visible(False)
+    lines_too = " and lines" if h.dates else ""
+    dotted = "; dotted: no drift found" if h.dates else ""
+    figure.suptitle(f"Calibrations{lines_too} with 95 % intervals{dotted}")
+    return figure
+
+
+def _draw_line(ax: Axes, history: History, k: int) -> None:
+    """Draw the line of a parameter over time, with the band that holds 95 %."""
+    parameter, course = history.parameters[k], history.courses[k]
+    colour, unit = group_colour(group_of(parameter.name)), parameter.unit
+    years = np.linspace(history.years[0], 0.0, GRID)
+    design = np.column_stack([np.ones(GRID), years])
+    last = np.datetime64(history.dates[-1], "us")
+    between = last + (years * YEAR * 1e6).astype("timedelta64[us]")
+    line = to_display(design @ course.line.estimates, unit)
+    variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
+    half = to_display(course.sigmas_95 * np.sqrt(variance), unit)
+    seen = ax.get_ylim()
+    ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
+    ax.plot(between, line, "-" if "drifts" in history.found[k] else ":", color=colour)
+    # The band of a few calibrations would dwarf them.
+    ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
+    locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
+    formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+    ax.xaxis.set(major_locator=locator, major_formatter=formatter)
+
+
+def interval_figure(interval: Interval) -> Figure:
+    """Draw the tilt error that is not exceeded, over the time since the last calibration."""
+    figure = new_figure(COLUMN, 55)
+    ax = figure.subplots()
+    last = min(LONGEST, max(1.0, 1.5 * interval.years))
+    years = np.linspace(0.0, last, GRID)
+    error = to_display([interval.error(t) for t in years], "rad")
+    ax.plot(years, error, color=INK)
+    ax.axhline(float(error[0]), color=INK, linewidth=0.8, linestyle=":")
+    ax.annotate("a new calibration", (last, float(error[0])), (0, 2), textcoords="offset points",
+                ha="right", fontsize=7)  # fmt: skip
+    accuracy = float(to_display(interval.accuracy, "rad"))
+    ax.axhline(accuracy, color=WRONG, linewidth=0.8)
+    ax.annotate("accuracy", (0, accuracy), (2, 2), textcoords="offset points", fontsize=7,
+                color=WRONG)  # fmt: skip
+    ax.set(
+        xlabel="years since the last calibration",
+        ylabel=f"tilt error / {shown_unit('rad')}",
+        xlim=(0, last),
+        ylim=(0, 1.1 * max(float(error.max()), accuracy)),
+    )
+    ax.set_title(f"Not exceeded with {100 * interval.confidence:g} %")
     return figure

@@ -61,10 +61,10 @@ def compare(
     """
     from accelstudy.api.calibrations import as_calibration
     from accelstudy.api.epochs import Comparison
-    from accelstudy.epochs.comparison import compare as compared
+    from accelstudy.epochs.history import compare as compared
 
     pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
-    return Comparison(compared(*pair, in_si(tilt_range)))
+    return Comparison(compared(*pair), in_si(tilt_range))
 
 
 @verb

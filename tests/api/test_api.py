@@ -85,7 +85,7 @@ def test_calibrations_are_compared_and_followed_as_they_are_returned(guide):
     as_returned, as_read = (acs.compare(each, other).result for each in (one, read))
     assert as_returned.model.name == "bias-scale"
     np.testing.assert_array_equal(as_returned.values, as_read.values)
-    assert as_returned.test == as_read.test
+    assert as_returned.change.test() == as_read.change.test()
     dates = [datetime(2025, month, 1, tzinfo=UTC) for month in (1, 4, 7)]
     assert len(history_of([each.sensor for each in (one, other, read)], dates).calibrations) == 3
     with pytest.raises(acs.InputError, match="second: expected what `calibrate` or"):

@@ -9,9 +9,10 @@ from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, document, write_document
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.document import json_text
-from accelstudy.epochs.comparison import compare
+from accelstudy.epochs.history import compare
 from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.leveling.error import cap_forces
 
@@ -31,10 +32,10 @@ def test_a_robot_and_gravity_have_the_same_sensor_in_common():
     for c in (compare(by_gravity, by_robot), compare(by_robot, by_gravity)):
         assert c.model.name == NINE
         np.testing.assert_allclose(*c.values, atol=1e-8)
-        assert c.only_in(by_robot) == ["cross_axis_misalignment"]
-        assert c.only_in(by_gravity) == []
+        assert c.left_out(by_robot) == ["cross_axis_misalignment"]
+        assert c.left_out(by_gravity) == []
         # Their tilts are relative to the sensor's own axes: a rotation is no change.
-        assert c.tilt[0].max() < 1e-8
+        assert c.tilt(50 * GON)[0].max() < 1e-8
 
 
 def test_what_is_brought_to_a_smaller_model_scatters_as_is_said():
@@ -46,7 +47,7 @@ def test_what_is_brought_to_a_smaller_model_scatters_as_is_said():
                        temperature_order="random")  # fmt: skip
     each = [compare(first, calibrated(seed, effects=effects, **robot)) for seed in range(2, 14)]
     values = np.array([c.values[1] for c in each])
-    roots = [np.linalg.cholesky(c.epochs.covariances[1]) for c in each]
+    roots = [np.linalg.cholesky(c.covariances[1]) for c in each]
     apart = [
         np.linalg.solve(r, d) for r, d in zip(roots, values - values.mean(axis=0), strict=True)
     ]
@@ -58,11 +59,11 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
     first = calibrated(1)
     second = calibrated(2, effects=("bias: 0.1, 0.07, -0.1", *SENSOR[1:]))
     c = compare(first, second)
-    forces = cap_forces(c.tilt_range, 5000, second.gravity)
+    forces = cap_forces(50 * GON, 5000, second.gravity)
     readings = first.model.sense(forces, first.parameters)
     apart = wrapped(angles_of(second.correct(readings)) - angles_of(forces))
-    np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
-    assert [c.parameters[i].name for i in c.changed] == ["b_y"]
+    np.testing.assert_allclose(c.tilt(50 * GON)[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
+    assert [c.parameters[i].name for i in c.change.changed] == ["b_y"]
 
 
 def test_what_cannot_be_compared_is_said():

@@ -114,7 +114,7 @@ def test_the_parameter_that_changed_is_named_and_no_other():
     n = 200
     for true, said in ((none, ()), (one, (4,)), (two, (0, 4))):
         right = [
-            Epochs(d, q, (np.inf, np.inf)).changed() == said
+            Epochs(d, q, (np.inf, np.inf)).changed == said
             for d in true + differences(rng, sum(q), n)
         ]
         assert np.mean(right) >= 1 - LEVEL - tolerance(LEVEL, n)
@@ -125,5 +125,5 @@ def test_parameters_that_cannot_be_told_apart_are_named_together():
     correlation[0, 1] = correlation[1, 0] = -0.999
     covariance = correlation / 2
     epochs = Epochs(np.array([0.2, 0.0, 0.3]), (covariance, covariance), (np.inf, np.inf))
-    (found,) = epochs.changed()
-    assert epochs.instead_of(found, (found,)) == (1 - found,)
+    (found,) = epochs.changed
+    assert epochs.instead_of(found) == (1 - found,)

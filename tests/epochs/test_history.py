@@ -19,7 +19,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL, POWER
-from accelstudy.epochs.history import Course
+from accelstudy.epochs.course import Course
 from accelstudy.files.parquet import read_frame
 from accelstudy.sensors.models import get_model
 

@@ -31,10 +31,8 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.of_type import TypeFile, TypicalParameter
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.epochs.comparison import compare
-from accelstudy.epochs.history import history_of
-from accelstudy.epochs.history_output import history_document, history_table
-from accelstudy.epochs.output import comparison_document
+from accelstudy.epochs.history import compare, history_of
+from accelstudy.epochs.output import comparison_document, history_document, history_table
 from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
 from accelstudy.lots.lot import Lot
 from accelstudy.lots.mixture import Anything
@@ -77,7 +75,7 @@ def test_each_key_of_a_calibration_is_described(pages):
     history = history_of([one] * 3, [datetime(2025, month, 1) for month in (1, 2, 3)])
     written = {
         "calibration.json": set(_keys(document)),
-        "comparison.json": set(_keys(comparison_document(compare(one, one)))),
+        "comparison.json": set(_keys(comparison_document(compare(one, one), 1.0))),
         "history.json": set(_keys(history_document(history))),
         "history.parquet": set(history_table(history)),
         "lot.json": {*_keys(_lot()), "files"},
