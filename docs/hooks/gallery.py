@@ -1,21 +1,17 @@
 """The gallery: a study's figures from what each says of itself, and all figures small."""
 
-import io
 import re
 from pathlib import Path
 
 from markdown.extensions.toc import slugify
 from markdown_text import page, plain
-from PIL import Image
 
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names, get_figure
 
 ROOT = Path(__file__).parents[2]
 PAPER = "config/config.yaml"
-SMALL = (300, 220)
-"""Largest width and height of a small copy, twice as many pixels as a screen takes for it."""
-SHOWN = re.compile(r"^##+ (.+)\n\n!\[.*?\]\(\.\./(figures/(.+?)\.png)\)", re.MULTILINE)
+SHOWN = re.compile(r"^##+ (.+)\n\n!\[.*?\]\((\.\./figures/.+?\.png)\)", re.MULTILINE)
 
 
 def studies():
@@ -66,22 +62,8 @@ def overview():
     parts = []
     for heading, name, text in _pages():
         links = [
-            f"[![](../small/{small}.png){{ loading=lazy }} {title}]({name}#{slugify(title, '-')})"
-            for title, _, small in SHOWN.findall(text)
+            f"[![]({path}){{ loading=lazy }} {title}]({name}#{slugify(title, '-')})"
+            for title, path in SHOWN.findall(text)
         ]
         parts += [f"## {heading}", '<div class="small-figures" markdown>', *links, "</div>"]
     return page(*parts)
-
-
-def thumbnails():
-    """Small copies of the figures of the gallery, as the bytes of PNG files by their paths."""
-    found = {}
-    for _, _, text in _pages():
-        for _, path, small in SHOWN.findall(text):
-            buffer = io.BytesIO()
-            with Image.open(ROOT / "docs" / path) as image:
-                copy = image.convert("RGB")
-                copy.thumbnail(SMALL)
-                copy.quantize(64).save(buffer, "PNG")
-            found[f"small/{small}.png"] = buffer.getvalue()
-    return found

@@ -7,9 +7,9 @@ import architecture
 import catalogue
 import command_pages
 import configuration_page
+import drawings
 import file_formats
 import gallery
-from drawings import DRAWINGS
 from markdown_text import table
 from mkdocs.structure.files import File
 
@@ -53,11 +53,9 @@ PLACE = re.compile(rf"^<!-- ({'|'.join(PARTS)}) -->$", re.MULTILINE)
 
 
 def on_files(files, config):
-    """Add the drawings, and small copies of the figures."""
-    for path, make in DRAWINGS.items():
-        files.append(File.generated(config, path, content=make()))
-    for path, content in gallery.thumbnails().items():
-        files.append(File.generated(config, path, content=content))
+    """Add the drawing of a session."""
+    drawn = drawings.svg(drawings.session)
+    files.append(File.generated(config, "drawings/session.svg", content=drawn))
     return files
 
 
