@@ -234,8 +234,8 @@ def test_stored_designs_have_their_efficiency_and_bound(family):
         value = float(criterion.value(task.normal(directions)))
         efficiency = min(1.0, criterion.efficiency(value, one["bound"]))
         assert one["efficiency"] == pytest.approx(efficiency, abs=2e-5)
-    for n in (10, 20):
-        found = optimal_design(task, criterion, n, starts=3, bounded=False)
+    for n in (10, 16):
+        found = optimal_design(task, criterion, n, starts=1, bounded=False)
         known = float(criterion.value(task.normal(stored[n]["directions"])))
         assert found.value > known - SEARCHED
 
@@ -293,12 +293,12 @@ def test_constraints_are_kept_and_cost_efficiency(constraints, free):
 
 
 def test_few_mountings_turn_about_few_axes():
-    task, space = BY_ROBOT, Mountings(2)
-    assert len(space.axes) == 9
+    task, space = BY_ROBOT, Mountings(2, ((1, 0, 0), (0, 1, 0), (0, 1, 1), (1, -1, 0)))
+    assert len(Mountings(2).axes) == 9
     found = optimal_design(task, get_criterion("I", task), 10, space, starts=1)
     axes = np.array(space.axes) / np.linalg.norm(space.axes, axis=1, keepdims=True)
     horizontal = np.abs(found.directions @ axes.T) < 1e-8
-    assert any(np.all(horizontal[:, i] | horizontal[:, j]) for i in range(9) for j in range(i))
+    assert any(np.all(horizontal[:, i] | horizontal[:, j]) for i in range(4) for j in range(i))
     assert found.efficiency > 0.98
 
 

@@ -105,57 +105,6 @@ def test_config_yaml_has_every_top_level_key():
     assert set(yaml.safe_load(CONFIG.read_text())) == set(Study.model_fields)
 
 
-def undocumented(text):
-    """Numbers of the lines with keys that no comment explains.
-
-    A key is explained by a comment in its line or in the line above it, by the comment of the
-    sibling in the line above (a group), by that of its parent, or if all its own keys are.
-    """
-    lines = text.splitlines()
-
-    def indent(line):
-        return len(line) - len(line.lstrip(" -"))
-
-    explained = set()
-    missing = []
-    for i, line in enumerate(lines):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        above = lines[i - 1] if i else ""
-        below = lines[i + 1] if i + 1 < len(lines) else ""
-        if (
-            " #" in line
-            or above.lstrip().startswith("#")
-            or (above.strip() and indent(above) <= indent(line) and i - 1 in explained)
-            or (above.strip() and indent(above) > indent(line) and group(lines, i, explained))
-            or (below.lstrip().startswith("#") and indent(below) > indent(line))
-        ):
-            explained.add(i)
-        else:
-            missing.append(i + 1)
-    return missing
-
-
-def group(lines, i, explained):
-    """Whether the sibling before line i, above its nested keys, is explained by its parent."""
-    own = len(lines[i]) - len(lines[i].lstrip(" -"))
-    for j in range(i - 1, -1, -1):
-        if not lines[j].strip() or lines[j].lstrip().startswith("#"):
-            return False
-        if len(lines[j]) - len(lines[j].lstrip(" -")) <= own:
-            return j in explained
-    return False
-
-
-def test_every_key_of_config_yaml_is_commented():
-    text = CONFIG.read_text()
-    assert undocumented(text) == []
-    # The check notices when a top-level key loses its comment.
-    for key in ("study", "seed", "gravity_mps2", "sensor", "models", "paper"):
-        bare = f"\n\n{key}:" + text.split(f"\n{key}:", 1)[1]
-        assert undocumented(bare)[0] == 3
-
-
 # --- bad input: what any file may have, tests/basics have -----------------------------------------
 
 NOISE = {"effects": ["heavy_tails( nu=5 )"]}
