@@ -18,7 +18,8 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.document import affine_form, in_gauge
+from accelstudy.campaign.calibration.applying import affine_form
+from accelstudy.campaign.calibration.document import in_gauge
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file

@@ -109,6 +109,11 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
         part.write_text(page, encoding="utf-8")
 
 
+def text(template: str, **content: Any) -> str:
+    """Render a file of plain text."""
+    return _environment(False).get_template(template).render(content) + "\n"
+
+
 def lines(template: str, part: str, *content: Any, **named: Any) -> list[str]:
     """Say something in plain text, one sentence or row a line.
 

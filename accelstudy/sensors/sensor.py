@@ -11,9 +11,10 @@ needs no inverse of its own, and has f_b = T f_a in closed form.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,17 +184,31 @@ class SensorModel:
         hold: HoldConditions | None = None,
     ) -> NDArray[np.float64]:
         """Specific force in the sensitive axes, f_a, for a sensor output; else as `correct`."""
-        f_s = np.asarray(f_s, dtype=float)
-        batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
-        f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
-        step = np.zeros_like(f_a)
+        step, f_a = np.zeros_like(f_s, dtype=float), np.asarray(f_s, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            for _ in range(25):
-                step = self._apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
-                f_a = f_a + step
+            for f_a, step in islice(self.newton(f_s, parameters, g, hold), 25):  # noqa: B007
                 if not np.any(np.abs(step) > 1e-14 * STANDARD_GRAVITY):
                     break
         return np.where(np.abs(step) <= 1e-12 * STANDARD_GRAVITY, f_a, np.nan)
+
+    def newton(
+        self,
+        f_s: ArrayLike,
+        parameters: ArrayLike,
+        g: ArrayLike = STANDARD_GRAVITY,
+        hold: HoldConditions | None = None,
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Yield f_a and the step to it, one step of Newton's method after the other, without end.
+
+        Parameters as in `correct`.
+        """
+        f_s = np.asarray(f_s, dtype=float)
+        batch = np.broadcast_shapes(f_s.shape[:-2], np.shape(parameters)[:-1])
+        f_a = np.broadcast_to(f_s, batch + f_s.shape[-2:])
+        while True:
+            step = self._apply(self.trace.newton_step, f_a, parameters, g, hold, f_s)
+            f_a = f_a + step
+            yield f_a, step
 
     def slope_of_last(
         self, f_a: NDArray[np.float64], parameters: ArrayLike, hold: HoldConditions | None

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
+from accelstudy.campaign.calibration.applying import affine_form
 from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import GAUGES, affine_form, in_gauge
+from accelstudy.campaign.calibration.document import GAUGES, in_gauge
 from accelstudy.campaign.calibration.export import device_matrix, export
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.sigma_check import check_sigmas

@@ -5,7 +5,6 @@ import json
 import re
 import shutil
 import subprocess
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from calling import refusal, succeed
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
-from accelstudy.campaign.calibration.c_code import HEAD, SOLVE, c_header
+from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export, losses
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -31,8 +30,9 @@ BEFORE = ("hysteresis", "settling")
 EFFECTS = [
     name for name in effect_names() if get_effect(name).part == "sensor" and name not in BEFORE
 ]
-PAIRS = [*combinations(EFFECTS, 2), tuple(EFFECTS)]
-"""Effects two by two, and all at once."""
+LAST = "saturation"
+PAIRS = [*((name, LAST) for name in EFFECTS if name != LAST), tuple(EFFECTS)]
+"""Each effect before one that acts last, and all at once."""
 ALONE = [
     *((name,) for name in EFFECTS),
     ("thermal_bias(tau=300)",),
@@ -105,22 +105,20 @@ class Library:
     def __init__(self, headers, folder, double):
         self.real = ctypes.c_double if double else ctypes.c_float
         self.columns = {}
-        texts = [HEAD, SOLVE]
+        texts = []
         for name, header in headers.items():
-            body = header[header.index(HEAD) + len(HEAD) :].removesuffix("#endif\n")
-            body = body.replace(SOLVE, "")
-            texts.append(re.sub(r"\baccel_(?!real|solve)(\w+)", rf"{name}_\1", body))
-            signature = re.search(rf"{name}_calibrate\(([^)]*)\)", texts[-1])[1]
+            header = header.replace("ACCEL_CALIBRATION_H", f"{name}_H")
+            texts.append(re.sub(r"\baccel_(\w+)", rf"{name}_\1", header))
+            signature = re.search(rf"{name}_calibrate\(([^)]*)\)", texts[-1].split("*/", 1)[1])[1]
             names = [argument.split()[-1] for argument in signature.split(",")[1:-1]]
             self.columns[name] = names
             given = "".join(f", known[{k} * n + i]" for k in range(len(names)))
             texts.append(
-                f"void run_{name}(int n, const accel_real *reading, const accel_real *known,"
-                " accel_real *out)\n{\n    int i;\n    (void)known;\n"
+                f"void run_{name}(int n, const {name}_real *reading, const {name}_real *known,"
+                f" {name}_real *out)\n{{\n    int i;\n    (void)known;\n"
                 f"    for (i = 0; i < n; i++)\n        {name}_calibrate(reading + 3 * i{given},"
                 " out + 3 * i);\n}"
             )
-        texts.append("#endif\n")
         source, library = folder / "all.c", folder / "all.so"
         source.write_text("\n".join(texts), encoding="utf-8")
         warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]

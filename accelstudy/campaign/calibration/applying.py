@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json, readable
@@ -30,7 +31,7 @@ from accelstudy.files.validation import (
 )
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sensors.sensor import SensorModel, not_affine
 
 Array = NDArray[np.float64]
 
@@ -336,6 +337,31 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibrati
         log=document.log,
         ranges=document.ranges,
     )
+
+
+def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
+    """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
+
+    Effects of the rig are left out: they are no part of the sensor.
+
+    Parameters
+    ----------
+    model : SensorModel
+    parameters : (u,) array, SI
+    """
+    if not_affine(model):
+        return None
+    specs = [effect.spec for effect in model.effects if effect.part == "sensor"]
+    parameters = np.asarray(parameters, dtype=float)[..., model.stays]
+    model = compose(model.name, tuple(specs))
+    g = STANDARD_GRAVITY
+    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    corrected = model.correct(probes, parameters)
+    if not np.isfinite(corrected).all():
+        return None
+    matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
+    constant = corrected[0]
+    return matrix, -np.linalg.solve(matrix, constant)
 
 
 def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:

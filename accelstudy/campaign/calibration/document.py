@@ -10,16 +10,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
-from accelstudy.campaign.calibration.applying import FORCES
+from accelstudy.basics.units import MGON, recorded_unit, to_recorded
+from accelstudy.campaign.calibration.applying import FORCES, affine_form
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
-from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel, not_affine
 
 Array = NDArray[np.float64]
 Gauge = Literal["upper", "lower", "symmetric"]
@@ -189,31 +187,6 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     suspects = {s.position for s in assessment.suspects}
     table["suspect"] = [i in suspects for i in range(len(table))]
     return table
-
-
-def affine_form(model: SensorModel, parameters: ArrayLike) -> tuple[Array, Array] | None:
-    """K (3, 3) and b (3,) of f_b = K (f_s − b), or None if the model is not affine.
-
-    Effects of the rig are left out: they are no part of the sensor.
-
-    Parameters
-    ----------
-    model : SensorModel
-    parameters : (u,) array, SI
-    """
-    if not_affine(model):
-        return None
-    specs = [effect.spec for effect in model.effects if effect.part == "sensor"]
-    parameters = np.asarray(parameters, dtype=float)[..., model.stays]
-    model = compose(model.name, tuple(specs))
-    g = STANDARD_GRAVITY
-    probes = g * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    corrected = model.correct(probes, parameters)
-    if not np.isfinite(corrected).all():
-        return None
-    matrix = ((corrected[1:4] - corrected[4:7]) / (2 * g)).T
-    constant = corrected[0]
-    return matrix, -np.linalg.solve(matrix, constant)
 
 
 def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:

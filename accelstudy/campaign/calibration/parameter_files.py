@@ -15,16 +15,17 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.basics.wording import comma_list, number
 from accelstudy.campaign.calibration.applying import SensorCalibration
-from accelstudy.campaign.calibration.c_code import provenance
 from accelstudy.campaign.calibration.device import KNOWN, in_use, must_be_known
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
+from accelstudy.pages import lines
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.conversion import Conversion
 from accelstudy.sensors.frames import Frame
@@ -84,7 +85,9 @@ class PX4:
     @property
     def text(self) -> str:
         """The file."""
-        head = [*provenance(self.calibration), *self.lost, *self._remarks()]
+        source = "campaign/calibration/provenance.txt.j2", "provenance"
+        known = lines(*source, self.calibration, __version__)
+        head = [*known, *self.lost, *self._remarks()]
         return "".join(f"{line}\n" for line in (*(f"# {line}" for line in head), *self._lines()))
 
     def _remarks(self) -> Iterable[str]:
