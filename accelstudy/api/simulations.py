@@ -225,7 +225,7 @@ class Simulation(Result):
 def simulated(
     names: Mapping[str, Sequence[str]],
     sigma: Sequence[float],
-    robot_accuracy: float,
+    robot_sigma: float,
     gravity: float,
     truth: Mapping[str, float | str] | None,
     replicates: int,
@@ -249,7 +249,7 @@ def simulated(
             "gravity_mps2": tidy(gravity),
             "noise": {
                 "sensor": {"sigma_mps2": tidy(sigma[0])},
-                "robot": {"sigma_mgon": tidy(robot_accuracy / MGON)},
+                "robot": {"sigma_mgon": tidy(robot_sigma / MGON)},
             },
             "grids": [grid],
         },

@@ -66,7 +66,7 @@ class CampaignSettings:
     noise_effects, gross_errors : tuple of str
     sigma : float, m/s², of a position mean
     sigma_known : bool, whether the campaign states it
-    sigma_angle : float, rad, of the robot's roll and pitch
+    robot_sigma : float, rad, of the robot's roll and pitch
     gravity : float, m/s²
     interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
@@ -86,7 +86,7 @@ class CampaignSettings:
     gross_errors: tuple[str, ...] = ()
     sigma: float = 0.002
     sigma_known: bool = True
-    sigma_angle: float = 3.2 * MGON
+    robot_sigma: float = 3.2 * MGON
     gravity: float = STANDARD_GRAVITY
     interval: float | None = 60.0
     temperature: tuple[float, float] | None = None
@@ -101,7 +101,7 @@ class CampaignSettings:
         for key, allowed in _RANGES.items():
             if (value := getattr(self, key)) is not None:
                 allowed.check_key(key, value)
-        bounds.SIGMA_ANGLE.check_key("sigma_angle", self.sigma_angle / MGON)
+        bounds.SIGMA_ANGLE.check_key("robot_sigma", self.robot_sigma / MGON)
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
 
@@ -160,7 +160,7 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
             )
     parameters = np.concatenate([v for _, v in present])
     ideal = session(model, parameters, directions, settings.gravity, hold)
-    noise = Noise(settings.sigma, settings.sigma_angle, effects=settings.noise_effects)
+    noise = Noise(settings.sigma, settings.robot_sigma, effects=settings.noise_effects)
     drawn = ideal.draw(noise, 1, rng["noise"])
     robot = get_approach(settings.approach).uses_angles
     campaign = Campaign(
@@ -170,7 +170,7 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
         gravity=settings.gravity,
         sigma_force=settings.sigma if settings.sigma_known else None,
         angles=drawn.angles[0] if robot and drawn.angles is not None else None,
-        sigma_angle=settings.sigma_angle if robot else None,
+        sigma_angle=settings.robot_sigma if robot else None,
         time=hold.time,
         temperature=hold.temperature,
         vibration=hold.vibration,

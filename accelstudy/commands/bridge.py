@@ -89,7 +89,7 @@ def command(
         if writes is not None:
             yield from (place, _FORCE) if optional else (_FORCE,)
         yield from (one for one, wanted in ((_ANGLE_UNIT, angles), (_QUIET, quiet)) if wanted)
-        yield from (_retired(*item) for item in (retired or {}).items())
+        yield from (_retired(*item) for item in {**_renamed(verb), **(retired or {})}.items())
         # It stands in the help of all commands together.
         yield click.Option(["--plugin"], hidden=True, **PLUGIN)
 
@@ -322,6 +322,14 @@ def _option(keyword: Keyword, verb: Verb) -> click.Option:
         show_default=default is not False and default not in (None, ()),
         help=_spelled(kinds.meanings(verb)[keyword.name], verb).replace(" [default", "  [default"),
     )
+
+
+def _renamed(verb: Verb) -> dict[str, str]:
+    """Options of earlier versions whose keywords have another name, with what to do instead."""
+    names = {one.name for one in kinds.keywords(verb)}
+    renamed = [each for each in kinds.RENAMED.items() if each[1] in names]
+    spelled = ([f"--{name.replace('_', '-')}" for name in each] for each in renamed)
+    return {old: f"{new} takes it" for old, new in spelled}
 
 
 def _retired(name: str, instead: str) -> click.Option:

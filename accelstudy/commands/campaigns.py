@@ -139,14 +139,14 @@ SIMULATE_CAMPAIGN = command(
     sections={
         "What is written": "out truth name seed",
         "The sensor": "model effects size noise_effects gross_errors",
-        "Its noise": "sigma sigma_known sigma_angle n_samples",
+        "Its noise": "sigma sigma_known robot_sigma n_samples",
         "The holds": "scheme repeats repeat_first order approach yaw gravity",
         "Their conditions": "interval temperature temperature_order vibration",
     },
     retired={
         "--gross": "--gross-error takes it",
         "--sigma-unknown!": "--no-sigma-known says it",
-        "--robot-sigma-mgon": "--sigma-angle takes it with its unit, as 5mgon",
+        "--robot-sigma-mgon": "--robot-sigma takes it with its unit, as 5mgon",
         "--samples-per-hold": "--n-samples takes it",
         "--no-time!": "--interval none says it",
         "--hold": "campaigns have no slopes within holds",

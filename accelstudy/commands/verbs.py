@@ -92,6 +92,6 @@ PLAN = command(
             "tilt_accuracy tilt_range sensor sigma history equipment reference confidence"
         ),
         "What is tried": "holds schemes max_time max_positions replicates seed",
-        "What the equipment takes": "moving_time robot_moving_time robot_setup_time robot_accuracy",
+        "What the equipment takes": "moving_time robot_moving_time robot_setup_time robot_sigma",
     },
 )

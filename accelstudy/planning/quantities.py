@@ -20,5 +20,5 @@ QUANTITIES = {
     "moving_time": Given("s", "20s", most=3600.0),
     "robot_moving_time": Given("s", "10s", most=3600.0),
     "robot_setup_time": Given("s", "30min", most=DAY),
-    "robot_accuracy": Given("rad", "3.2mgon", 1e-6 * MGON, 10 * GON),
+    "robot_sigma": Given("rad", "3.2mgon", 1e-6 * MGON, 10 * GON),
 }

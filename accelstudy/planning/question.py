@@ -117,7 +117,7 @@ class Question:
     equipment: tuple[Equipment, ...] = (BY_HAND, ROBOT)
     confidence: float | None = None
     holds: tuple[float, ...] = ()
-    sigma_angle: float = QUANTITIES["robot_accuracy"].value
+    sigma_angle: float = QUANTITIES["robot_sigma"].value
     most_seconds: float = math.inf
     most_positions: int = 200
     schemes: tuple[str, ...] = ()

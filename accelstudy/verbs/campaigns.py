@@ -216,7 +216,7 @@ def simulate_campaign(
     gross_errors: GrossErrorName | Sequence[GrossErrorName] = (),
     sigma: Annotated[Quantity, si("m/s^2", *SIGMA)] = "2mm/s^2",
     sigma_known: bool = True,
-    sigma_angle: Annotated[Quantity, Given("rad", "", 0, 100 * GON)] = "3.2mgon",
+    robot_sigma: Annotated[Quantity, Given("rad", "", 0, 100 * GON)] = "3.2mgon",
     gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
     interval: Annotated[Quantity | None, si("s", *INTERVAL)] = "60s",
     temperature: Annotated[
@@ -259,7 +259,7 @@ def simulate_campaign(
         Sd of a position's mean.
     sigma_known : bool
         Whether the campaign states its noise.
-    sigma_angle : float in rad, or str with a unit
+    robot_sigma : float in rad, or str with a unit
         Sd of the robot's roll and pitch.
     gravity : float in m/s², or str with a unit
         Local gravity.

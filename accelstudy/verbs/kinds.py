@@ -149,6 +149,8 @@ class Pairs:
 
 Quantity = float | str
 """A number in SI, or a text with a unit."""
+RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
+"""Keywords of earlier versions, and what takes their place."""
 
 
 def si(unit: str, least: float, most: float) -> Given:
@@ -398,6 +400,8 @@ def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returne
 
     @wraps(function)
     def within(*args: Arguments.args, **given: Arguments.kwargs) -> Returned:
+        for old in given.keys() & RENAMED.keys():
+            raise InputError(f"{old}: no longer a keyword; {RENAMED[old]} takes it")
         return function(*args, **check(function, given))
 
     within.__doc__ = _documented(function)

@@ -75,7 +75,7 @@ def plan(
     moving_time: Annotated[Quantity, QUANTITIES["moving_time"]] = "20s",
     robot_moving_time: Annotated[Quantity, QUANTITIES["robot_moving_time"]] = "10s",
     robot_setup_time: Annotated[Quantity, QUANTITIES["robot_setup_time"]] = "30min",
-    robot_accuracy: Annotated[Quantity, QUANTITIES["robot_accuracy"]] = "3.2mgon",
+    robot_sigma: Annotated[Quantity, QUANTITIES["robot_sigma"]] = "3.2mgon",
 ) -> Plan:
     """Find the cheapest calibration for a tilt accuracy.
 
@@ -120,8 +120,8 @@ def plan(
         Time from position to position with the robot.
     robot_setup_time : float in s, or str with a unit
         Time to mount the sensor on the robot.
-    robot_accuracy : float in rad, or str with a unit
-        Standard deviation of the robot's roll and pitch.
+    robot_sigma : float in rad, or str with a unit
+        Sd of the robot's roll and pitch.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def plan(
         {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
         None if confidence is None else float(confidence),
         tuple(sorted({in_si(hold) for hold in each(holds)})),
-        in_si(robot_accuracy),
+        in_si(robot_sigma),
         math.inf if max_time is None else in_si(max_time),
         max_positions,
         tuple(each(schemes)),
@@ -331,7 +331,7 @@ def simulate(
     approach: str | Sequence[str],
     *,
     sigma: Sigma | Sequence[Sigma],
-    robot_accuracy: Annotated[Quantity, QUANTITIES["robot_accuracy"]] = "3.2mgon",
+    robot_sigma: Annotated[Quantity, QUANTITIES["robot_sigma"]] = "3.2mgon",
     gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
     truth: Annotated[Mapping[str, float | str] | None, Pairs("b_x=0.05,s_y=200ppm")] = None,
     replicates: Annotated[int, Range(2, bounds.REPLICATES.most)] = 1000,
@@ -347,8 +347,8 @@ def simulate(
         A name or a file.
     sigma : float in m/s², or str with a unit, or several
         Noise of the mean of a position.
-    robot_accuracy : float in rad, or str with a unit
-        Standard deviation of the robot's roll and pitch.
+    robot_sigma : float in rad, or str with a unit
+        Sd of the robot's roll and pitch.
     gravity : float in m/s², or str with a unit
         Local gravity.
     truth : mapping of str to float, or str with a unit
@@ -366,7 +366,7 @@ def simulate(
 
     given = {"model": model, "scheme": scheme, "approach": approach}
     chosen = {name: names(name, value) for name, value in given.items()}
-    noise: dict[str, Any] = {"sigma": sigma, "robot_accuracy": robot_accuracy}  # in SI by `verb`
+    noise: dict[str, Any] = {"sigma": sigma, "robot_sigma": robot_sigma}  # in SI by `verb`
     return simulated(
         chosen, **noise, gravity=in_si(gravity), truth=truth, replicates=replicates, seed=seed
     )

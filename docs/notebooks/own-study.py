@@ -20,7 +20,7 @@ result = acs.simulate(
     [f"fibonacci-{n}" for n in numbers],
     ["gravity", "robot"],
     sigma="2 mm/s^2",
-    robot_accuracy="3.2 mgon",
+    robot_sigma="3.2 mgon",
     truth={"b_x": 0.05, "s_y": "200 ppm", "alpha_zx": "44 mgon"},
     replicates=1000,
 )

@@ -85,6 +85,20 @@ def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() ->
     assert [*keywords] == [each.name for each in fields(CampaignSettings)]
 
 
+@pytest.mark.parametrize(("verb", "old"), [
+    ("simulate-campaign", "sigma_angle"), ("plan", "robot_accuracy"),
+    ("simulate", "robot_accuracy"),
+])  # fmt: skip
+def test_the_noise_of_the_robot_has_one_name(verb: str, old: str) -> None:
+    assert "robot_sigma" in inspect.signature(function(verb)).parameters
+    with pytest.raises(accelstudy.InputError, match=f"^{old}: no longer a keyword; robot_sigma "):
+        function(verb)(**{old: "3mgon"})
+    if verb in VERBS:
+        option = f"--{old.replace('_', '-')}"
+        line = refusal(verb, option, "3mgon", "--out", "none")
+        assert line == f"error: {option}: no longer an option; --robot-sigma takes it\n"
+
+
 def test_a_message_calls_a_keyword_as_its_user_does() -> None:
     said = "give `time_unit`; `apply` takes the same"
     assert str(accelstudy.InputError(said)) == said

@@ -253,7 +253,7 @@ HOSTILE = [
 OPTIONS = [
     *("--name", "--seed", "--scheme", "--repeats", "--repeat-first", "--order", "--approach"),
     *("--model", "--effect", "--size", "--noise-effect", "--gross-error", "--sigma", "--interval"),
-    *("--sigma-angle", "--temperature", "--vibration", "--yaw", "--n-samples"),
+    *("--robot-sigma", "--temperature", "--vibration", "--yaw", "--n-samples"),
 ]
 
 

@@ -178,7 +178,7 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
         "--effect", "warm_up(tau=300)",
         "--noise-effect", "heavy_tails(nu=3)", "--gross-error", "unit_error(force=0.1)",
         "--temperature", "20:40", "--temperature-order", "ABBA", "--vibration", "0:1",
-        "--yaw", "random", "--n-samples", 50, "--no-sigma-known", "--sigma-angle", "5mgon",
+        "--yaw", "random", "--n-samples", 50, "--no-sigma-known", "--robot-sigma", "5mgon",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in folder.iterdir()) == ["campaign.yaml", "positions.csv"]
@@ -186,7 +186,7 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     expected, truth = simulate(
         name="one", seed=7, effects=("warm_up(tau=300)",), noise_effects=("heavy_tails(nu=3)",),
         gross_errors=("unit_error(force=0.1)",), temperature=(20, 40), temperature_order="ABBA",
-        vibration=(0, 1), yaw="random", n_samples=50, sigma_known=False, sigma_angle=5 * MGON,
+        vibration=(0, 1), yaw="random", n_samples=50, sigma_known=False, robot_sigma=5 * MGON,
     )  # fmt: skip
     np.testing.assert_allclose(campaign.forces, expected.forces, rtol=1e-14)
     np.testing.assert_allclose(campaign.yaw, expected.yaw, rtol=1e-13)
@@ -214,6 +214,7 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     (["--yaw", "some"], "unknown yaw 'some'"),
     (["--n-samples", "1"], "--n-samples: must be from 2 to 1000000000, not 1"),
     (["--gross", "row_order"], "--gross: no longer an option; --gross-error takes it"),
+    (["--sigma-angle", "3mgon"], "--sigma-angle: no longer an option; --robot-sigma takes it"),
     (["--no-time"], "--no-time: no longer an option; --interval none says it"),
     (["--hold", "30"], "--hold: no longer an option; campaigns have no slopes within holds"),
     (["--scheme", "mclaren-25"], "unknown scheme"),
