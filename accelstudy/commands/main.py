@@ -11,62 +11,27 @@ import click
 
 from accelstudy.basics.errors import OPTIONS, InputError
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.commands import campaigns, choices, studies, verbs
 from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN
-from accelstudy.commands.campaigns import (
-    ADVISE,
-    APPLY,
-    DATA_SHEET,
-    DESIGN,
-    IMPORT,
-    PUBLIC,
-    SIMULATE_CAMPAIGN,
-)
-from accelstudy.commands.choices import EFFECTS, MODELS, SCHEME, SCHEMES
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
-from accelstudy.commands.studies import CELLS, CLAIMS, CONFIG_SCHEMA, INIT
-from accelstudy.commands.verbs import (
-    CALIBRATE,
-    CHECK_SIGMAS,
-    COMPARE,
-    DIAGNOSE,
-    EXPORT,
-    HISTORY,
-    LOT,
-    PLAN,
-)
 
-SECTIONS: dict[str, tuple[click.Command, ...]] = {
+_COMMANDS = {
+    one.name: one
+    for module in (campaigns, choices, studies, verbs)
+    for one in vars(module).values()
+    if isinstance(one, click.Command)
+}
+_SECTIONS = {
     "Campaigns, measured or simulated": (
-        IMPORT,
-        PUBLIC,
-        SIMULATE_CAMPAIGN,
-        ADVISE,
-        CALIBRATE,
-        DIAGNOSE,
-        LOT,
-        CHECK_SIGMAS,
-        APPLY,
-        EXPORT,
-        COMPARE,
-        HISTORY,
+        "import public simulate-campaign advise calibrate diagnose lot check-sigmas apply export "
+        "compare history"
     ),
-    "Before a calibration, and what it is worth": (
-        PLAN,
-        DATA_SHEET,
-    ),
-    "What there is to choose from": (
-        MODELS,
-        EFFECTS,
-        SCHEMES,
-        SCHEME,
-        DESIGN,
-    ),
-    "Studies": (
-        INIT,
-        CELLS,
-        CLAIMS,
-        CONFIG_SCHEMA,
-    ),
+    "Before a calibration, and what it is worth": "plan data-sheet",
+    "What there is to choose from": "models effects schemes scheme design",
+    "Studies": "init cells claims config-schema",
+}
+SECTIONS = {
+    title: [_COMMANDS[name] for name in names.split()] for title, names in _SECTIONS.items()
 }
 """Commands in the order of use."""
 RETIRED = {
@@ -119,7 +84,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
 
 
-@click.group(cls=Commands, commands=[each for commands in SECTIONS.values() for each in commands])
+@click.group(cls=Commands, commands=[*_COMMANDS.values()])
 @click.version_option(package_name="accelstudy")
 @click.option(
     "--angle-unit",
