@@ -6,13 +6,15 @@ import re
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.given import path_of
+from accelstudy.api.given import drawing, path_of
+from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import LONGEST
+from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import (
     angle_note,
     attitude_unit,
@@ -22,13 +24,16 @@ from accelstudy.basics.units import (
 )
 from accelstudy.basics.wording import amount
 from accelstudy.design.spaces import attitudes
+from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
-from accelstudy.pages.notebook import notebook_html
 from accelstudy.proposal.proposal import REFERENCE, Proposal, write_design
 from accelstudy.schemes import get_scheme, is_scheme_file
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-class Design:
+
+class Design(Result):
     """The best positions for a calibration, in the order in which to take them.
 
     Attributes
@@ -38,6 +43,28 @@ class Design:
 
     def __init__(self, proposal: Proposal) -> None:
         self.proposal = proposal
+
+    @property
+    def name(self) -> str:
+        """How many positions it has."""
+        return f"{len(self.proposal.directions)} positions"
+
+    @property
+    def state(self) -> str:
+        """Found: where no positions determine the model, there is no design."""
+        return "found"
+
+    @property
+    def verdict(self) -> str:
+        """What the positions are expected to leave, in a sentence."""
+        return f"These {self.name} leave {_both(self.proposal.rms)} (expected rms of leveling)."
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """State, verdict, how the positions were found, and the positions."""
+        positions = self.to_frame().to_dict("records")
+        made = {"design": dict(self.proposal.made()), "positions": positions}
+        return {"state": self.state, "verdict": self.verdict, **made}
 
     @property
     def inputs(self) -> list[str]:
@@ -67,9 +94,27 @@ class Design:
             rows[column] = ["" if x != x else form.format(x) for x in rows[column]]
         return rows.to_string(index=False)
 
-    def summary(self) -> str:
+    def _table(self) -> str:
         """Return the positions and what they bring as text."""
         return "\n".join([self.table(), *self.lines()])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw roll and pitch of the positions, with their numbers."""
+        rows = self.to_frame()
+        number, roll, pitch = rows.columns[:3]
+        with drawing(ax, FULL, 80) as ax:
+            ax.plot(rows[roll], rows[pitch], "o")
+            for _, row in rows.iterrows():
+                ax.annotate(f" {row[number]}", (row[roll], row[pitch]))
+            ax.set(xlabel=roll.replace("/", " / "), ylabel=pitch.replace("/", " / "))
+        return ax
+
+    def tell(self, place: Path) -> None:
+        """Print the positions and what they bring."""
+        show(self.table())
+        for line in self.lines():
+            say(line)
+        say(f"scheme: {place}")
 
     def lines(self) -> Iterable[str]:
         """What the design brings, in sentences."""
@@ -118,21 +163,15 @@ class Design:
         with new_file(out, self.inputs, force) as file:
             self.write(file, out)
 
-    def write(self, file: Path, out: Path) -> None:
-        """Write a file that becomes `out`, by which the scheme is named."""
+    def write(self, file: Path, place: Path) -> None:
+        """Write a file that becomes `place`, by which the scheme is named."""
         proposal = self.proposal
         extra = {"turn_about": proposal.axes} if proposal.axes else None
-        name = re.sub(r"[^\w.-]+", "-", out.stem).lstrip(".-")[: LONGEST // 2] or "scheme"
+        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: LONGEST // 2] or "scheme"
         kind = proposal.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {proposal.request.seed}"
         write_design(file, name, title, source, proposal.directions, proposal.made(), extra)
-
-    def __repr__(self) -> str:
-        return f"Design({len(self.proposal.directions)} positions)"
-
-    def _repr_html_(self) -> str:
-        return notebook_html("Design", " ".join(self.lines()), self.to_frame())
 
 
 def scheme_file(path: Any) -> Path:

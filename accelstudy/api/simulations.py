@@ -18,6 +18,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, Given, display_unit, to_display
 from accelstudy.basics.wording import counted
+from accelstudy.campaign.calibration.document import write_json
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import SIMULATION
 from accelstudy.files.tables import write_table
@@ -107,7 +108,8 @@ class Simulation(Result):
         return ax
 
     def write(self, folder: Path, place: Path) -> None:
-        """Write the tables of a study."""
+        """Write simulation.json and the tables of a study."""
+        write_json(folder / "simulation.json", self.content)
         for name, table in self.tables.items():
             provenance = {"config_hash": None, "seed": self._seed}
             write_table(folder / f"{name}.parquet", table, provenance)

@@ -306,10 +306,7 @@ def run_design(out: Path, force: bool, **given: Any) -> None:
     with new_file(scheme_file(out), read, force) as path:
         design = planning.find_positions(**given)
         design.write(path, out)
-    click.echo(design.table())
-    for line in design.lines():
-        say(line)
-    say(f"scheme: {out}")
+    design.tell(out)
 
 
 DESIGN = command(

@@ -91,10 +91,11 @@ STUDY = Kind(
 )
 SIMULATION = Kind(
     "simulation",
-    "cells.parquet",
-    ("summary.parquet", "correlations.parquet", "leveling.parquet", "quantiles.parquet"),
-)
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, PLAN, COMPARISON, HISTORY, LOT)
+    "simulation.json",
+    tuple(f"{table}.parquet" for table in
+          ("cells", "summary", "correlations", "leveling", "quantiles")),
+)  # fmt: skip
+_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, PLAN, COMPARISON, HISTORY, LOT, SIMULATION)
 
 
 @contextmanager

@@ -120,6 +120,8 @@ def test_a_function_gives_what_its_command_writes(tmp_path):
     )
     (tmp_path / "function").mkdir()
     found.save(tmp_path / "function/mine.yaml")
+    assert found.verdict in found.summary()
+    assert found.plot(Figure().subplots()).has_data()
     written = (tmp_path / name for name in ("mine.yaml", "function/mine.yaml"))
     assert len({path.read_bytes() for path in written}) == 1
 
@@ -340,6 +342,15 @@ def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     assert [*result.to_frame()] == [*result.tilt]
     assert result.plot(Figure().subplots()).has_data()
     result.save(tmp_path / "simulated")
-    written = {path.stem: read_table(path) for path in (tmp_path / "simulated").iterdir()}
+    written = {path.stem: read_table(path) for path in (tmp_path / "simulated").glob("*.parquet")}
     assert set(written) == set(result.tables)
     pd.testing.assert_frame_equal(written["summary"], result.tables["summary"])
+    said = json.loads((tmp_path / "simulated/simulation.json").read_text(encoding="utf-8"))
+    assert (said["state"], said["verdict"]) == (result.state, result.verdict)
+    result.save(tmp_path / "simulated")  # the same again takes no `force`
+    with pytest.raises(acs.InputError, match="is the folder of a simulation"):
+        acs.calibrate(acs.simulate_campaign()).save(tmp_path / "simulated", force=True)
+    # The tables of a study have the same names, and are no simulation to write over.
+    (tmp_path / "simulated/simulation.json").unlink()
+    with pytest.raises(acs.InputError, match="is not empty"):
+        result.save(tmp_path / "simulated")
