@@ -6,13 +6,11 @@
 import inspect
 import json
 import re
-import sys
 from datetime import datetime
 from importlib import import_module
 
 import griffe
 import numpy as np
-import pytest
 from places import ROOT
 from study_helpers import grid, make_study, run_study
 
@@ -45,28 +43,32 @@ SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
 
 
-@pytest.fixture(scope="module")
-def pages():
-    sys.path.insert(0, str(ROOT / "docs/hooks"))
-    try:
-        import file_formats
-    finally:
-        sys.path.pop(0)
-    return file_formats
+def described(page):
+    """Keys or columns of each file of which a page of the reference has a table."""
+    files = {}
+    text = (ROOT / f"docs/reference/{page}.md").read_text(encoding="utf-8")
+    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+        names = re.findall(r"^\| `([^`]+)` \|", section, re.MULTILINE)
+        if first := re.search("first columns are those of `(.+)` up to `(.+)`", section):
+            shared = files[first[1]]
+            names = [*shared[: shared.index(first[2]) + 1], *names]
+        files[re.search("`([^`]+)`", section)[1]] = names
+    return files
 
 
-def test_each_column_of_a_study_is_described(tmp_path, pages):
-    described = {name: list(columns) for name, (_, columns) in pages.study_tables().items()}
+def test_each_column_of_a_study_is_described(tmp_path):
+    said = described("tables")
     keys = {"grids": [grid(replicates=20)], "sensitivity": SENSITIVITY}
     written = run_study(tmp_path, **keys)
     study, summary = make_study(**keys), written["summary"]
     written["sensitivity"] = sensitivity_table(study, summary)
     written["shapley"] = shapley_table(study, summary, written["correlations"])
     for name, table in written.items():
-        assert described[name] == list(table), name
+        file = "estimates/*.parquet" if name == "estimates" else f"{name}.parquet"
+        assert said[file] == list(table), name
 
 
-def test_each_key_of_a_calibration_is_described(pages):
+def test_each_key_of_a_calibration_is_described():
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-12"))
     fit = fit_campaign(campaign, get_model("bias-scale"), get_approach("robot"))
     assessment = assess(fit)
@@ -87,12 +89,12 @@ def test_each_key_of_a_calibration_is_described(pages):
         "campaigns.parquet": set(CAMPAIGN_COLUMNS),
         "parameters.parquet": set(PARAMETER_COLUMNS),
     }
-    described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
-    assert {name: described[name] for name in written} == written
-    assert described.keys() - written == {"calibration.h", "calibration.params"}
+    said = {name: set(columns) for name, columns in described("file-formats").items() if columns}
+    assert {name: said[name] for name in written} == written
+    assert said.keys() - written == {"calibration.h", "calibration.params"}
 
 
-def test_each_name_of_an_exported_calibration_is_described(pages):
+def test_each_name_of_an_exported_calibration_is_described():
     settings = CampaignSettings(scheme="fibonacci-24", temperature=(10, 40), vibration=(0, 1))
     effects = ("thermal_bias(tau=60)", "thermal_curve", "vibration_rectification", "warm_up")
     model = get_model(f"bias-scale+{'+'.join(effects)}")
@@ -105,9 +107,9 @@ def test_each_name_of_an_exported_calibration_is_described(pages):
     names = {word.removesuffix("_60") for word in words}
     lines = [line.split("\t") for line in export(document, "px4").splitlines() if line[0] != "#"]
     first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
-    described = {name: set(columns) for name, (_, columns) in pages.calibration_files().items()}
-    assert described["calibration.h"] == names
-    assert described["calibration.params"] == first
+    said = described("file-formats")
+    assert set(said["calibration.h"]) == names
+    assert set(said["calibration.params"]) == first
 
 
 def _lot():
