@@ -218,7 +218,7 @@ class Calibration(Result):
 
     def export(self, form: str = "json") -> str:
         """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
-        return forms.export(self.sensor.content, form)
+        return forms.export(self.sensor, form)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters, as `parameters`."""

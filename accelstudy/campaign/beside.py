@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
-from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.holds import DetectedHolds, hold_noise
@@ -141,7 +140,7 @@ class Beside:
         content, read = self.calibration.content, self.log.samples
         full_range = content.get("range_mps2") or np.inf
         time = read.time + self._shift(log)
-        samples = read._replace(time=time, forces=read.forces @ mending(content).T)
+        samples = read._replace(time=time, forces=read.forces @ self.calibration.mending.T)
         segments, lost = {}, {}
         for n, hold in holds.segments.items():
             inside = slice(*np.searchsorted(time, [hold.t0, hold.t1 + holds.step / 2]).tolist())

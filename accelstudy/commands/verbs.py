@@ -37,7 +37,7 @@ def run_export(calibration: Path, form: str) -> None:
     text = calibrations.export(read, form=form)
     if mended := read.content.get("mended"):
         warn(f"the calibration is of mended data: {mended['reason']}")
-    for loss in losses(read.content, form):
+    for loss in losses(read.sensor, form):
         warn(loss)
     click.echo(text, nl=False)
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.applying import affine_form
+from accelstudy.campaign.calibration.applying import SensorCalibration, affine_form
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import GAUGES, in_gauge
 from accelstudy.campaign.calibration.export import device_matrix, export
@@ -89,19 +89,15 @@ def test_a_nonlinear_model_has_no_matrix():
 
 
 def calibration_in(unit, nominal=None):
-    k, bias = affine_form(NINE, NINE.vector({"b_x": 0.1, "s_x": 0.01, "alpha_yz": 0.02}))
-    return {
-        "campaign": "test",
-        "model": NINE.name,
-        "effects": [effect.spec for effect in NINE.effects],
-        "unit": unit,
-        "nominal": nominal,
-        "gravity_mps2": 9.81,
-        "parameters": [
-            {"name": p.name, "value": 0.0, "sigma": 1.0, "unit": p.unit} for p in NINE.parameters
+    p = NINE.vector({"b_x": 0.1, "s_x": 0.01, "alpha_yz": 0.02})
+    content = {
+        "campaign": "test", "model": NINE.name, "effects": [e.spec for e in NINE.effects],
+        "unit": unit, "nominal": nominal, "parameters": [
+            {"name": q.name, "value": value, "sigma": 1.0, "unit": q.unit}
+            for q, value in zip(NINE.parameters, p.tolist(), strict=True)
         ],
-        "affine": {"matrix": k.tolist(), "bias_mps2": bias.tolist()},
-    }
+    }  # fmt: skip
+    return SensorCalibration(NINE, p, np.eye(9), 9.81, content)
 
 
 @pytest.mark.parametrize(("unit", "nominal"), [
@@ -118,7 +114,7 @@ def test_the_device_matrix_takes_raw_readings(unit, nominal):
         forces = (raw - nominal["offset"]) * nominal["scale"]
     else:
         forces = raw * (9.80665 if unit == "g" else 1)
-    k, bias = (np.array(calibration["affine"][key]) for key in ("matrix", "bias_mps2"))
+    k, bias = affine_form(NINE, calibration.parameters)
     applied = np.column_stack([raw, np.ones(10)]) @ matrix.T
     np.testing.assert_allclose(applied, (forces - bias) @ k.T, rtol=0, atol=1e-9)
     plain = np.array([row.split() for row in export(calibration, "matrix").splitlines()], float)

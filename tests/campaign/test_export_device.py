@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,10 +18,10 @@ from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export, losses
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import HoldConditions, effect_names, get_effect
-from accelstudy.sensors.conversion import conversion_of
-from accelstudy.sensors.frames import FRD, parse_frame
+from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import compose, get_model
 
 G = 9.81
@@ -48,7 +49,7 @@ ALONE = [
 CONTENT = {
     "campaign": "made", "sensor": "a */ b", "model": "m", "approach": "gravity",
     "n_positions": 24, "quality": {"state": "accepted"}, "mended": None,
-    "sigma_reading_mps2": 0.01,
+    "sigma_reading_mps2": 0.01, "unit": "m/s^2", "nominal": None,
 }  # fmt: skip
 
 
@@ -137,10 +138,6 @@ class Library:
         return out.astype(float)
 
 
-def header_of(calibration, unit="m/s^2"):
-    return c_header(calibration, conversion_of(unit), FRD, np.eye(3), unit)
-
-
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc)")
 
 
@@ -156,7 +153,7 @@ def compiled(request, of_effects, tmp_path_factory):
     """Library of the effects; with their pairs in the precision of a device alone."""
     folder, double = tmp_path_factory.mktemp(request.param), request.param == "double"
     some = of_effects[0] if double else of_effects[0] | of_effects[1]
-    headers = {name: header_of(each) for name, each in some.items()}
+    headers = {name: c_header(each) for name, each in some.items()}
     return request.param, Library(headers, folder, double)
 
 
@@ -200,7 +197,7 @@ def test_c_of_each_pair_gives_the_force_that_made_the_reading(compiled, of_effec
 @needs_cc
 def test_c_follows_a_lag_as_its_head_says(tmp_path):
     calibration = calibration_with(("thermal_bias(tau=300)",))
-    library = Library({"lag": header_of(calibration)}, tmp_path, double=True)
+    library = Library({"lag": c_header(calibration)}, tmp_path, double=True)
     time = np.arange(0.0, 1000.0)
     temperature = 20 + 15 * (time / 1000)
     lagged, factor = [temperature[0]], 1 - np.exp(-1 / 300)
@@ -218,7 +215,7 @@ def test_c_follows_a_lag_as_its_head_says(tmp_path):
 def test_c_has_no_force_where_apply_has_none(tmp_path):
     """Hard clipping: nothing is known of what lies beyond the knee."""
     calibration = calibration_with(("saturation(knee=9)",), values=[1.0, 1.0, 1.0])
-    library = Library({"clips": header_of(calibration)}, tmp_path, double=False)
+    library = Library({"clips": c_header(calibration)}, tmp_path, double=False)
     readings = np.array([[0.0, 0.0, -8.0], [0.0, 9.5, 0.0]])
     force = library("clips", readings, {})
     np.testing.assert_allclose(force[0], [0, 0, -8], atol=1e-5)
@@ -232,17 +229,20 @@ def test_c_takes_counts_in_the_axes_of_the_log(frame, tmp_path):
     """A large offset costs no digits: the first thing that is done is to take it away."""
     calibration = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
     turn, axes = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), parse_frame(frame)
-    raw = conversion_of("counts", [0.002, 0.0021, 0.0019], [33000.3, 33100.4, 32900.2])
-    header = c_header(calibration, raw, axes, turn, "counts")
+    scale, offset = [0.002, 0.0021, 0.0019], [33000.3, 33100.4, 32900.2]
+    layout = LogLayout(unit="counts", scale=scale, offset=offset, frame=frame)
+    mended = {**CONTENT, "mended": {"matrix": turn.tolist(), "reason": "x is y"}}
+    header = c_header(replace(calibration, log=layout, content=mended))
     library = Library({"log": header}, tmp_path, double=False)
     forces, hold = attitudes(30), HoldConditions()
-    counts = raw.from_si(axes.from_frd(readings_of(calibration, forces, hold) @ turn))
+    sensed = axes.from_frd(readings_of(calibration, forces, hold) @ turn)
+    counts = sensed / scale + offset
     force = library("log", counts, {})
     np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
 
 
 def test_a_header_says_what_it_takes_and_where_it_is_from():
-    header = header_of(calibration_with(tuple(EFFECTS)))
+    header = c_header(calibration_with(tuple(EFFECTS)))
     comment = " ".join(header[: header.index("*/")].replace("\n *", " ").split())
     for words in (
         "temperature: degC", "time: s since the start", "vibration: m/s^2, rms", "g = 9.81 m/s^2",
@@ -251,7 +251,7 @@ def test_a_header_says_what_it_takes_and_where_it_is_from():
     ):  # fmt: skip
         assert words in comment
     assert "malloc" not in header
-    for_one = header_of(calibration_with(("bias", "scale")))
+    for_one = c_header(calibration_with(("bias", "scale")))
     assert "Newton" not in for_one
     assert "accel_solve" not in for_one
     assert "accel_calibrate(const accel_real reading[3], accel_real force[3])" in for_one
@@ -390,7 +390,9 @@ def test_matrix_has_what_imu_calib_takes(frame, calibrated):
     """SM · reading − bias, with the first three columns and minus the last one."""
     log = {"unit": "counts", "scale": [0.02, 0.021, 0.019], "offset": [5, 1, -4], "frame": frame}
     content = json.loads(calibrated("bias-scale-nonorthogonality").read_text()) | {"log": log}
-    matrix = np.array([row.split() for row in export(content, "matrix").splitlines()], dtype=float)
+    matrix = np.array(
+        [row.split() for row in export(calibration_of(content), "matrix").splitlines()], dtype=float
+    )
     sm, bias = matrix[:, :3], -matrix[:, 3]
     axes, forces = parse_frame(frame), attitudes(30)
     sensed = axes.from_frd(readings_of(calibration_of(content), forces, HoldConditions()))
@@ -402,12 +404,12 @@ def test_px4_takes_no_counts(calibrated):
     log = {"unit": "counts", "scale": [0.02] * 3, "offset": [0] * 3, "frame": "frd"}
     content = json.loads(calibrated("bias-scale-nonorthogonality").read_text()) | {"log": log}
     with pytest.raises(InputError, match="PX4 takes readings in m/s\\^2"):
-        export(content, "px4")
+        export(calibration_of(content), "px4")
 
 
 def test_px4_has_no_lag(calibrated):
     content = json.loads(
         calibrated("bias-scale+thermal_bias(tau=300)", temperature=True).read_text()
     )
-    (loss,) = losses(content, "px4")
+    (loss,) = losses(calibration_of(content), "px4")
     assert "thermal_bias with one of 300 s is right at a settled temperature only" in loss

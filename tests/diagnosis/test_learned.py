@@ -148,7 +148,7 @@ def readings():
 
 def test_exported_formulas_correct_as_the_calibration_does(calibration, readings):
     """Evaluated by Python alone."""
-    whole = json.loads(export(calibration.content, "json"))
+    whole = json.loads(export(calibration, "json"))
     expected = calibration.correct(readings[0], some_holds(8, temperature=readings[1]))
     values = {p["name"]: p["value"] for e in whole["effects"] for p in e["parameters"]}
     for reading, warm, one in zip(*readings, expected, strict=True):

@@ -98,14 +98,13 @@ def test_each_name_of_an_exported_calibration_is_described():
     settings = CampaignSettings(scheme="fibonacci-24", temperature=(10, 40), vibration=(0, 1))
     effects = ("thermal_bias(tau=60)", "thermal_curve", "vibration_rectification", "warm_up")
     model = get_model(f"bias-scale+{'+'.join(effects)}")
-    document = calibration_document(
-        fit_campaign(simulate_campaign(settings)[0], model, get_approach("robot"))
-    )
-    code = export(document, "c").split("*/", 1)[1]
+    fit = fit_campaign(simulate_campaign(settings)[0], model, get_approach("robot"))
+    calibration = calibration_of(calibration_document(fit))
+    code = export(calibration, "c").split("*/", 1)[1]
     (signature,) = re.findall(r"void (accel_calibrate\(.*\))", code)
     words = set(re.findall(r"\w+", signature)) - {"const", "3"}
     names = {word.removesuffix("_60") for word in words}
-    lines = [line.split("\t") for line in export(document, "px4").splitlines() if line[0] != "#"]
+    lines = [line.split("\t") for line in export(calibration, "px4").splitlines() if line[0] != "#"]
     first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
     said = described("file-formats")
     assert set(said["calibration.h"]) == names

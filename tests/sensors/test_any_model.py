@@ -358,9 +358,9 @@ def test_the_rig_stays_where_it_was(tmp_path):
         read_calibration(path).covariance, fit.covariance[np.ix_(sensor, sensor)], rtol=1e-12
     )
     assert content["affine"] is not None
-    effects = json.loads(export(content, "json"))["effects"]
+    effects = json.loads(export(read_calibration(path), "json"))["effects"]
     assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
-    assert len(export(content, "matrix").splitlines()) == 3
+    assert len(export(read_calibration(path), "matrix").splitlines()) == 3
 
 
 def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):

@@ -30,6 +30,7 @@ from accelstudy.files.validation import (
     within,
 )
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel, not_affine
 
@@ -84,6 +85,21 @@ class SensorCalibration:
         if self.log is not None:
             return self.log
         return LogLayout(unit=self.content["unit"], **(self.content["nominal"] or {}))
+
+    @cached_property
+    def conversion(self) -> Conversion:
+        """From readings, as a device has them, to m/s²."""
+        layout = self.usual_layout
+        return conversion_of(layout.unit, layout.scale, layout.offset)
+
+    @cached_property
+    def mending(self) -> Array:
+        """C (3, 3) that turns forces as they are read into those that were fitted, in frd.
+
+        It differs from I if the data had a gross error that a diagnosis mended.
+        """
+        mended = self.content.get("mended") or {}
+        return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], float)
 
     @cached_property
     def needs(self) -> tuple[tuple[str, str], ...]:

@@ -26,8 +26,6 @@ from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.pages import text
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.conversion import Conversion
-from accelstudy.sensors.frames import Frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.symbolic.algebra import sp
@@ -51,16 +49,8 @@ LAGGED, SESSION_TIME = "temperature_lagged_", "time_kept"
 of drifts, which end with the session."""
 
 
-def c_header(
-    calibration: SensorCalibration, raw: Conversion, frame: Frame, mending: Array, unit: str
-) -> str:
+def c_header(calibration: SensorCalibration) -> str:
     """Write a header with a function that turns readings into calibrated forces.
-
-    Parameters
-    ----------
-    calibration : SensorCalibration
-    raw, frame, unit : of the readings
-    mending : (3, 3) array, turns forces in frd as they are read into those that were fitted
 
     Raises
     ------
@@ -68,11 +58,12 @@ def c_header(
         If an effect depends on what no device knows, or no force explains a reading.
     """
     must_be_known(calibration.needs)
-    model, p = calibration.model, calibration.parameters
+    model, p, raw = calibration.model, calibration.parameters, calibration.conversion
+    frame = calibration.usual_layout.axes
     # Counts lose no digits of a float if their offset is a whole number of them.
     offset = np.broadcast_to(raw.offset, 3)
     whole = np.round(offset)
-    linear = mending @ frame.matrix * raw.scale
+    linear = calibration.mending @ frame.matrix * raw.scale
     constant = linear @ (whole - offset)
     if affine := affine_form(model, p):
         stages, (k, bias) = [], affine
@@ -89,8 +80,7 @@ def c_header(
         version=__version__,
         calibration=calibration,
         sigmas=np.sqrt(np.diag(calibration.covariance)),
-        unit=unit,
-        frame=frame,
+        layout=calibration.usual_layout,
         end=end,
         end_in_c=None if end is None else _number(end),
         bound=BOUND,

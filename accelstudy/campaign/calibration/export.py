@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,13 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
+from accelstudy.campaign.calibration.applying import SensorCalibration, affine_form
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.parameter_files import PX4
 from accelstudy.effects import Effect
 from accelstudy.effects.base import formulas
-from accelstudy.sensors.conversion import Conversion, conversion_of
-from accelstudy.sensors.frames import FRD, Frame, parse_frame
 from accelstudy.sensors.models import compose
-from accelstudy.sensors.sensor import SensorModel, not_affine
+from accelstudy.sensors.sensor import not_affine
 
 Array = NDArray[np.float64]
 
@@ -54,57 +51,34 @@ SYMBOLS = {
 }
 
 
-def device_matrix(calibration: Mapping[str, Any]) -> Array:
+def device_matrix(calibration: SensorCalibration) -> Array:
     """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
-
-    Parameters
-    ----------
-    calibration : mapping, content of calibration.json
 
     Raises
     ------
     InputError
         If the model has effects that no matrix can hold.
     """
-    if unfit := not_affine(_model(calibration)):
+    model, frame = calibration.model, calibration.usual_layout.axes
+    if unfit := not_affine(model):
         raise InputError(
-            f"no matrix can hold {comma_list(list(unfit))} of the model {calibration['model']!r}; "
+            f"no matrix can hold {comma_list(list(unfit))} of the model {model.name!r}; "
             "the forms json and yaml carry all effects, and c all that a device can know"
         )
-    affine = calibration["affine"]
+    affine = affine_form(model, calibration.parameters)
     if affine is None:
-        raise InputError(f"the model {calibration['model']!r} with these parameters has no inverse")
-    k, bias = np.array(affine["matrix"]), np.array(affine["bias_mps2"])
-    raw, frame = _readings(calibration)
-    linear = frame.matrix.T @ k @ mending(calibration) @ frame.matrix * raw.scale
+        raise InputError(f"the model {model.name!r} with these parameters has no inverse")
+    (k, bias), raw = affine, calibration.conversion
+    linear = frame.matrix.T @ k @ calibration.mending @ frame.matrix * raw.scale
     return np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
 
 
-def campaign_conversion(calibration: Mapping[str, Any]) -> Conversion:
-    """Conversion to m/s² of readings in the unit of the campaign, in frd."""
-    if calibration["unit"] != "counts":
-        return conversion_of(calibration["unit"])
-    scale, offset = (
-        np.array(calibration["nominal"][key], dtype=float) for key in ("scale", "offset")
-    )
-    return Conversion(scale, offset)
-
-
-def mending(calibration: Mapping[str, Any]) -> Array:
-    """C (3, 3) that turns forces as they were read into those that were fitted, in frd.
-
-    It differs from I if the data had a gross error that a diagnosis mended.
-    """
-    mended = calibration.get("mended") or {}
-    return np.eye(3) if mended.get("matrix") is None else np.array(mended["matrix"], dtype=float)
-
-
-def export(calibration: Mapping[str, Any], form: str) -> str:
+def export(calibration: SensorCalibration, form: str) -> str:
     """Text of a calibration in one of `FORMS`.
 
     Parameters
     ----------
-    calibration : mapping, content of calibration.json
+    calibration : SensorCalibration
     form : one of `FORMS`
 
     Raises
@@ -124,9 +98,9 @@ def export(calibration: Mapping[str, Any], form: str) -> str:
         rows = device_matrix(calibration)
         return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
     if form == "c":
-        return c_header(*_of_device(calibration))
+        return c_header(calibration)
     if form == "px4":
-        return PX4(*_of_device(calibration)).text
+        return PX4(calibration).text
     if form == "json":
         return json.dumps(_whole(calibration), indent=2, ensure_ascii=False) + "\n"
     if form == "yaml":
@@ -134,63 +108,40 @@ def export(calibration: Mapping[str, Any], form: str) -> str:
     raise UnknownNameError("form", form, FORMS)
 
 
-def losses(calibration: Mapping[str, Any], form: str) -> tuple[str, ...]:
+def losses(calibration: SensorCalibration, form: str) -> tuple[str, ...]:
     """What a form cannot hold of a calibration, a sentence each."""
-    return PX4(*_of_device(calibration)).lost if form == "px4" else ()
+    return PX4(calibration).lost if form == "px4" else ()
 
 
-def _of_device(
-    calibration: Mapping[str, Any],
-) -> tuple[SensorCalibration, Conversion, Frame, Array, str]:
-    """A calibration without its rig, and the readings that a device has."""
-    raw, frame = _readings(calibration)
-    unit = _unit(calibration)
-    return calibration_of(calibration), raw, frame, mending(calibration), unit
-
-
-def _model(calibration: Mapping[str, Any]) -> SensorModel:
-    return compose(calibration["model"], tuple(calibration["effects"]))
-
-
-def _readings(calibration: Mapping[str, Any]) -> tuple[Conversion, Frame]:
-    """Conversion of raw readings, and their axes: those of the log, if there was one."""
-    log = calibration.get("log")
-    if log is None:
-        return campaign_conversion(calibration), FRD
-    raw = conversion_of(log["unit"], log.get("scale"), log.get("offset"))
-    return raw, parse_frame(log["frame"])
-
-
-def _whole(calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything that is needed to implement a calibration elsewhere."""
-    model = _model(calibration)
-    raw, frame = _readings(calibration)
-    values = iter(calibration["parameters"])
+def _whole(calibration: SensorCalibration) -> dict[str, Any]:
+    """Everything that is needed to implement a calibration elsewhere, the rig included."""
+    content, raw = calibration.content, calibration.conversion
+    layout = calibration.usual_layout
+    values = iter(content["parameters"])
     effects = [
-        _effect(effect, [next(values) for _ in effect.parameters]) for effect in model.effects
+        _effect(effect, [next(values) for _ in effect.parameters])
+        for effect in compose(content["model"], tuple(content["effects"])).effects
     ]
     used = " ".join(json.dumps(effect) for effect in effects)
-    matrix = None
-    if not not_affine(model) and calibration["affine"] is not None:
-        matrix = device_matrix(calibration).tolist()
+    affine = affine_form(calibration.model, calibration.parameters)
     return {
-        "campaign": calibration["campaign"],
-        "model": calibration["model"],
-        "unit": _unit(calibration),
-        "gravity_mps2": calibration["gravity_mps2"],
+        "campaign": content["campaign"],
+        "model": content["model"],
+        "unit": layout.unit,
+        "gravity_mps2": calibration.gravity,
         "readings": {
-            "frame": frame.name,
+            "frame": layout.axes.name,
             "scale": raw.scale.tolist(),
             "offset": raw.offset.tolist(),
-            "to_frd": frame.matrix.tolist(),
-            "mending": mending(calibration).tolist(),
+            "to_frd": layout.axes.matrix.tolist(),
+            "mending": calibration.mending.tolist(),
         },
         "steps": list(STEPS),
         "symbols": {name: text for name, text in SYMBOLS.items() if name in used or name == "g"},
         "effects": effects,
-        "ranges": calibration.get("ranges") or {},
-        "parameters": calibration["parameters"],
-        "matrix_3x4": matrix,
+        "ranges": calibration.ranges,
+        "parameters": content["parameters"],
+        "matrix_3x4": None if affine is None else device_matrix(calibration).tolist(),
     }
 
 
@@ -210,8 +161,3 @@ def _effect(effect: Effect, parameters: list[Any]) -> dict[str, Any]:
             {key: p[key] for key in ("name", "value", "sigma", "unit")} for p in parameters
         ],
     }
-
-
-def _unit(calibration: Mapping[str, Any]) -> str:
-    log = calibration.get("log")
-    return str(calibration["unit"] if log is None else log["unit"])

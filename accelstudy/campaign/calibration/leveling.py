@@ -29,7 +29,6 @@ from accelstudy.campaign.calibration.applying import (
     noise_of_reading,
 )
 from accelstudy.campaign.calibration.device import KNOWN
-from accelstudy.campaign.calibration.export import mending
 from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
 from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout
@@ -168,7 +167,7 @@ def readings_of(
     mended = calibration.content.get("mended") or {"error": "", "matrix": None}
     mends = mended["matrix"] is not None and option_of.get(mended["error"]) not in given
     if mends:
-        forces = forces @ mending(calibration.content).T
+        forces = forces @ calibration.mending.T
     return Readings(opened, forces, hold, mends)
 
 

@@ -27,8 +27,6 @@ from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
 from accelstudy.pages import lines
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.conversion import Conversion
-from accelstudy.sensors.frames import Frame
 from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
@@ -54,8 +52,6 @@ class PX4:
     Parameters
     ----------
     calibration : SensorCalibration
-    raw, frame, unit : of the readings
-    mending : (3, 3) array, turns forces in frd as they are read into those that were fitted
 
     Raises
     ------
@@ -64,21 +60,15 @@ class PX4:
         not in m/s².
     """
 
-    def __init__(
-        self,
-        calibration: SensorCalibration,
-        raw: Conversion,
-        frame: Frame,
-        mending: Array,
-        unit: str,
-    ) -> None:
+    def __init__(self, calibration: SensorCalibration) -> None:
         must_be_known(calibration.needs)
+        unit = calibration.usual_layout.unit
         if unit != "m/s^2":
             raise InputError(
                 f"PX4 takes readings in m/s^2, and this calibration is of readings in {unit}"
             )
-        self.calibration, self.frame = calibration, frame
-        self._raw, self._to_read = raw, np.linalg.inv(mending)
+        self.calibration, self.frame = calibration, calibration.usual_layout.axes
+        self._to_read = np.linalg.inv(calibration.mending)
         self.gains, self.offsets = self._fitted(calibration)
         self.lost = tuple(self._lost())
 
@@ -136,7 +126,7 @@ class PX4:
     def _read(self, calibration: SensorCalibration, forces: Array, hold: HoldConditions) -> Array:
         """Readings (n, 3) of forces (n, 3) in frd."""
         output = calibration.model.sense(forces, calibration.parameters, calibration.gravity, hold)
-        return self._raw.from_si(self.frame.from_frd(output @ self._to_read.T))
+        return self.frame.from_frd(output @ self._to_read.T)
 
     def _fitted(self, calibration: SensorCalibration) -> tuple[Array, Array]:
         """Gains (3,), and offsets (3, k) by powers of the temperature."""
