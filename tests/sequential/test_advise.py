@@ -420,13 +420,3 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
     enough = [block for block in blocks if "YOU CAN STOP" in block]
     assert enough[0].startswith("whole: 16 positions so far")
     assert "ACCEPTED" in follow(last[0])
-
-
-def test_the_python_of_the_page_runs(capsys):
-    page = (ROOT / "docs/guides/sequential.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    exec(code, {})
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[0] in ("9", "10")
-    assert lines[-1].split()[0] == "24"
-    assert lines[-1].split()[-1] == "15"
