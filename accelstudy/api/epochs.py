@@ -65,7 +65,8 @@ class Comparison(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy compare` does."""
-        output.write_comparison(self.result, self.tilt_range, folder)
+        said = output.comparison_said(self.result, self.tilt_range)
+        output.write_report(self.result, self.content, said, folder)
 
 
 class History(Result):
@@ -128,7 +129,8 @@ class History(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy history` does."""
-        output.write_history(self.result, self.interval, folder)
+        said = output.history_said(self.result, self.interval)
+        output.write_report(self.result, self.content, said, folder, self.interval)
 
 
 def follow(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -223,32 +223,26 @@ def history_table(history: History) -> pd.DataFrame:
     )
 
 
-def write_comparison(history: History, tilt_range: float, folder: Path) -> None:
-    """Write comparison.json, report.html and the figure into a folder."""
-    content, said = comparison_document(history, tilt_range), comparison_said(history, tilt_range)
-    drawn = save_all({"changes": lambda: parameters_figure(history)}, folder / "figures")
-    _write_page(history, folder, content, said, drawn)
-    write_json(folder / "comparison.json", content)
-
-
-def write_history(history: History, interval: Interval | None, folder: Path) -> None:
-    """Write history.json, history.parquet, report.html and the figures into a folder."""
-    content, said = history_document(history, interval), history_said(history, interval)
-    figures = {"history": lambda: parameters_figure(history)}
-    if interval is not None:
-        figures["interval"] = lambda: interval_figure(interval)
-    _write_page(history, folder, content, said, save_all(figures, folder / "figures"))
-    write_frame(folder / "history.parquet", history_table(history))
-    write_json(folder / "history.json", content)
-
-
-def _write_page(
+def write_report(
     history: History,
-    folder: Path,
     content: dict[str, Any],
     said: Sequence[str],
-    figures: Mapping[str, str],
+    folder: Path,
+    interval: Interval | None = None,
 ) -> None:
+    """Write what a comparison or a history says into a folder: JSON, a page, figures and a table.
+
+    Parameters
+    ----------
+    history : History
+    content, said : document and sentences of it
+    folder : Path, to write to
+    interval : Interval, of a history, if it was asked for
+    """
+    name, figure = ("history", "history") if history.dates else ("comparison", "changes")
+    figures = {figure: lambda: parameters_figure(history)}
+    if interval is not None:
+        figures["interval"] = lambda: interval_figure(interval)
     write_page(
         folder / "report.html",
         "epochs/report.html.j2",
@@ -256,8 +250,11 @@ def _write_page(
         doc=content,
         h=history,
         lines=said,
-        figures=figures,
+        figures=save_all(figures, folder / "figures"),
     )
+    if history.dates:
+        write_frame(folder / "history.parquet", history_table(history))
+    write_json(folder / f"{name}.json", content)
 
 
 def draw_changes(ax: Axes, history: History) -> None:
