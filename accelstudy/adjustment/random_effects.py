@@ -82,20 +82,3 @@ class RandomEffects:
         while self.squares(most) > squares:
             most *= 4
         return most * float(optimize.brentq(lambda x: self.squares(x * most) - squares, 0.0, 1.0))
-
-
-def random_effects(
-    values: Array, variances: Array
-) -> tuple[float, float, float, tuple[float, float]]:
-    """Mean of values, their scatter, the sigma of the mean, and the 95 % interval of the scatter.
-
-    Parameters
-    ----------
-    values, variances : (n,) arrays; those with NaN do not count
-    """
-    known = np.isfinite(values) & np.isfinite(variances)
-    if not known.any():
-        return np.nan, np.nan, np.nan, (np.nan, np.nan)
-    fit = RandomEffects(values[known], variances[known], np.ones((known.sum(), 1)))
-    interval = fit.scatter_interval() if fit.dof else (0.0, np.inf)
-    return float(fit.estimates[0]), fit.scatter, float(np.sqrt(fit.covariance[0, 0])), interval

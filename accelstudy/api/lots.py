@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import LOT
-from accelstudy.lots.output import LotReport, draw_sensors, write_lot
+from accelstudy.lots.calibrated import CalibratedLot
+from accelstudy.lots.output import draw_sensors, lot_document, write_lot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,12 +27,12 @@ class Lot(Result):
 
     Attributes
     ----------
-    report : accelstudy.lots.output.LotReport, all of it
+    report : accelstudy.lots.calibrated.CalibratedLot, all of it
     """
 
     kind = LOT
 
-    def __init__(self, report: LotReport) -> None:
+    def __init__(self, report: CalibratedLot) -> None:
         self.report = report
 
     @property
@@ -38,15 +40,15 @@ class Lot(Result):
         """How many sensors it has."""
         return f"{self.content['sensors']} sensors"
 
-    @property
+    @cached_property
     def content(self) -> dict[str, Any]:
         """Content of lot.json."""
-        return self.report.content
+        return lot_document(self.report)
 
     @property
     def state(self) -> str:
         """One of no_effect, named, unknown."""
-        return self.report.state
+        return self.report.lot.state
 
     @property
     def effects(self) -> pd.DataFrame:
@@ -91,9 +93,9 @@ class Lot(Result):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw what each sensor has of the first parameter that the model lacks."""
         with drawing(ax, FULL, 62) as ax:
-            draw_sensors(ax, self.report.lot, self.report.found)
+            draw_sensors(ax, self.report)
         return ax
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy lot` does."""
-        write_lot(self.report, folder, place)
+        write_lot(self.report, self.content, folder, place)

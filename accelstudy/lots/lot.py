@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
-from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign, usual_approach
+from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, fit_base
 from accelstudy.lots.evidence import (
@@ -34,7 +33,7 @@ from accelstudy.lots.evidence import (
 )
 from accelstudy.lots.mixture import Anything
 from accelstudy.lots.noise import SensorNoise, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, Found, Odd, Pass, Size
+from accelstudy.lots.passes import LEVEL, ODD, Found, Odd, Pass
 from accelstudy.lots.sizes import TypeSizes, told
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
@@ -96,6 +95,11 @@ class Lot:
         return self.p_value < LEVEL
 
     @property
+    def state(self) -> str:
+        """State in a word, as the badge of the page has it."""
+        return "no_effect" if not self.missing else "named" if self.effects else "unknown"
+
+    @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
@@ -104,15 +108,6 @@ class Lot:
     def odd(self) -> list[Odd]:
         """Odd sensors, with all that was found in the model; the surest first."""
         return self.passes[-1].odd
-
-    def usual(self, fits: Sequence[CampaignFit | InputError]) -> list[CampaignFit]:
-        """Those of the `calibrations` that there are, without odd sensors."""
-        odd = {one.campaign for one in self.odd}
-        return [
-            fit
-            for fit, sensor in zip(fits, self.sensors, strict=True)
-            if isinstance(fit, CampaignFit) and sensor.campaign not in odd
-        ]
 
     def each(self) -> list[tuple[str, tuple[str, ...], float]]:
         """Campaign, names of what the model lacks for it, and their posterior, for each sensor."""
@@ -333,67 +328,3 @@ def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
     """Model with further effects."""
     effects = (*(effect.spec for effect in model.effects), *specs)
     return compose(composition_name(compose("type", effects).effects), effects)
-
-
-def calibrations(
-    lot: Lot, campaigns: Sequence[Campaign], approach: Approach | None = None
-) -> list[CampaignFit | InputError]:
-    """Calibrate each sensor with the model of the type, or say why that cannot be done.
-
-    Parameters
-    ----------
-    lot : Lot
-    campaigns : of its sensors, in the same order
-    approach : Approach, as in `weigh_lot`
-    """
-    fits: list[CampaignFit | InputError] = []
-    for i, campaign in enumerate(campaigns):
-        try:
-            chosen = lot.model_of(i), approach or usual_approach(campaign)
-            fits.append(fit_campaign(campaign, *chosen))
-        except InputError as error:
-            fits.append(error)
-    return fits
-
-
-def variances(lot: Lot, fit: CampaignFit) -> Array:
-    """Variances of the parameters of a sensor, (u,), SI, by what all sensors tell of its noise.
-
-    Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
-    would look like scatter of the parameters.
-    """
-    own, noise = fit.sigma**2, lot.noises[fit.campaign.name]
-    if fit.trusts_sigma or noise is None:
-        return own
-    r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
-    return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
-
-
-def with_sizes(
-    lot: Lot, fits: Sequence[CampaignFit | InputError], model: SensorModel
-) -> list[Found]:
-    """Find the sizes of what the model of the lot lacks.
-
-    Parameters
-    ----------
-    lot : Lot
-    fits : of `calibrations`
-    model : SensorModel, of the diagnosis
-    """
-    values, sigmas = np.full((2, len(fits), lot.model.n_parameters), np.nan)
-    for i, fit in enumerate(fits):
-        if isinstance(fit, CampaignFit):
-            values[i], sigmas[i] = fit.parameters, np.sqrt(variances(lot, fit))
-    odd = {one.campaign for one in lot.odd}
-    each, first, results = lot.each(), model.n_parameters, []
-    for found, spec in lot.effects:
-        sizes = []
-        if spec is not None:
-            rows = np.array([found.names[0] in names and campaign not in odd
-                             for campaign, names, _ in each])  # fmt: skip
-            for j, p in enumerate(compose(spec, (spec,)).parameters, start=first):
-                of_type = random_effects(values[rows, j], sigmas[rows, j] ** 2)
-                sizes.append(Size(p.name, p.unit, *of_type, values[:, j], sigmas[:, j]))
-            first += len(sizes)
-        results.append(replace(found, sizes=tuple(sizes)))
-    return results

@@ -63,29 +63,6 @@ HAS = 0.5
 
 
 @dataclass(frozen=True)
-class Size:
-    """A parameter of an effect, over the sensors that have it.
-
-    Attributes
-    ----------
-    name, unit : str, SI
-    mean, scatter : float, of the type
-    sigma : float, of the mean
-    scatter_ci95 : tuple of two floats, interval that holds the scatter with a probability of 95 %
-    each, sigma_each : (n,) arrays, of the sensors; NaN where a campaign cannot show it
-    """
-
-    name: str
-    unit: str
-    mean: float
-    scatter: float
-    sigma: float
-    scatter_ci95: tuple[float, float]
-    each: Array
-    sigma_each: Array
-
-
-@dataclass(frozen=True)
 class Found:
     """Something that the model of the lot lacks.
 
@@ -95,14 +72,12 @@ class Found:
     posterior : float, given that the model lacks anything
     share : float, of the sensors
     share_ci95 : tuple of two floats
-    sizes : tuple of Size, of an effect
     """
 
     names: tuple[str, ...]
     posterior: float
     share: float
     share_ci95: tuple[float, float]
-    sizes: tuple[Size, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -162,29 +137,24 @@ class Pass:
                 pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        common: dict[Names, float] = {
-            (k,): self.together[members[0]].odds
-            for k, members in enumerate(self.classes)
-            if members[0] in self.together
-        }
+        of_all = {name: joint.odds for name, joint in self.together.items()}
+        of_two: dict[Names, float] = {}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise; what is sudden has no mean.
-            of_mean = {
+            of_all |= {
                 name: log
                 for name, log in mean.odds.items()
                 if not is_noise(name) and not _is_sudden(name)
             }
-            of_mean[COMMON] = mean.odds[LEVEL_OF_NOISE]
-            common |= {
-                (k,): of_mean[members[0]]
-                for k, members in enumerate(self.classes)
-                if members[0] in of_mean
-            }
-            common |= {
+            of_all[COMMON] = mean.odds[LEVEL_OF_NOISE]
+            of_two = {
                 both: log
                 for both, log in self._pairs(mean).items()
                 if not any(_is_sudden(self.classes[k][0]) for k in both)
             }
+        firsts = [members[0] for members in self.classes]
+        of_one = {(k,): of_all[name] for k, name in enumerate(firsts) if name in of_all}
+        common: dict[Names, float] = {**of_one, **of_two}
         return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common, cache(self._of_type))
 
     def _of_type(self, names: Names) -> OfType | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -15,28 +14,17 @@ from numpy.typing import NDArray
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say
-from accelstudy.basics.units import GON
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.campaign.batch.run import campaign_of
-from accelstudy.campaign.calibration.assessment import tilt_shares
 from accelstudy.campaign.calibration.fit import (
-    CampaignFit,
-    JudgedNoise,
-    fit_campaign,
     usual_approach,
 )
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.files.outputs import LOT, result_folder
-from accelstudy.leveling.error import (
-    ATTITUDES,
-    MAX_TILT_GON,
-    cap_forces,
-    holds_in_use,
-    tilt_error,
-)
-from accelstudy.lots.lot import calibrations, weigh_lot, with_sizes
-from accelstudy.lots.output import LotReport, write_lot
+from accelstudy.lots.calibrated import CalibratedLot
+from accelstudy.lots.lot import weigh_lot
+from accelstudy.lots.output import lot_document, write_lot
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
@@ -53,7 +41,7 @@ def evaluate_lot(
     seed: int = 1,
     cores: int = 1,
     left_out: Mapping[str, str] | None = None,
-) -> LotReport:
+) -> CalibratedLot:
     """Say what the model of sensors of one type lacks, and calibrate each of them.
 
     Parameters
@@ -90,17 +78,7 @@ def evaluate_lot(
     for name, why in without.items():
         say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
     lot = weigh_lot(usable, model, approach, seed, cores)
-    fits = calibrations(lot, usable, approach)
-    found = with_sizes(lot, fits, model)
-    named = any(spec is not None for _, spec in lot.effects)
-    return LotReport(
-        lot,
-        found,
-        fits,
-        worth(lot.usual(fits), model) if named else None,
-        approach or usual_approach(usable[0]),
-        without,
-    )
+    return CalibratedLot.of(lot, model, usable, approach, without)
 
 
 def _own_names(given: Sequence[str], others: Collection[str]) -> list[str]:
@@ -142,39 +120,7 @@ def run_lot(
     model = get_model(settings.model or batch.model)
     approach = None if settings.approach is None else get_approach(settings.approach)
     with result_folder(out, LOT) as new:
-        report = evaluate_lot(campaigns, model, approach, settings.seed, cores, unread)
-        write_lot(report, new, out)
-    return report.content
-
-
-def worth(fits: Sequence[CampaignFit], model: SensorModel) -> Array | None:
-    """Rms tilt error of the sensors by what their model lacked, (2,), rad, of roll and of pitch.
-
-    It is over tilts up to `MAX_TILT_GON`, in the conditions of the campaigns, and without what the
-    uncertainty of the parameters adds. None if no sensor tells it.
-
-    Parameters
-    ----------
-    fits : calibrations with the model of the type, of sensors that are not odd
-    model : SensorModel, without what was found
-    """
-    squares = []
-    for fit in fits:
-        with suppress(InputError):
-            squares.append(_of_sensor(fit, model))
-    if not squares:
-        return None
-    return np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0))
-
-
-def _of_sensor(fit: CampaignFit, model: SensorModel) -> Array:
-    """Square of the error less that by noise: of nested models the difference of covariances."""
-    noise = JudgedNoise(fit.trusts_sigma, fit.variance_factor)
-    base = replace(fit_campaign(fit.campaign, model, fit.approach), judged=noise)
-    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
-    hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
-    error = tilt_error(
-        fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
-    ).constant
-    by_noise = tilt_shares(fit)["all"] ** 2 - tilt_shares(base)["all"] ** 2
-    return np.asarray(error - by_noise)
+        lot = evaluate_lot(campaigns, model, approach, settings.seed, cores, unread)
+        content = lot_document(lot)
+        write_lot(lot, content, new, out)
+    return content

@@ -11,10 +11,10 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from scipy import integrate, stats
 
-from accelstudy.adjustment.random_effects import random_effects
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import AS_GIVEN, Evidence, Level
+from accelstudy.lots.calibrated import TypeParameter
 from accelstudy.lots.evidence import (
     DRAWS,
     AnythingOdds,
@@ -304,19 +304,27 @@ def test_a_log_counts_once_whatever_its_folder(tmp_path):
     assert said == "error: copy: has the readings of s0; each sensor counts once\n"
 
 
+def over_sensors(values, sigmas, odd=()):
+    """A parameter over the sensors of a lot, all of which have it."""
+    usual = np.isin(np.arange(len(values)), odd, invert=True)
+    return TypeParameter("b_x", "m/s^2", values, sigmas, usual, np.ones_like(usual))
+
+
 def test_the_scatter_of_a_type_is_found():
-    """Mean and scatter of many sensors with known ones, and a single sensor."""
+    """Mean and scatter of many sensors with known ones, beside an odd one, and of a single one."""
     rng = np.random.default_rng(6)
     sigmas = rng.uniform(0.5, 1.5, 2000)
     values = 3 + rng.normal(0, 0.8, 2000) + sigmas * rng.standard_normal(2000)
-    mean, scatter, sigma, (low, high) = random_effects(values, sigmas**2)
-    assert low < scatter < high
-    assert mean == pytest.approx(3, abs=STANDARD_ERRORS * sigma)
-    assert scatter == pytest.approx(0.8, abs=0.1)
-    assert random_effects(np.array([2.0, np.nan]), np.array([0.25, 0.25])) == (
-        2.0, 0.0, 0.5, (0.0, np.inf)
-    )  # fmt: skip
-    assert np.isnan(random_effects(np.array([]), np.array([]))[0])
+    values[7] = 1e6
+    many = over_sensors(values, sigmas, [7])
+    low, high = many.scatter_interval()
+    assert low < many.scatter < high
+    assert many.mean == pytest.approx(3, abs=STANDARD_ERRORS * many.sigma)
+    assert many.scatter == pytest.approx(0.8, abs=0.1)
+    one = over_sensors(np.array([2.0, np.nan]), np.array([0.5, 0.5]))
+    assert (one.mean, one.scatter, one.sigma) == (2.0, 0.0, 0.5)
+    assert one.scatter_interval() == (0.0, np.inf)
+    assert np.isnan(over_sensors(np.full(3, np.nan), np.full(3, np.nan)).mean)
 
 
 def test_the_interval_of_a_scatter_holds_it():
@@ -326,7 +334,7 @@ def test_the_interval_of_a_scatter_holds_it():
     for _ in range(n):
         sigmas = rng.uniform(0.07, 0.13, 50)
         values = 0.15 + true * rng.standard_normal(50) + sigmas * rng.standard_normal(50)
-        low, high = random_effects(values, sigmas**2)[3]
+        low, high = over_sensors(values, sigmas).scatter_interval()
         held += low <= true <= high
     assert held / n == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / n))
 

@@ -16,6 +16,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.of_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.noise import SensorNoise
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
@@ -49,9 +50,9 @@ def type_of(sensors, folder):
     lot = SimpleNamespace(
         odd=[], sensors=named, effects=(), model=MODEL,
         noises={one.name: SensorNoise(0.002, 200.0) for one in sensors},
-        each=lambda: [(one.name, (), 1.0) for one in sensors], usual=lambda fits: fits,
+        each=lambda: [(one.name, (), 1.0) for one in sensors],
     )  # fmt: skip
-    assert write_type(lot, fits, folder)
+    assert write_type(CalibratedLot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
     return folder / "type.yaml"
 
 

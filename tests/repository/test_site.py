@@ -31,6 +31,7 @@ from accelstudy.campaign.of_type import TypeFile, TypicalParameter
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.history import compare, history_of
 from accelstudy.epochs.output import comparison_document, history_document, history_table
+from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
 from accelstudy.lots.lot import Lot
 from accelstudy.lots.mixture import Anything
@@ -119,9 +120,9 @@ def _lot():
     for _ in each:
         anything.add((name,), odds)
     one = Pass(tuple(each), anything, lambda i: AnythingOdds((name,), odds))
-    effects = tuple((found, name) for _, found in one.found)
-    lot = Lot((one, one), get_model("bias-scale"), effects)
-    return lot_document(lot, [found for found, _ in effects], [None] * 3, None, {})
+    model, effects = get_model("bias-scale"), tuple((found, None) for _, found in one.found)
+    lot = Lot((one, one), model, effects)
+    return lot_document(CalibratedLot(lot, model, [None] * 3, get_approach("robot"), {}))
 
 
 def _keys(document):
