@@ -138,7 +138,6 @@ class Pass:
         kinds = [_kind(members[0]) for members in self.classes]
         prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
         of_all = {name: joint.odds for name, joint in self.together.items()}
-        of_two: dict[Names, float] = {}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise; what is sudden has no mean.
             of_all |= {
@@ -147,14 +146,16 @@ class Pass:
                 if not is_noise(name) and not _is_sudden(name)
             }
             of_all[COMMON] = mean.odds[LEVEL_OF_NOISE]
-            of_two = {
+        firsts = [members[0] for members in self.classes]
+        common: dict[Names, float] = {
+            (k,): of_all[name] for k, name in enumerate(firsts) if name in of_all
+        }
+        if mean is not None:
+            common |= {
                 both: log
                 for both, log in self._pairs(mean).items()
-                if not any(_is_sudden(self.classes[k][0]) for k in both)
+                if not any(_is_sudden(firsts[k]) for k in both)
             }
-        firsts = [members[0] for members in self.classes]
-        of_one = {(k,): of_all[name] for k, name in enumerate(firsts) if name in of_all}
-        common: dict[Names, float] = {**of_one, **of_two}
         return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common, cache(self._of_type))
 
     def _of_type(self, names: Names) -> OfType | None:
