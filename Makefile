@@ -101,7 +101,7 @@ hidden-effects: $(READY) ## study how well the diagnosis finds what is hidden
 hidden-docs: $(READY) ## study hidden effects, and take score and figures into docs
 	$(MAKE) hidden-effects HIDDEN=studies/hidden/config/hidden-effects.yaml
 	cp results/hidden-effects/score.md docs/guides/hidden-effects-score.md
-	for name in alarms naming methods sets calibration confusion outside places limits; do \
+	for name in naming methods sets calibration outside; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
 	python tests/helpers/pictures.py drawn hidden
 

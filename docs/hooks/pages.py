@@ -10,6 +10,7 @@ import configuration_page
 import drawings
 import file_formats
 import gallery
+import quotes
 from markdown_text import table
 from mkdocs.structure.files import File
 
@@ -58,5 +59,5 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, **_):
-    """Put the parts where a page has their names."""
-    return PLACE.sub(lambda place: PARTS[place[1]]().strip("\n"), markdown)
+    """Put the parts where a page has their names, and the numbers that it quotes."""
+    return quotes.fill(PLACE.sub(lambda place: PARTS[place[1]]().strip("\n"), markdown))

@@ -7,7 +7,6 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import pandas as pd
 
 from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.basics.errors import InputError
+from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import judge
 from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import effects_without
@@ -24,17 +24,15 @@ from accelstudy.sensors.models import get_model
 from studies.hidden.baselines import METHODS, answers
 from studies.hidden.physics.generate import Case, Truth
 from studies.hidden.real_noise import RealNoiseConfig
-from studies.hidden.study import HiddenConfig, Job, Made, Row, removed
+from studies.hidden.study import HiddenConfig, Job, Row, removed
 
-KEY = ["cell", "campaign"]
 _TYPES = {
     "string": "cell set what design approach sigma classes effects noise gross gross_name "
-    "oracle_best oracle_told left true_place sensor seed verdict found specs found_classes "
-    "positions posteriors credible_set place fits statement reason methods error",
+    "oracle_best oracle_told true_place sensor verdict found specs positions posteriors "
+    "credible_set place fits methods error",
     "boolean": "oracle_detected confirmed recorded",
-    "Int64": "campaign oracle_alternatives redundancy positions_used",
-    "float64": "size held_out_z sigma0_before sigma0_after p_size p_known known_ratio "
-    "known_sigma ratio ratio_sigma",
+    "Int64": "campaign oracle_alternatives",
+    "float64": "size held_out_z sigma0_before sigma0_after p_size p_known",
 }
 TYPES = {name: kind for kind, names in _TYPES.items() for name in names.split()}
 """Type of each column of a campaign; lists and mappings are JSON."""
@@ -49,15 +47,9 @@ def parse_hidden(
     return checked(HiddenConfig, content, source)
 
 
-def run(job: Job, outputs: Mapping[str, str | Path], provenance: Mapping[str, Any]) -> None:
-    """Make and diagnose the campaigns of a job, and write them, and the seconds that each took.
-
-    The seconds stand apart, as they differ in every run.
-    """
-    rows, seconds = zip(*(row_of(job, *one) for one in job.campaigns), strict=True)
-    table = table_of(rows)
-    write_table(outputs["campaigns"], table, provenance)
-    write_table(outputs["seconds"], table[KEY].assign(seconds=seconds), provenance)
+def run(job: Job, path: str | Path, provenance: Mapping[str, Any]) -> None:
+    """Make and diagnose the campaigns of a job, and write them."""
+    write_table(path, table_of(row_of(job, *one) for one in job.campaigns), provenance)
 
 
 def table_of(rows: Iterable[Row]) -> pd.DataFrame:
@@ -65,50 +57,46 @@ def table_of(rows: Iterable[Row]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*TYPES]).astype(TYPES)
 
 
-def row_of(job: Job, case: Case, k: int) -> tuple[Row, float]:
-    """Truth and answer of a campaign, and the seconds that the diagnosis took.
+def row_of(job: Job, case: Case, k: int) -> Row:
+    """Truth and answer of a campaign.
 
     The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
     """
     what, model = f"{case.name} {k}", get_model(job.model)
     made, failed = tried(lambda: job.make(case, k), f"{what}: not made")
-
-    def diagnosed() -> Row:
-        verdict = judge(made.campaign, model, seed=job.seed)
-        return outcome(verdict) | made.of_answer(verdict)
-
+    campaign: Any
+    campaign, truth = made or (None, Truth())
     methods = None
     with effects_without(removed(case)):
-        start = process_time()
-        answer, error = tried(diagnosed, what, failed)
-        seconds = process_time() - start
+        answer, error = tried(lambda: outcome(judge(campaign, model, seed=job.seed)), what, failed)
         if job.baselines_every and int.from_bytes(case.digest(k)[:8]) % job.baselines_every == 0:
-            told, _ = tried(lambda: dict(answers(made.campaign, model)), what, failed)
+            told, _ = tried(lambda: dict(answers(campaign, model)), what, failed)
             # Where the model cannot be fitted, no method can work: each finds nothing.
             methods = told or dict.fromkeys(METHODS, (False, []))
-    row = {"cell": case.name, "campaign": k} | truth_row(case, made) | (answer or {})
-    return row | {"methods": json.dumps(methods), "error": error}, seconds
+    row = {"cell": case.name, "campaign": k} | truth_row(case, campaign, truth) | (answer or {})
+    return row | {"methods": json.dumps(methods), "error": error}
 
 
-def truth_row(case: Case, made: Made | None) -> Row:
+def truth_row(case: Case, campaign: Campaign | None, truth: Truth) -> Row:
     """What is true of a campaign."""
-    truth = made.truth if made else Truth()
     # No name is right for what a session cannot show or the catalogue lacks.
     nameless = case.set in ("invisible", "outside", "unforeseen")
     known = [[name for name in one if name not in removed(case)] for one in truth.classes]
     parts = asdict(truth)
-    oracle = parts.pop("oracle") or {}
+    oracle, p_known = parts.pop("oracle") or {}, parts.pop("p_known")
+    given = case.sigma_known if campaign is None else campaign.sigma_force is not None
     return {
-        **{name: getattr(case, name) for name in ("set", "what", "size")},
-        **{name: getattr(case, name) for name in ("design", "approach", "sigma")},
+        **{name: getattr(case, name) for name in ("set", "what", "size", "design", "approach")},
         **{name: json.dumps(value) for name, value in parts.items()},
+        "sigma": "given" if given else "not given",
+        "recorded": getattr(case, "recorded", None),
         "classes": json.dumps([] if nameless else [one for one in known if one]),
         "gross_name": truth.gross["name"],
         "oracle_detected": oracle.get("detected"),
         "oracle_best": json.dumps(oracle.get("best", [])),
         "oracle_told": json.dumps(oracle.get("told", [])),
         "oracle_alternatives": oracle.get("alternatives"),
-        **(made.columns if made else {}),
+        "p_known": p_known,
     }
 
 
@@ -144,21 +132,16 @@ def outcome(d: Verdict) -> Row:
         "verdict": d.verdict,
         "found": json.dumps([one.name for one in d.effects]),
         "specs": json.dumps([one.spec for one in d.effects]),
-        "found_classes": json.dumps([list(one.equivalence_class) for one in d.effects]),
         "positions": json.dumps([one.position for one in d.effects]),
         "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
         "credible_set": json.dumps(explanations),
         "place": json.dumps(d.place),
         "fits": json.dumps([fit_squares(one) for one in fits]),
         "confirmed": bool(d.gap.confirmed),
-        "statement": d.gap.statement or "",
         "held_out_z": np.nan if held is None else float(held.z),
         "sigma0_before": float(d.gap.before),
         "sigma0_after": np.nan if d.gap.after is None else float(d.gap.after),
         "p_size": np.nan if test is None else float(test.p_value),
-        "redundancy": d.base.redundancy,
-        "positions_used": d.campaign.n_positions,
-        "reason": d.reason,
     }
 
 

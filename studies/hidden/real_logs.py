@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -107,7 +108,7 @@ class Donor:
             time=(self.time[starts] + self.time[ends - 1]) / 2,
             course=course,
         )
-        atlas = Atlas(session, Conditions(session, "gravity", self.sensor))
+        atlas = Atlas(Conditions(session, "gravity", self.sensor))
         for name in self.own[:1]:
             shape = atlas.shape(EFFECTS[name], {})
             assert shape is not None
@@ -135,34 +136,35 @@ class Donor:
         middles = (self.spans[:-1, 1] + self.spans[1:, 0]) / 2
         return added[:, np.searchsorted(middles, np.arange(len(self.forces)), side="right")]
 
-    def left(
+    def shape(
         self, kind: Kind, settings: dict[str, float], atlas: Atlas, spans: Spans
-    ) -> tuple[Array, Shape | None]:
-        """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape."""
-        holds = means_of(self.unit(kind, settings, atlas.session.course), spans)
-        left = atlas.conditions.left(atlas.conditions.changed(holds))
-        size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
-        return left, Shape.of(kind, settings, left, size)
-
-    def drawn(
-        self, name: str, size: float, course: Course | None, rng: np.random.Generator
-    ) -> Cause:
-        """Draw an effect that has a noncentrality in the log.
+    ) -> tuple[Array, Shape]:
+        """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape.
 
         Raises
         ------
         InputError
-            If the log cannot show it.
+            If they cannot show it.
         """
+        holds = means_of(self.unit(kind, settings, atlas.session.course), spans)
+        left = atlas.conditions.left(atlas.conditions.changed(holds))
+        size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
+        shape = Shape.of(kind, settings, left, size)
+        if shape is None:
+            raise InputError(f"{self.name}: cannot show {kind.name}")
+        return left, shape
+
+    def drawn(
+        self, name: str, size: float, course: Course | None, rng: np.random.Generator
+    ) -> Cause:
+        """Draw an effect that has a noncentrality in the log."""
         kind, atlas = PUT[name], self.atlas(self.spans, course, self.sigma)
         settings = kind.settings.draw(atlas.session, rng)
         if "t" in settings:  # between two holds: what jumps within one is another effect
             starts, ends = self.spans.T
             between = (self.time[ends[:-1] - 1] + self.time[starts[1:]]) / 2
             settings["t"] = float(between[np.argmin(abs(between - settings["t"]))])
-        left, shape = self.left(kind, settings, atlas, self.spans)
-        if shape is None:
-            raise InputError(f"{self.name}: cannot show {name}")
+        left, shape = self.shape(kind, settings, atlas, self.spans)
         parameters = shape.drawn(rng)
         factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
         return Cause(kind, settings, parameters[None] * factor)
@@ -214,62 +216,43 @@ def residuals(atlas: Atlas, forces: Array) -> Array:
     return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
-class Shown:
-    """An effect in the holds of a log that was imported with it, all of unit weight.
+class Shown(NamedTuple):
+    """Effects in the holds of a log that was imported with them, all of unit weight.
 
     Attributes
     ----------
     atlas : Atlas, of the holds
-    whole : (m,) array, residuals of a calibration
-    shape : Shape
-    left : (k, m) array, what each parameter leaves
-    beside : (m, d) array, orthonormal, what the other effects take up
-
-    Raises
-    ------
-    InputError
-        If the holds cannot show it.
+    residuals : (m,) array, of a calibration
+    shapes : tuple of Shape, of each effect
+    p : float, by an F test that knows the form: of two effects that of the one that is less certain
     """
 
-    def __init__(self, log: Donor, cause: Cause, spans: Spans, atlas: Atlas, whole: Array) -> None:
-        self.log, self.cause, self.spans, self.atlas, self.whole = log, cause, spans, atlas, whole
-        self.left, shape = log.left(cause.kind, cause.settings, atlas, spans)
-        if shape is None:
-            raise InputError(f"{log.name}: its holds no longer show {cause.kind.name}")
-        self.shape, self.beside = shape, np.zeros((len(whole), 0))
-
-    def without(self, rows: Array) -> Array:
-        """Residuals (..., m) without what the other effects take up."""
-        return np.asarray(rows - (rows @ self.beside) @ self.beside.T)
-
-    @cached_property
-    def true(self) -> Array:
-        """What the effect left in the residuals, (m,), beside the others."""
-        return self.without(self.cause.parameters[0] @ self.left)
-
-    def f_test(self) -> tuple[float, float, float]:
-        """p-value, size over true size, and its sigma, by an F test that knows the form."""
-        z, true = self.without(self.whole), self.true
-        basis = np.linalg.qr(self.without(self.shape.basis.T).T)[0]
-        gain, d = float(np.sum((z @ basis) ** 2)), basis.shape[1]
-        lost = len(self.log.spans) - len(self.spans)
-        dof = self.log.redundancy - lost - self.beside.shape[1] - d
-        variance = (float(z @ z) - gain) / dof
-        p = float(special.fdtrc(d, dof, gain / d / variance))
-        size = float(true @ true)
-        return p, float(z @ true) / size, float(np.sqrt(variance / size))
+    atlas: Atlas
+    residuals: Array
+    shapes: tuple[Shape, ...]
+    p: float
 
 
 def shown(
     log: Donor, spans: Spans, course: Course | None, causes: Sequence[Cause], forces: Array
-) -> list[Shown]:
-    """Show each of some effects beside the others in holds with forces (n, 3)."""
-    if not causes:
-        return []
+) -> Shown:
+    """Show effects in holds with forces (n, 3).
+
+    Raises
+    ------
+    InputError
+        If the holds cannot show them.
+    """
     atlas = log.atlas(spans, course, log.sigma)
-    whole = residuals(atlas, forces)
-    found = [Shown(log, cause, spans, atlas, whole) for cause in causes]
-    for one in found:
-        others = [other.shape.basis for other in found if other is not one]
-        one.beside = np.concatenate([one.beside, *others], axis=1)
-    return found
+    shapes = tuple(log.shape(cause.kind, cause.settings, atlas, spans)[1] for cause in causes)
+    z, p = residuals(atlas, forces), 0.0
+    for shape in shapes:
+        others = [one.basis for one in shapes if one is not shape]
+        beside = np.concatenate([np.zeros((len(z), 0)), *others], axis=1)
+        left = z - beside @ (beside.T @ z)
+        basis = np.linalg.qr(shape.basis - beside @ (beside.T @ shape.basis))[0]
+        gain, d = float(np.sum((left @ basis) ** 2)), basis.shape[1]
+        dof = log.redundancy - (len(log.spans) - len(spans)) - beside.shape[1] - d
+        variance = (float(left @ left) - gain) / dof
+        p = max(p, float(special.fdtrc(d, dof, gain / d / variance)))
+    return Shown(atlas, z, shapes, p)

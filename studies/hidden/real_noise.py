@@ -8,7 +8,7 @@ test says that knows the form of the effect, and the oracle's best answer.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,15 +20,14 @@ from pydantic import Field, model_validator
 from accelstudy.basics.errors import UnknownNameError
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
+from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import ModelName
-from accelstudy.diagnosis.result import Verdict
-from accelstudy.effects import get_effect
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates
 from studies.hidden.physics.designs import Array, Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.oracle import Oracle
-from studies.hidden.real_logs import BUMPED, PUT, Donor, Shown, shown, spans_of
-from studies.hidden.study import Job, Made, Plan, Row, Study
+from studies.hidden.real_logs import BUMPED, PUT, Donor, shown, spans_of
+from studies.hidden.study import Job, Study
 
 FEWEST = 5
 """Redundancy of a log, below which nothing is put into it."""
@@ -45,8 +44,7 @@ class Log(Block):
 class RealNoiseConfig(Study):
     """A study with real noise; results go to ``results/<study>``."""
 
-    tables: ClassVar = ("campaigns",)
-    """Tables of its score."""
+    score: ClassVar = "real"
 
     public_folder: str = Field(
         "resources/public", description="where the logs are, or are downloaded to"
@@ -76,11 +74,7 @@ class RealNoiseConfig(Study):
         """Names of the jobs, one for each log."""
         return [*self.logs]
 
-    def plan(self) -> Plan:
-        """Nothing, as what can be put into a log shows when it is read."""
-        return {}
-
-    def job(self, name: str, plan: str | Path) -> Job:
+    def job(self, name: str) -> Job:
         """Campaigns of a log."""
         path, settings = public_file(name, self.public_folder), import_settings(name)
         return self.of_log(Donor(name, path, settings, self.interval_s, self.logs[name].own))
@@ -141,7 +135,7 @@ class LogCase(Case):
         return np.random.SeedSequence([seed, zlib.crc32(self.session.encode()), campaign])
 
 
-def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> Made:
+def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
     """Put effects into a log, and import it."""
     rng, course, columns = np.random.default_rng(seed), None, dict[str, Array]()
     if any("course" in PUT[name].needs for name in case.effect) or not case.effect:
@@ -156,28 +150,22 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> Made
         path = Path(folder) / f"{log.name}.parquet"
         campaign, report = import_log(path, log.write(path, causes, course, columns))
     spans = spans_of(campaign, report)
-    found = shown(log, spans, course, causes, campaign.forces)
     truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
+    if not causes:
+        return campaign, truth
+    found = shown(log, spans, course, causes, campaign.forces)
+    truth = replace(truth, p_known=found.p)
     if BUMPED in case.effect:
         # The hold in which the bumped one lies, whatever its number became.
         middle = np.mean(log.spans[int(causes[0].settings["row"])])
         place = campaign.positions[(spans[:, 0] <= middle) & (middle < spans[:, 1])].tolist()
         gross = {"name": BUMPED, "settings": {"position": place[0] if place else None}}
         truth = replace(truth, gross=gross)
-    elif found:
-        atlas = found[0].atlas
-        said = Oracle(atlas).judge(found[0].whole, case.lam)
-        classes = tuple(atlas.same_as(one.shape) for one in found)
+    else:
+        said = Oracle(found.atlas).judge(found.residuals, case.lam)
+        classes = tuple(map(found.atlas.same_as, found.shapes))
         truth = replace(truth, classes=classes, oracle=said)
-    row: Row = {
-        "sigma": "given" if campaign.sigma_force else "not given",
-        "recorded": case.recorded,
-    }
-    # Of two effects the numbers are those of the one that is less certain.
-    if found:
-        tests = ("p_known", "known_ratio", "known_sigma")
-        row |= dict(zip(tests, max(one.f_test() for one in found), strict=True))
-    return Made(campaign, truth, row, lambda verdict: _sizes(found, verdict))
+    return campaign, truth
 
 
 def _course(duration: float, rng: np.random.Generator) -> Course:
@@ -189,24 +177,3 @@ def _course(duration: float, rng: np.random.Generator) -> Course:
     turns, start = rng.uniform(0.4, 3.0, 3), rng.uniform(0, 2 * np.pi, 3)
     waves = np.sin(2 * np.pi * np.outer(time / duration, turns) + start)
     return Course(time, 24 + waves @ rng.uniform(1, 3, 3))
-
-
-def _sizes(found: Sequence[Shown], verdict: Verdict) -> Row:
-    """Size of an effect as the diagnosis found it over the true size, the least certain one."""
-    sizes = []
-    for one in found:
-        name = one.cause.kind.name
-        given = [list(each.parameters or ()) for each in verdict.found if each.name == name]
-        if not given or not given[0]:
-            continue
-        settings = next(each for each in verdict.extended.effects if each.name == name).settings
-        # Some of its parameters may be zero, as the positions do not show them.
-        names = [parameter.name for parameter in get_effect(name).parameters]
-        told, values = zip(*((p[0], p[1]) for p in given[0]), strict=True)
-        left = one.log.left(one.cause.kind, settings, one.atlas, one.spans)[0]
-        part = left[[names.index(each) for each in told]] @ one.true / float(one.true @ one.true)
-        columns = [verdict.extended.parameter_names.index(each) for each in told]
-        covariance = verdict.final.solution.cofactors[np.ix_(columns, columns)]
-        sigma = float(np.sqrt(part @ covariance @ part * verdict.unit_variance))
-        sizes.append((sigma, float(np.array(values) @ part)))
-    return dict(zip(("ratio_sigma", "ratio"), max(sizes, default=()), strict=False))

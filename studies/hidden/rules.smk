@@ -14,39 +14,15 @@ DIAGNOSING = code_version(
 )
 # What the jobs use of it; where the logs are does not matter.
 DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "public_folder"})
-SCORED = {table: f"{RESULTS}/{table}.parquet" for table in STUDY.tables}
-if "targets" in SCORED:
-    SCORED["figures"] = directory(f"{RESULTS}/figures")
-PARTS = {part: f"{RESULTS}/{part}/{{job}}.parquet" for part in ("campaigns", "seconds")}
 
 
 wildcard_constraints:
     job=one_of(STUDY.jobs),
 
 
-rule hidden_plan:
-    output:
-        f"{RESULTS}/plan.json",
-    log:
-        f"{RESULTS}/logs/plan.log",
-    conda:
-        "../../workflow/envs/accelstudy.yaml"
-    resources:
-        mem_mb=4000,
-    params:
-        spec=DIAGNOSED,
-        version=DIAGNOSING,
-    message:
-        "Choose the campaigns of {STUDY.study}"
-    script:
-        "scripts/plan.py"
-
-
 rule hidden_diagnose:
-    input:
-        rules.hidden_plan.output,
     output:
-        **PARTS,
+        f"{RESULTS}/campaigns/{{job}}.parquet",
     log:
         f"{RESULTS}/logs/{{job}}.log",
     conda:
@@ -62,9 +38,10 @@ rule hidden_diagnose:
 
 rule hidden_score:
     input:
-        **{part: expand(path, job=STUDY.jobs) for part, path in PARTS.items()},
+        expand(rules.hidden_diagnose.output, job=STUDY.jobs),
     output:
-        **SCORED,
+        campaigns=f"{RESULTS}/campaigns.parquet",
+        figures=directory(f"{RESULTS}/figures"),
         page=f"{RESULTS}/score.md",
     log:
         f"{RESULTS}/logs/score.log",

@@ -6,24 +6,20 @@ that can show it.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import combinations, product
 from math import ceil
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, TypeAdapter, model_validator
+from pydantic import Field, model_validator
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import KnownModel
-from accelstudy.diagnosis.result import Verdict
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import config_hash
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, Seed
 from studies.hidden.physics import oracle
@@ -39,23 +35,21 @@ Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]
 Numbered = tuple[Case, int]
 """A case, and the number of the campaign among those of the case."""
-Plan = dict[str, list[Numbered]]
-PLAN = TypeAdapter(Plan)
 
 CAMPAIGNS = Range(1, 1_000_000)
 """Campaigns of a study; the most take days of computing."""
-JOB = 800
-"""Campaigns in one job: minutes of work, so that starting Python does not matter."""
+JOB = 1600
+"""Campaigns in one job: minutes of work, so that it does not matter that each job starts Python and
+looks which session can show what."""
 
-_EFFECTS = tuple(name for name in EFFECTS if name in effect_names())
 KINDS: Mapping[str, tuple[Sequence[str], Callable[[str, str], Collection[str]]]] = {
     "noise": (tuple(NOISES), lambda design, approach: NOISES),
-    "one": (_EFFECTS, visible_effects),
-    "removed": (_EFFECTS, visible_effects),
+    "one": (tuple(EFFECTS), visible_effects),
+    "removed": (tuple(EFFECTS), visible_effects),
     "outside": (tuple(OUTSIDE), oracle.visible_outside),
-    "unforeseen": (tuple(UNFORESEEN), oracle.visible_unforeseen),
+    "unforeseen": (tuple(UNFORESEEN), oracle.visible_outside),
     "gross": (tuple(GROSS), visible_gross),
-    "invisible": (_EFFECTS, invisible_effects),
+    "invisible": (tuple(EFFECTS), invisible_effects),
 }
 """Kinds that each set may have, and those that make sense in a design by an approach."""
 SETS = ("nothing", "two", *KINDS)
@@ -63,15 +57,6 @@ SETS = ("nothing", "two", *KINDS)
 
 
 Row = dict[str, Any]
-
-
-class Made(NamedTuple):
-    """A campaign and its truth, with further columns of its row and of that of its diagnosis."""
-
-    campaign: Campaign
-    truth: Truth
-    columns: Row = {}  # noqa: RUF012, nobody changes it
-    of_answer: Callable[[Verdict], Row] = lambda verdict: {}
 
 
 class Job(NamedTuple):
@@ -87,7 +72,7 @@ class Job(NamedTuple):
     """
 
     campaigns: Iterable[Numbered]
-    make: Callable[[Any, int], Made]
+    make: Callable[[Any, int], tuple[Campaign, Truth]]
     model: str
     seed: int
     baselines_every: int = 0
@@ -134,21 +119,11 @@ class Study(Block):
         """Hash of all that the numbers depend on, defaults included."""
         return config_hash(self.model_dump(mode="json", exclude={"public_folder"}))
 
-    @abstractmethod
-    def plan(self) -> Plan:
-        """Campaigns of each job."""
-
-    def write_plan(self, path: str | Path) -> None:
-        """Write the plan, so that the jobs need not plan the study again."""
-        with whole_file(path) as temporary:
-            temporary.write_bytes(PLAN.dump_json(self.plan()))
-
 
 class HiddenConfig(Study):
     """A study of hidden effects; results go to ``results/<study>``."""
 
-    tables: ClassVar = ("campaigns", "targets", "confusion", "calibration", "baselines", "limits")
-    """Tables of its score."""
+    score: ClassVar = "score"
 
     designs: Names = Field(["all"], description="sessions that are simulated, or all")
     approaches: Names = Field(["all"], description="gravity, robot, or all")
@@ -218,21 +193,18 @@ class HiddenConfig(Study):
 
         return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
 
-    def plan(self) -> Plan:
-        """Campaigns of each job, as equal in number as they can be."""
+    def job(self, name: str) -> Job:
+        """A job by its name: a part of all campaigns, as large as those of the others."""
         campaigns, jobs = self.campaigns(), self.jobs
         ends = np.linspace(0, len(campaigns), len(jobs) + 1).round().astype(int).tolist()
-        return {job: campaigns[ends[i] : ends[i + 1]] for i, job in enumerate(jobs)}
-
-    def job(self, name: str, plan: str | Path) -> Job:
-        """Job by its name, as `write_plan` wrote it."""
-        return self.simulated(PLAN.validate_json(Path(plan).read_bytes())[name])
+        i = jobs.index(name)
+        return self.simulated(campaigns[ends[i] : ends[i + 1]])
 
     def simulated(self, campaigns: Iterable[Numbered]) -> Job:
         """Campaigns by the physics of the study."""
         return Job(
             campaigns,
-            lambda case, k: Made(*generate(case, case.seed(self.seed, k))),
+            lambda case, k: generate(case, case.seed(self.seed, k)),
             self.model,
             self.diagnosis_seed,
             self.baselines_every,

@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
+from accelstudy.basics.progress import track
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI
 from studies.positions import efficiency, stopping
@@ -18,7 +19,8 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     table = efficiency.efficiency_table(efficiency.TASKS, efficiency.SCHEMES, efficiency.POSITIONS)
     _write(folder, "efficiency", table, efficiency.efficiency_figure(table))
-    sessions = stopping.sessions_table(stopping.SETTINGS)
+    settings = track(stopping.SETTINGS, "sessions")
+    sessions = pd.concat([stopping.simulate(each, stopping.SEED) for each in settings])
     summary = stopping.summary_table(sessions)
     sessions.to_parquet(folder / "sessions.parquet")
     _write(folder, "stopping", summary, stopping.stopping_figure(summary))

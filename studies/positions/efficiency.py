@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -30,7 +30,7 @@ SEED = 1
 
 
 def efficiency_table(
-    tasks: Iterable[Task], schemes: Iterable[Scheme], positions: Iterable[int], seed: int = SEED
+    tasks: Iterable[Task], schemes: Iterable[Scheme], positions: Sequence[int], seed: int = SEED
 ) -> pd.DataFrame:
     """Efficiency of schemes and of I-optimal designs by each criterion.
 
@@ -49,56 +49,39 @@ def efficiency_table(
         and rms_pitch (rad, NaN likewise), and least_rms, the lower bound for any n positions
         of the rms of roll and pitch together (I only).
     """
-    schemes = list(schemes)
-    tables = [_of_task(task, schemes, positions, seed) for task in tasks]
-    return pd.concat(tables, ignore_index=True)
-
-
-def _of_task(
-    task: Task, schemes: list[Scheme], positions: Iterable[int], seed: int
-) -> pd.DataFrame:
-    criteria = {name: get_criterion(name, task) for name in CRITERIA}
-    # For shares that sum to one position; n positions have n times the information.
-    bounds = {
-        name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
-        for name, criterion in criteria.items()
-    }
-    designs = [
-        Scheme(
-            f"I-optimal {n}",
-            f"{n} I-optimal",
-            optimal_design(task, criteria["I"], n, seed=seed, bounded=False).directions,
-            "generated",
-            "accelstudy design",
-        )
-        for n in positions
-    ]
     rows: list[Mapping[str, object]] = []
-    for scheme in [*schemes, *designs]:
-        n, reason = scheme.n_positions, task.missing(scheme.directions)
-        roll, pitch = (np.nan, np.nan) if reason else task.rms_tilt(scheme.directions)
-        for name, criterion in criteria.items():
-            share = 0.0
-            if not reason:
-                value = float(criterion.value(task.normal(scheme.directions) / n))
-                share = min(1.0, criterion.efficiency(value, bounds[name]))
-            rows.append(
-                {
-                    "model": task.model.name,
-                    "approach": task.approach.name,
-                    "scheme": scheme.name,
-                    "title": scheme.title,
-                    "status": scheme.status,
-                    "n": n,
-                    "criterion": name,
-                    "efficiency": share,
-                    "rms_roll": roll,
-                    "rms_pitch": pitch,
-                    "least_rms": float(np.exp(bounds["I"] / 2) / np.sqrt(n)),
-                    "reason": reason,
-                }
+    schemes = list(schemes)
+    for task in tasks:
+        criteria = {name: get_criterion(name, task) for name in CRITERIA}
+        # For shares that sum to one position; n positions have n times the information.
+        bounds = {
+            name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
+            for name, criterion in criteria.items()
+        }
+        designs = [
+            Scheme(
+                f"I-optimal {n}", f"{n} I-optimal",
+                optimal_design(task, criteria["I"], n, seed=seed, bounded=False).directions,
+                "generated", "accelstudy design",
             )
-    return pd.DataFrame(rows)
+            for n in positions
+        ]  # fmt: skip
+        for scheme in [*schemes, *designs]:
+            n, reason = scheme.n_positions, task.missing(scheme.directions)
+            roll, pitch = (np.nan, np.nan) if reason else task.rms_tilt(scheme.directions)
+            of_scheme = {
+                **{"model": task.model.name, "approach": task.approach.name},
+                **{name: getattr(scheme, name) for name in ("name", "title", "status")},
+                **{"n": n, "rms_roll": roll, "rms_pitch": pitch, "reason": reason},
+                "least_rms": float(np.exp(bounds["I"] / 2) / np.sqrt(n)),
+            }
+            for name, criterion in criteria.items():
+                share = 0.0
+                if not reason:
+                    value = float(criterion.value(task.normal(scheme.directions) / n))
+                    share = min(1.0, criterion.efficiency(value, bounds[name]))
+                rows.append({**of_scheme, "criterion": name, "efficiency": share})
+    return pd.DataFrame(rows).rename(columns={"name": "scheme"})
 
 
 MARKS = {"D": ("#0072B2", "o"), "A": ("#009E73", "s"), "I": ("#D55E00", "D")}
@@ -112,63 +95,51 @@ def efficiency_figure(table: pd.DataFrame) -> Figure:
     ----------
     table : DataFrame, of `efficiency_table`
     """
+    titles = table.drop_duplicates("scheme").set_index("scheme")["title"]
+    height = 5.2 * len(titles)
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        approaches = list(dict.fromkeys(table["approach"]))
-        schemes = list(dict.fromkeys(table["scheme"]))
-        figure = new_figure(FULL, 40 + 5.2 * len(schemes) + 62)
-        grid = figure.add_gridspec(2, len(approaches), height_ratios=[5.2 * len(schemes) + 14, 62])
-        for column, approach in enumerate(approaches):
-            part = table[table["approach"] == approach]
-            above = figure.add_subplot(grid[0, column])
-            _efficiencies(above, part, schemes, approach, column == 0)
-            below = figure.add_subplot(grid[1, column])
-            _over_positions(below, part, approach, column == 0, column == len(approaches) - 1)
+        groups = [*table.groupby("approach", sort=False)]
+        figure = new_figure(FULL, 40 + height + 62)
+        grid = figure.add_gridspec(2, len(groups), height_ratios=[height + 14, 62])
+        for column, (approach, part) in enumerate(groups):
+            above, below = (figure.add_subplot(grid[row, column]) for row in (0, 1))
+            _efficiencies(above, part, [*titles.index])
+            above.set_title(f"{approach}: share of the best there can be")
+            above.set_yticks(range(len(titles)), titles if column == 0 else [])
+            _over_positions(below, part, approach_colour(str(approach)))
+            below.set_title(f"{approach}: expected rms")
+            if column == 0:
+                above.legend(title="criterion", loc="center left")
+                below.set_ylabel(f"rms of roll and pitch, {display_unit('rad')}")
+        below.legend(loc="best")
         return figure
 
 
-def _efficiencies(
-    ax: Axes, table: pd.DataFrame, schemes: list[str], approach: str, labelled: bool
-) -> None:
-    titles = table.drop_duplicates("scheme").set_index("scheme")["title"]
+def _efficiencies(ax: Axes, table: pd.DataFrame, schemes: list[str]) -> None:
     for name, (colour, marker) in MARKS.items():
-        part = table[table["criterion"] == name].set_index("scheme")
-        determined = [s for s in schemes if not part.loc[s, "reason"]]
-        y = [schemes.index(s) for s in determined]
-        ax.plot(100 * part.loc[determined, "efficiency"], y, marker, color=colour, label=name)
-    for place, scheme in enumerate(schemes):
-        if table.loc[table["scheme"] == scheme, "reason"].iloc[0]:
-            ax.text(2, place, "does not determine the model", va="center", color="#777777", size=7)
-    ax.set_xlim(0, 103)
-    ax.set_ylim(len(schemes) - 0.4, -0.6)
-    ax.set_yticks(range(len(schemes)), [titles[s] for s in schemes] if labelled else [])
-    ax.set_title(f"{approach}: share of the best there can be")
-    ax.set_xlabel("efficiency, %")
-    if labelled:
-        ax.legend(title="criterion", loc="center left")
+        part = table[(table["criterion"] == name) & (table["reason"] == "")]
+        y = [schemes.index(scheme) for scheme in part["scheme"]]
+        ax.plot(100 * part["efficiency"], y, marker, color=colour, label=name)
+    for scheme in table.loc[table["reason"] != "", "scheme"].unique():
+        ax.text(2, schemes.index(scheme), "does not determine the model", va="center",
+                color="#777777", size=7)  # fmt: skip
+    ax.set(xlim=(0, 103), ylim=(len(schemes) - 0.4, -0.6), xlabel="efficiency, %")
 
 
-def _over_positions(
-    ax: Axes, table: pd.DataFrame, approach: str, labelled: bool, last: bool
-) -> None:
-    rows = table[(table["criterion"] == "I") & (table["reason"] == "")].copy()
-    rows["rms"] = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
+def _over_positions(ax: Axes, table: pd.DataFrame, colour: str) -> None:
+    rows = table[(table["criterion"] == "I") & (table["reason"] == "")]
+    rms = np.sqrt((rows["rms_roll"] ** 2 + rows["rms_pitch"] ** 2) / 2)
     n = np.geomspace(rows["n"].min(), rows["n"].max(), 60)
     one = float((rows["least_rms"] * np.sqrt(rows["n"])).iloc[0])
     ax.plot(n, to_display(one / np.sqrt(n), "rad"), color=INK, label="no positions are below")
     designed = rows["scheme"].str.startswith("I-optimal ")
-    style: Style = {"color": approach_colour(approach), "linestyle": ""}
-    ax.plot(rows["n"][~designed], to_display(rows["rms"][~designed], "rad"), marker="o", **style,
-            label="schemes")  # fmt: skip
-    ax.plot(rows["n"][designed], to_display(rows["rms"][designed], "rad"), marker="D", **style,
-            markerfacecolor="white", label="I-optimal designs")  # fmt: skip
-    least, most = (
-        float(to_display(value, "rad")) for value in (rows["least_rms"].min(), rows["rms"].max())
-    )
-    ax.set_yscale("log")
-    log_ticks(ax.yaxis, least, most)
-    ax.set_xlabel("positions")
-    ax.set_title(f"{approach}: expected rms")
-    if labelled:
-        ax.set_ylabel(f"rms of roll and pitch, {display_unit('rad')}")
-    if last:
-        ax.legend(loc="best")
+    looks: dict[str, tuple[pd.Series, Style]] = {
+        "schemes": (~designed, {"marker": "o"}),
+        "I-optimal designs": (designed, {"marker": "D", "markerfacecolor": "white"}),
+    }
+    for label, (chosen, look) in looks.items():
+        ax.plot(rows["n"][chosen], to_display(rms[chosen], "rad"), color=colour, linestyle="",
+                label=label, **look)  # fmt: skip
+    ends = (float(to_display(end, "rad")) for end in (rows["least_rms"].min(), rms.max()))
+    ax.set(yscale="log", xlabel="positions")
+    log_ticks(ax.yaxis, *ends)

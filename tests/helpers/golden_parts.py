@@ -278,7 +278,7 @@ def hidden(folder, approach) -> Texts:
     config = parse_hidden(yaml.safe_load((GOLDEN / "hidden.yaml").read_text("utf-8")))
     job = config.simulated(one for one in config.campaigns() if one[0].approach == approach)
     rows = (row_of(job._replace(baselines_every=0), *one) for one in job.campaigns)
-    yield "campaigns", "".join(answer(row) for row, _ in rows)
+    yield "campaigns", "".join(map(answer, rows))
 
 
 def answer(row):

@@ -29,10 +29,10 @@ from studies.hidden.physics.designs import (
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.physics.gross import visible_gross
-from studies.hidden.physics.kinds import COORDINATES, FACTORS, OF_ROBOT, OUTPUTS, Cause
+from studies.hidden.physics.kinds import OF_ROBOT, OUTPUTS, Cause
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
-from studies.hidden.physics.oracle import oracle, visible_outside, visible_unforeseen
-from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
+from studies.hidden.physics.oracle import oracle, visible_outside
+from studies.hidden.physics.outside import FACTORS, NOWHERE, OUTSIDE, UNFORESEEN
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -150,7 +150,8 @@ def misfit_without_noise(case, kind, seed):
 def test_physics_outside_is_as_large_as_was_asked_for(approach):
     """Of each place, and of each target without a place, one kind."""
     design, lam, shown = "repeats-30", 100.0, visible_outside("repeats-30", approach)
-    for name in {OUTSIDE[name].place or OUTSIDE[name].target: name for name in shown}.values():
+    kinds = {name: OUTSIDE[name] for name in shown if name in OUTSIDE}
+    for name in {kind.place or kind.target: name for name, kind in kinds.items()}.values():
         case = Case("outside", design, approach, True, (name,), (lam,))
         misfit, _ = misfit_without_noise(case, OUTSIDE[name], seeded(8))
         assert misfit == pytest.approx(lam, rel=0.03), name
@@ -205,25 +206,24 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
             left = own.conditions.seen(*observe(own.session, Sensor(), [cause]))
             assert np.sum(left**2) < 0.05, name
             assert effect.parameters != (0.0,) * EFFECTS[name].k
-        shown = {
-            "outside": visible_outside(design, approach),
-            "unforeseen": visible_unforeseen(design, approach),
-        }
-        for set_, names in shown.items():
-            for name in names[part::3]:
+        shown = visible_outside(design, approach)
+        for kinds, set_ in ((OUTSIDE, "outside"), (UNFORESEEN, "unforeseen")):
+            for name in [one for one in shown if one in kinds][part::3]:
                 case = Case(set_, design, approach, True, (name,), (200.0,))
                 truth = generate(case, seeded(10))[1]
                 assert not any(truth.classes)
-                one, two = truth.left
-                assert 200 > one > two > 20, name
-                place = {**OUTSIDE, **UNFORESEEN}[name].place
+                kind, effect = NOWHERE[name], truth.effects[0]
+                cause = Cause(kind, effect.settings, np.array([effect.parameters]))
+                left = own.conditions.seen(*observe(own.session, Sensor(), [cause]))[0]
+                assert oracle(design, approach).is_outside(left), name
+                place = kind.place
                 recorded = place and (approach == "robot" or place[0] not in OF_ROBOT)
                 assert truth.true_place == (place if recorded else None), name
 
 
 # --- physics outside the catalogue ---------------------------------------------------------------
 
-PLACED = {k: v for k, v in {**OUTSIDE, **UNFORESEEN}.items() if v.place}
+PLACED = {k: v for k, v in NOWHERE.items() if v.place}
 
 
 def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none():
@@ -231,14 +231,17 @@ def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none
     assert len(UNFORESEEN) >= 12
     assert not {*OUTSIDE} & {*UNFORESEEN}
     assert not {*OUTSIDE, *UNFORESEEN} & {*EFFECTS, *effect_names()}
-    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {*COORDINATES}
+    assert {kind.place[0] for kind in OUTSIDE.values() if kind.place} == {
+        "force", "previous", "next", "angle", "yaw", "move", "vibration", "temperature", "dT/dt",
+        "time",
+    }  # fmt: skip
     assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {*FACTORS}
     for kinds in (OUTSIDE, UNFORESEEN):
         assert sum(kind.place is None for kind in kinds.values()) >= 5
     shown = {
         name
         for design in ("abba-48", "repeats-30", "long-60")
-        for name in (*visible_outside(design, "robot"), *visible_unforeseen(design, "robot"))
+        for name in visible_outside(design, "robot")
     }
     assert shown == {*OUTSIDE, *UNFORESEEN}
 

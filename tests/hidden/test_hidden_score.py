@@ -4,7 +4,6 @@ import json
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from accelstudy.basics.shares import clopper_pearson
@@ -12,13 +11,14 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.models import get_model
-from studies.hidden.campaigns import TYPES, fit_squares
+from studies.hidden.campaigns import fit_squares, table_of
 from studies.hidden.physics.designs import session
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.scoring.figures import figures
 from studies.hidden.scoring.judging import LEARNABLE, all_true, same_effects
-from studies.hidden.scoring.page import score_page
-from studies.hidden.scoring.tables import SCORE, _measured, score_tables, shares
+from studies.hidden.scoring.page import frames, score_page
+from studies.hidden.scoring.tables import SCORES, share_text, statistic, table
+from studies.hidden.study import HiddenConfig
 
 DRIFT, WARM, SQUARE, MOUNTED = (
     ["bias_drift"], ["warm_up"], ["quadratic_scale"],
@@ -36,7 +36,7 @@ def truth(set_, classes=(), size=np.nan, oracle=None, **more):
         "gross_name": "", "oracle_detected": None if oracle is None else oracle != "nothing",
         "oracle_best": json.dumps(list(best)), "oracle_told": json.dumps(list(classes)),
         "oracle_alternatives": 1,
-        "left": "[]", "true_place": "null", "sensor": "null", "seed": "[]",
+        "true_place": "null", "sensor": "null",
         "methods": '{"F test": [true, ["bias_drift"]]}' if set_ == "one" else "null", **more,
     }  # fmt: skip
 
@@ -46,14 +46,14 @@ def answer(verdict, *found, among=(), place=None, place_of="null", **more):
     explanations = [] if verdict == "no_effect" else [(list(found) or ["unknown"], 0.8)]
     explanations += [(names, 0.15) for names in among]
     return {
-        "verdict": verdict, "found": json.dumps(found), "specs": "[]", "found_classes": "[]",
-        "positions": json.dumps([place] + [None] * (len(found) - 1)), "posteriors": "[]",
+        "verdict": verdict, "found": json.dumps(found), "specs": "[]",
+        "positions": json.dumps([place, None, None][: len(found)]), "posteriors": "[]",
         "credible_set": json.dumps(
             [{"names": n, "classes": [[i] for i in n], "posterior": p} for n, p in explanations]
         ),
         "place": place_of, "fits": "[]",
-        "confirmed": False, "statement": "", "held_out_z": np.nan, "sigma0_before": 2.0,
-        "sigma0_after": 1.0, "p_size": 0.1, "redundancy": 63, "positions_used": 24, "reason": "",
+        "confirmed": False, "held_out_z": np.nan, "sigma0_before": 2.0,
+        "sigma0_after": 1.0, "p_size": 0.1,
         "error": "", **more,
     }  # fmt: skip
 
@@ -73,7 +73,13 @@ def learned(place, share, **more):
     return answer("learned", "learned", place_of=place, fits=json.dumps(fits), **more)
 
 
-GIVEN_AWAY = {"verdict": None, "found": None, "credible_set": None, "confirmed": None}
+GIVEN_AWAY = {
+    "verdict": None,
+    "found": None,
+    "positions": None,
+    "credible_set": None,
+    "confirmed": None,
+}
 """What there is of a diagnosis that failed."""
 
 BUMPED = {"gross_name": "outlier_position", "gross": '{"settings": {"position": 7.0}}'}
@@ -119,18 +125,25 @@ CASES = [
 @pytest.fixture(scope="module")
 def campaigns():
     """Truths and outcomes."""
-    rows = [{"cell": f"cell {i}", "campaign": i % 3, **truth, **answer}
-            for i, (truth, answer) in enumerate(CASES)]  # fmt: skip
-    table = pd.DataFrame(rows)
-    return table.astype({name: TYPES[name] for name in table})
+    return table_of({"cell": f"cell {i}", "campaign": i % 3, **truth, **answer}
+                    for i, (truth, answer) in enumerate(CASES))  # fmt: skip
+
+
+CONFIG = HiddenConfig.model_validate(
+    {"study": "one", "seed": 1, "one": {"sizes": 25, "campaigns": 1}}
+)
+PAGE = SCORES["score"]["page"]
 
 
 @pytest.fixture(scope="module")
-def tables(campaigns):
-    limit = {"design": "spread-24", "approach": "robot", "mdb": 1.0, "mib": 2.0, "unit": "m/s^2",
-             "nearest": "warm_up", "lambda_mdb": 15.0, "lambda_mib": 50.0}  # fmt: skip
-    known = [{"what": what, **limit} for what in ("bias_drift", "quadratic_scale")]
-    return score_tables(campaigns, pd.DataFrame(known))
+def judged(campaigns):
+    """The judged campaigns, and the methods on them."""
+    return frames(campaigns, CONFIG)
+
+
+def rows_of(title, judged, key):
+    """A table of the page as a mapping of the cells of a column to rows."""
+    return table(PAGE[title], judged).set_index(key)
 
 
 ORIGIN = {"seed": 5, "version": "1.2", "commit": "abcdef012345+"}
@@ -144,6 +157,13 @@ def test_names_are_right_in_any_order_and_each_for_another_effect():
     assert not all_true([], [["a"]])
     assert not same_effects([], [])
     assert not all_true([["a"], ["b"]], [["a"]])
+
+
+@pytest.fixture(scope="module")
+def targets(judged):
+    """All rows of the targets, and of what stands beside them."""
+    both = (table(PAGE[title], judged) for title in ("Targets", "Beside the targets"))
+    return [row for part in both for row in part.to_dict("records")]
 
 
 @pytest.mark.parametrize(("figure", "cases", "wanted", "measured", "n", "met"), [
@@ -183,31 +203,25 @@ def test_names_are_right_in_any_order_and_each_for_another_effect():
     ("place right", "outside the catalogue, a place that can be learned, λ ≥ 150", "", 2 / 4, 4,
      ""),
 ])  # fmt: skip
-def test_targets(tables, figure, cases, wanted, measured, n, met):
-    table = tables["targets"]
-    (row,) = table[(table["figure"] == figure) & (table["cases"] == cases)].to_dict("records")
-    assert (row["wanted"], row["n"], row["met"]) == (wanted, n, met)
-    assert row["measured"] == pytest.approx(measured, nan_ok=True)
+def test_targets(targets, figure, cases, wanted, measured, n, met):
+    (row,) = [r for r in targets if (r["figure"], r["campaigns"]) == (figure, cases)]
+    assert (row.get("target", ""), row["n"], row.get("met", "")) == (wanted, n, met)
+    assert row["measured"] == share_text(measured)
     if n and "names" not in figure and "median" not in figure and "expect" not in figure:
         ends = clopper_pearson(round(measured * n), n)
-        assert (row["ci95_low"], row["ci95_high"]) == pytest.approx([float(end) for end in ends])
+        assert row["95 % interval"] == " … ".join(share_text(float(end)) for end in ends)
 
 
 def test_what_was_not_measured_is_not_met(campaigns):
-    table = score_tables(campaigns.query("set == 'one'"), NO_LIMITS)
-    row = table["targets"].query("figure == 'recognised'").iloc[0]
-    assert (row["met"], row["ci95_low"], row["ci95_high"]) == ("–", 0, 1)
+    rows = table(PAGE["Targets"], frames(campaigns.query("set == 'one'"), CONFIG))
+    row = rows[rows["figure"] == "recognised"].iloc[0]
+    assert (row["met"], row["95 % interval"], row["measured"]) == ("–", "", "–")
 
 
-NO_LIMITS = pd.DataFrame(
-    [{"what": "none", "design": "none", "approach": "none", "lambda_mdb": 1.0, "lambda_mib": 1.0}]
-)
-
-
-def test_every_line_of_the_table_is_known():
+def test_every_question_is_one_that_is_known():
     keys = {"figure", "campaigns", "set", "filter", "statistic", "of", "beside", "each", "least",
             "most", "below_oracle", "n"}  # fmt: skip
-    lines = [one for line in SCORE["targets"] for one in line.get("together", [line])]
+    lines = [*PAGE["Targets"]["targets"], *PAGE["Beside the targets"]["targets"]]
     assert len(lines) > 40
     assert all({"figure", "campaigns", "of"} <= line.keys() <= keys for line in lines)
 
@@ -215,10 +229,10 @@ def test_every_line_of_the_table_is_known():
 def test_the_interval_of_a_median_holds_it():
     """Of 40 exponential values: in 95 % of all samples, and not in many more."""
     values = np.random.default_rng(3).exponential(size=(400, 40))
-    ends = [_measured("median", x)[1:] for x in values]
+    ends = [statistic(np.sort(x), "median")[1:3] for x in values]
     inside = np.mean([low <= np.log(2) <= high for low, high in ends])
     assert inside == pytest.approx(0.96, abs=4 * np.sqrt(0.96 * 0.04 / 400))
-    assert np.isnan(_measured("median", np.array([1.0, 2.0]))[1])
+    assert np.isnan(statistic(np.array([1.0, 2.0]), "median").low)
 
 
 def test_what_noise_leaves_of_the_residuals_of_a_fit_with_a_prior():
@@ -249,78 +263,78 @@ def test_the_places_at_which_a_function_can_be_learned():
     assert places == set(LearnedShapes.of(frame).places)
 
 
-def test_the_place_of_what_is_learned(tables):
-    judged = tables["campaigns"].query("set == 'outside'")
-    told = judged[["learned", "has_place", "place_right", "place_wrong", "answered", "wrong"]]
-    yes, no, none = True, False, None
-    assert told.astype(object).where(told.notna(), None).to_numpy().tolist() == [
-        [no, no, none, none, yes, yes],
+def test_the_place_of_what_is_learned(judged):
+    rows = judged["campaigns"].query("set == 'outside'")
+    told = rows[["learned", "has_place", "place_right", "place_wrong", "answered", "wrong"]]
+    yes, no = True, False
+    assert told.to_numpy().tolist() == [
+        [no, no, no, no, yes, yes],
         *[[yes, yes, yes, no, no, no]] * 2,
         [yes, yes, no, yes, no, no],
         [no, yes, no, no, yes, yes],
-        [yes, no, none, none, no, no],
+        [yes, no, no, no, no, no],
         [yes, yes, no, yes, no, no],
         [no, yes, no, no, yes, yes],
     ]
-    explained = judged["explained"].to_numpy()
+    explained = rows["explained"].to_numpy()
     assert explained == pytest.approx(
         [np.nan, 0.9, 0.8, 0.8, np.nan, 0.3, 0.8, np.nan], nan_ok=True
     )
 
 
-def test_shares(tables):
-    judged = tables["campaigns"]
-    one = judged[judged["set"] == "one"]
-    alarms = shares(judged[judged["set"] == "null"], "alarm", "sigma").set_index("sigma")
-    assert alarms.loc["given", ["count", "n"]].tolist() == [2, 40]
-    # A place is only asked of what has one.
-    assert shares(judged, "place_right", "set").set_index("set").loc["outside", "n"] == 6
+def test_tables_of_shares(judged):
+    sizes = rows_of("One effect, over its size", judged, "λ")
     # Narrowed to a set that holds the truth is not wrong.
-    assert shares(one, "wrong", "size")["count"].tolist() == [0, 1]
-    assert shares(one, "oracle_found", "size")["share"].tolist() == [3 / 4, 1]
-    low, high = clopper_pearson([0, 1, 5], [10, 20, 5])
-    assert low == pytest.approx([0, 0.0012651, 0.4781762], abs=1e-6)
-    assert high == pytest.approx([0.3084971, 0.2487328, 1], abs=1e-6)
+    assert sizes["wrong"].tolist() == ["0.000", "0.50"]
+    assert sizes["oracle"].tolist() == ["0.75", "1.00"]
+    assert sizes.loc["25", "set holds the truth"] == "1.00"
+    verdicts = rows_of("Verdicts", judged, "campaigns")
+    assert [*verdicts.index] == [*dict.fromkeys(SCORES["score"]["sets"].values())][:-1]
+    assert verdicts.loc["gross errors", "gross error"] == "0.75"
+    effects = rows_of("Each effect", judged, "effect")
+    assert effects.loc["quadratic scale"].tolist() == ["0.33", "0.000", "0.67", "0.33"]
+    # Where its place is right, it is confirmed in one of two; of others it is not asked.
+    kinds = rows_of("What the catalogue lacks", judged, "kind")
+    assert kinds.loc["turn"].tolist() == [
+        "never in the catalogue", "–", "4", "0.25", "0.75", "0.50", "0.25", "0.50", "0.85"
+    ]  # fmt: skip
+    assert kinds.loc["fifth", ["place right", "confirmed"]].tolist() == ["–", "–"]
 
 
-def test_other_tables(tables):
-    confused = tables["confusion"].set_index(["truth", "answer"])["share"]
-    assert confused["slow change in time", "slow change in time"] == 1  # warm-up for a drift, too
-    assert confused["even nonlinearity", "nothing"] == 1 / 2
-    # Of all with a set, singles and pairs: three names of the first place are right in the end.
-    stated = tables["calibration"].set_index("of")
-    assert stated.loc["explanation", ["count", "n"]].tolist() == [3, 7]
-    assert stated.loc["explanation", "stated"] == pytest.approx(0.8)
-    assert stated.loc["set", ["count", "n"]].sum().tolist() == [4, 7]
-    table = tables["baselines"]
-    whole = table[table["size"].isna()].set_index(["method", "quantity"])["share"]
-    assert whole["F test"].to_dict() == pytest.approx(
-        {"detected": 1, "right": 2 / 6, "first right": 2 / 6, "wrong": 4 / 6}
-    )
-    assert whole["oracle", "right"] == pytest.approx(4 / 6)
-    assert whole["diagnosis", "right"] == pytest.approx(2 / 6)
-    limits = tables["limits"].set_index("what")
-    assert limits.loc["bias_drift", ["above_mdb", "above_mib"]].tolist() == [2, 0]
-    assert limits.loc["quadratic_scale", ["above_mib", "right"]].tolist() == [2, 0]
-    assert limits.loc["quadratic_scale", "detected"] == pytest.approx(1 / 3)
+def test_the_simpler_methods_beside_the_diagnosis(judged):
+    methods = rows_of("Simpler methods on the same campaigns", judged, "method")
+    assert [*methods.index] == ["diagnosis", "oracle", "F test"]
+    one = [name for name in methods if name.startswith("one")]
+    assert methods.loc["F test", one].tolist() == ["1.00", "0.33", "0.33", "0.67"]
+    assert methods.loc["oracle", "one: all names right"] == "0.67"
+    assert methods.loc["diagnosis", "one: all names right"] == "0.33"
+    assert methods.loc["F test", "false alarm"] == "–"
 
 
-def test_a_page_with_every_target_and_every_error(tables):
-    page = score_page(tables, pd.Series([0.1, 0.2, 0.3]), {"fingerprint": "0123", "origin": ORIGIN})
+def test_a_page_with_every_target_and_every_error(judged, targets):
+    made = {"fingerprint": "0123", "origin": ORIGIN}
+    page = score_page("score", judged, made)
     assert "configuration `0123`, seed 5, accelstudy 1.2, commit `abcdef0123`" in page
-    for row in tables["targets"].to_dict("records"):
-        wanted = f" {row['wanted']} |" if row["wanted"] else ""
-        assert f"| {row['figure']} | {row['cases']} |{wanted}" in page
+    for row in targets:
+        assert f"| {row['figure']} | {row['campaigns']} |" in page
     assert "| refused | 1 |" in page
-    assert (
-        "| never in the catalogue | turn | – | 4 | 0.25 | 0.75 | 0.50 | 0.25 | 0.50 | 0.85 |"
-        in page
-    )
     assert "nan" not in page
 
 
-def test_figures_of_much_and_of_nothing(tables):
-    empty = {name: table[:0] for name, table in tables.items()}
-    for made in (tables, empty):
-        for draw in figures(made).values():
-            assert draw().axes
+def test_the_sample_has_a_campaign_of_each_kind_or_size(judged):
+    sample = table(PAGE["A sample"], judged)
+    sets = judged["campaigns"].set_index("cell")["set"].loc[sample["cell"]]
+    assert sets.value_counts()["one"] == len({*judged["campaigns"].query("set == 'one'")["what"]})
+    assert sets.value_counts()["outside"] == 3
+
+
+def test_figures_of_much_and_of_nothing(judged):
+    empty = {name: rows[:0] for name, rows in judged.items()}
+    for made in (judged, empty):
+        drawn = {name: draw() for name, draw in figures("score", made).items()}
+        assert [*drawn] == [*SCORES["score"]["figures"]]
+        assert all(figure.axes for figure in drawn.values())
+    (ax,) = [ax for ax in figures("score", judged)["calibration"]().axes]
+    stated, true = ax.containers[0].lines[0].get_data()
+    assert stated == pytest.approx([0.8])  # of all with a set, three of seven
+    assert true == pytest.approx([3 / 7])

@@ -21,7 +21,7 @@ from studies.hidden.physics.kinds import Cause
 from studies.hidden.real_logs import BUMPED, PUT, Donor
 from studies.hidden.real_noise import LogCase, RealNoiseConfig
 from studies.hidden.scoring.judging import judge
-from studies.hidden.scoring.page import real_page
+from studies.hidden.scoring.page import frames, score_page
 
 G, SIZE, COUNT, SIGMA = 9.80665, 20, 26, 0.01
 CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/real-noise.yaml"))
@@ -78,7 +78,7 @@ def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
         assert abs(added).max() == 1
 
 
-def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
+def test_p_is_that_of_a_nested_fit(log, tmp_path):
     """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
     (row,) = of_log(log, (SQUARE, 0)).to_dict("records")
     rng = np.random.default_rng(SQUARE.seed(OURS.seed, 0))
@@ -103,9 +103,6 @@ def test_p_and_size_are_those_of_a_nested_fit(log, tmp_path):
     )
     # λ is what the effect alone adds to the sum of squares: 300 of the log's own variance.
     assert before / log.sigma**2 == pytest.approx(COUNT - 9 + 300, rel=0.3)
-    assert abs(row["known_ratio"] - 1) < 4 * row["known_sigma"]
-    sigma = np.sqrt(np.diag(np.linalg.inv(full.jac.T @ full.jac)) * after / (COUNT - 12))[9:]
-    assert (abs(full.x[9:] - one.parameters[0]) < 4 * sigma).all()
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +117,7 @@ def table(campaigns):
 
 def of_job(job):
     """Truths and answers of the campaigns of a job."""
-    return table_of(row_of(job, case, k)[0] for case, k in job.campaigns)
+    return table_of(row_of(job, case, k) for case, k in job.campaigns)
 
 
 def of_log(log, *campaigns, config=OURS):
@@ -137,14 +134,6 @@ def test_plain_effects_in_white_noise_are_found(table):
     assert said[f"{NAME}/thermal_bias/300/not recorded"] != "right name"
 
 
-def test_sizes_are_those_that_were_put_in(table):
-    sized = table[table["ratio"].notna()]
-    assert len(sized) >= 2
-    assert (abs(sized["ratio"] - 1) < 4.5 * sized["ratio_sigma"]).all()
-    known = table[table["known_ratio"].notna()]
-    assert (abs(known["known_ratio"] - 1) < 4.5 * known["known_sigma"]).all()
-
-
 def test_with_and_without_its_column_it_is_the_same_session(table):
     rows = table.set_index("cell")
     with_it, without = (
@@ -154,11 +143,17 @@ def test_with_and_without_its_column_it_is_the_same_session(table):
     assert with_it == without
 
 
-def test_the_page_counts_every_campaign_once(table):
-    page = real_page(OURS, table, {"fingerprint": "", "origin": ORIGIN})
+def test_the_page_counts_every_campaign_once(campaigns):
+    judged, made = frames(campaigns, OURS), {"fingerprint": "", "origin": ORIGIN}
+    page = score_page("real", judged, made)
     part = page.partition("## Each effect")[2].partition("##")[0]
-    rows = [line.split("|")[4].strip() for line in part.splitlines() if line.startswith("| ")]
-    assert sum(int(n) for n in rows[2:]) == (table["set"] != "null").sum()
+    rows = [line.split("|")[1:-1] for line in part.splitlines() if line.startswith("| ")][2:]
+    assert (
+        sum(int(n) for *_, n, _, _, _, _, _, _, _, _, _ in rows)
+        == (judged["campaigns"]["set"] != "null").sum()
+    )
+    for *_, n, a, b, c, d, e, f, g, h, _ in rows:
+        assert sum(map(int, (a, b, c, d, e, f, g, h))) == int(n)
     assert page.count(f"| {NAME} | nothing is missing | 2 |") == 1
 
 
@@ -232,7 +227,7 @@ def test_where_the_logs_are_changes_no_number():
 
 
 @needs_data
-def test_two_cases_of_a_real_log(tmp_path):
+def test_two_cases_of_a_real_log():
     """In the noise of an MPU-9150: a warm-up that is plain gets its name, and nothing gets none."""
     content = read_layer(ROOT / "studies/hidden/config/real-noise.yaml")
     logs = {"mpu9150-2": content["logs"]["mpu9150-2"]}
@@ -240,12 +235,11 @@ def test_two_cases_of_a_real_log(tmp_path):
         {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
          "effects": ["warm_up"]}
     )  # fmt: skip
-    judged = judge(of_job(config.job("mpu9150-2", tmp_path)))
+    judged = judge(of_job(config.job("mpu9150-2")))
     nothing, warm = judged.to_dict("records")
     assert nothing["said"] == "nothing"
     assert warm["said"] == "right name"
     assert warm["p_known"] < 1e-6
-    assert abs(warm["ratio"] - 1) < 4 * warm["ratio_sigma"]
 
 
 @needs_data

@@ -24,14 +24,14 @@ class Conditions:
 
     Attributes
     ----------
-    sensor : Sensor
+    session : Session; sensor : Sensor
     robot : bool, whether the readings of the encoders are used; else the norm of gravity is
     directions : (n, 3) array, unit vectors along the specific force
     absorbed : (m, 9) array, orthonormal, what the nine parameters of a calibration absorb
     """
 
     def __init__(self, session: Session, approach: str, sensor: Sensor) -> None:
-        self.sensor, self.robot = sensor, approach == "robot"
+        self.session, self.sensor, self.robot = session, sensor, approach == "robot"
         output, joints = (part[0] for part in observe(session, sensor, ()))
         correction = sensor.correction
         self.directions = (output - sensor.bias) @ correction.T / GRAVITY
@@ -137,12 +137,15 @@ class Atlas:
 
     Attributes
     ----------
-    session : Session
     conditions : Conditions, of an ideal sensor
     """
 
-    session: Session
     conditions: Conditions
+
+    @property
+    def session(self) -> Session:
+        """The session."""
+        return self.conditions.session
 
     def shape(self, effect: Kind, settings: Mapping[str, float]) -> Shape | None:
         """Shape of an effect with any settings; None if it cannot be seen."""
@@ -213,8 +216,7 @@ class Atlas:
 @cache
 def atlas(design: str, approach: str) -> Atlas:
     """The atlas of a design by an approach."""
-    ideal = session(design)
-    return Atlas(ideal, Conditions(ideal, approach, Sensor()))
+    return Atlas(Conditions(session(design), approach, Sensor()))
 
 
 def visible_effects(design: str, approach: str) -> tuple[str, ...]:

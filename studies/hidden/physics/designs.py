@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import permutations, product
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -233,114 +233,92 @@ def _by_hand(directions: Array, rng: np.random.Generator) -> Array:
     return rotated(directions, 0.03 * rng.standard_normal(directions.shape))
 
 
-def _times(n: int, hold: float, pause: float) -> Array:
-    return np.asarray(hold / 2 + (hold + pause) * np.arange(n), dtype=float)
+def _held(
+    directions: Array,
+    sigma: float,
+    samples: int = 0,
+    hold: float = 20.0,
+    pause: float | None = None,
+    wait: tuple[float, int] = (0.0, 1),
+    warms: Callable[[Array], Array] | tuple[float, ...] | None = None,
+    yaw: Array | None = None,
+    **more: Any,
+) -> Session:
+    """Session of holds of so many seconds with pauses; without a pause no time was written down.
 
-
-def _blocks(time: Array, values: tuple[float, ...]) -> Course:
-    """Equal blocks of holds, each at a temperature of its own, with the change between them."""
-    blocks = np.array_split(time, len(values))
-    edges = [edge for block in blocks for edge in (block[0], block[-1])]
-    return Course(np.array(edges), np.repeat(values, 2))
-
-
-def _smooth(time: Array, course: Callable[[Array], Array]) -> Course:
-    grid = np.linspace(0.0, time[-1] + 60.0, 200)
-    return Course(grid, course(grid))
+    `wait` is how long somebody waits between so many equal blocks of holds. The temperature is a
+    function of the time, or one for each block, and changes between them.
+    """
+    n, (between, blocks), course = len(directions), wait, None
+    time: Array | None = None
+    if pause is not None:
+        waited = between * np.repeat(np.arange(blocks), n // blocks)
+        time = np.asarray(hold / 2 + (hold + pause) * np.arange(n) + waited, dtype=float)
+    if callable(warms) and time is not None:
+        grid = np.linspace(0.0, time[-1] + 60.0, 200)
+        course = Course(grid, warms(grid))
+    elif isinstance(warms, tuple) and time is not None:
+        ends = [end for block in np.array_split(time, blocks) for end in (block[0], block[-1])]
+        course = Course(np.array(ends), np.repeat(warms, 2))
+    joints = joints_of(directions)
+    turned = np.zeros(n) if yaw is None else yaw
+    return Session("", joints, turned, sigma, ANGLE_SIGMA, samples, hold, time, course, **more)
 
 
 def _spread_24(rng: np.random.Generator) -> Session:
-    directions = rng.permutation(_spiral(24, rng))
-    time = _times(24, 30.0, 20.0)
-    course = _smooth(time, lambda t: 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170))
-    joints = joints_of(directions)
-    return Session("spread-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 3000, 30.0, time, course)
+    def warms(t: Array) -> Array:
+        return 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170)
+
+    return _held(rng.permutation(_spiral(24, rng)), 0.002, 3000, 30.0, 20.0, warms=warms)
 
 
 def _abba_48(rng: np.random.Generator) -> Session:
     one = rng.permutation(_spiral(12, rng))
-    joints = joints_of(np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)]))
-    time = _times(48, 20.0, 20.0) + 900.0 * np.repeat(np.arange(4), 12)
-    course = _blocks(time, (12.0, 34.0, 34.0, 12.0))
-    yaw = rng.uniform(-np.pi, np.pi, 48)
-    return Session("abba-48", joints, yaw, 0.001, ANGLE_SIGMA, 2000, 20.0, time, course)
-
-
-def _circles_24(rng: np.random.Generator) -> Session:
-    joints = joints_of(_three_circles())
-    return Session(
-        "circles-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA, 500, 10.0, _times(24, 10.0, 15.0)
-    )
-
-
-def _snub_24(rng: np.random.Generator) -> Session:
-    joints = joints_of(rng.permutation(_snub_cube()))
-    return Session("snub-24", joints, np.zeros(24), 0.002, ANGLE_SIGMA)
+    all_ = np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)])
+    warms, yaw = (12.0, 34.0, 34.0, 12.0), rng.uniform(-np.pi, np.pi, 48)
+    return _held(all_, 0.001, 2000, 20.0, 20.0, (900.0, 4), warms, yaw)
 
 
 def _hand_18(rng: np.random.Generator) -> Session:
-    joints = joints_of(_by_hand(_faces_and_edges(), rng))
-    return Session("hand-18", joints, rng.uniform(-0.5, 0.5, 18), 0.003, ANGLE_SIGMA, 400)
+    directions = _by_hand(_faces_and_edges(), rng)
+    return _held(directions, 0.003, 400, yaw=rng.uniform(-0.5, 0.5, 18))
 
 
 def _repeats_30(rng: np.random.Generator) -> Session:
+    def warms(t: Array) -> Array:
+        return 24 - 3 * np.cos(2 * np.pi * t / 1900)
+
     directions = rng.permutation(np.tile(_spiral(15, rng), (2, 1)))
-    time = _times(30, 60.0, 30.0)
-    course = _smooth(time, lambda t: 24 - 3 * np.cos(2 * np.pi * t / 1900))
-    return Session(
-        "repeats-30",
-        joints_of(directions),
-        rng.uniform(-np.pi, np.pi, 30),
-        0.0005,
-        ANGLE_SIGMA,
-        6000,
-        60.0,
-        time,
-        course,
-        vibration=0.1 + 1.4 * rng.random(30) ** 2,
-    )
+    yaw, vibration = rng.uniform(-np.pi, np.pi, 30), 0.1 + 1.4 * rng.random(30) ** 2
+    return _held(directions, 0.0005, 6000, 60.0, 30.0, warms=warms, yaw=yaw, vibration=vibration)
 
 
 def _yaw_50(rng: np.random.Generator) -> Session:
-    joints = joints_of(rng.permutation(_spiral(50, rng)))
-    yaw = rng.uniform(-np.pi, np.pi, 50)
-    return Session("yaw-50", joints, yaw, 0.003, ANGLE_SIGMA, 1000, 15.0, _times(50, 15.0, 12.0))
+    directions = rng.permutation(_spiral(50, rng))
+    return _held(directions, 0.003, 1000, 15.0, 12.0, yaw=rng.uniform(-np.pi, np.pi, 50))
 
 
 def _long_60(rng: np.random.Generator) -> Session:
+    def warms(t: Array) -> Array:
+        return 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310)
+
     directions = rng.permutation(np.tile(_by_hand(_spiral(20, rng), rng), (3, 1)))
-    time = _times(60, 20.0, 25.0)
-    course = _smooth(time, lambda t: 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310))
-    return Session(
-        "long-60",
-        joints_of(directions),
-        rng.uniform(-np.pi, np.pi, 60),
-        0.005,
-        ANGLE_SIGMA,
-        200,
-        20.0,
-        time,
-        course,
-        vibration=0.2 + 2.0 * rng.random(60),
-        full_range=19.6133,
-    )
+    yaw, vibration = rng.uniform(-np.pi, np.pi, 60), 0.2 + 2.0 * rng.random(60)
+    return _held(directions, 0.005, 200, 20.0, 25.0, warms=warms, yaw=yaw, vibration=vibration,
+                 full_range=19.6133)  # fmt: skip
 
 
 def _two_warm_36(rng: np.random.Generator) -> Session:
     one = _spiral(18, rng)
-    joints = joints_of(np.concatenate([rng.permutation(one), rng.permutation(one)]))
-    time = _times(36, 25.0, 10.0) + 1200.0 * np.repeat(np.arange(2), 18)
-    course = _blocks(time, (21.0, 38.0))
-    return Session(
-        "two-warm-36", joints, np.zeros(36), 0.002, ANGLE_SIGMA, 2500, 25.0, time, course
-    )
+    both = np.concatenate([rng.permutation(one), rng.permutation(one)])
+    return _held(both, 0.002, 2500, 25.0, 10.0, (1200.0, 2), (21.0, 38.0))
 
 
 _DESIGNS: dict[str, Callable[[np.random.Generator], Session]] = {
     "spread-24": _spread_24,
     "abba-48": _abba_48,
-    "circles-24": _circles_24,
-    "snub-24": _snub_24,
+    "circles-24": lambda rng: _held(_three_circles(), 0.002, 500, 10.0, 15.0),
+    "snub-24": lambda rng: _held(rng.permutation(_snub_cube()), 0.002),
     "hand-18": _hand_18,
     "repeats-30": _repeats_30,
     "yaw-50": _yaw_50,
@@ -356,7 +334,8 @@ APPROACHES = ("gravity", "robot")
 @cache
 def session(design: str) -> Session:
     """The session of a design; the same whenever it is asked for."""
-    return _DESIGNS[design](np.random.default_rng(zlib.crc32(design.encode())))
+    made = _DESIGNS[design](np.random.default_rng(zlib.crc32(design.encode())))
+    return replace(made, name=design)
 
 
 def in_turned_frame(vectors: Array, axis: int, angle: ArrayLike) -> Array:

@@ -14,21 +14,13 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.designs import GRAVITY, Array, Session
+from studies.hidden.physics.designs import GRAVITY, Array
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.gross import GROSS
-from studies.hidden.physics.kinds import Cause, Kind, Place
-from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
+from studies.hidden.physics.kinds import Cause, Place
+from studies.hidden.physics.measuring import Noise, Sensor, observe
 from studies.hidden.physics.oracle import Oracle, Verdict, oracle
-from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
-
-NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
-"""Effects that are not in the catalogue, by name."""
-
-
-def place_of(kind: str) -> Place | None:
-    """Coordinate and target of an effect that is not in the catalogue, if it has a place."""
-    return NOWHERE[kind].place if kind in NOWHERE else None
+from studies.hidden.physics.outside import NOWHERE
 
 
 @dataclass(frozen=True)
@@ -118,14 +110,12 @@ class Truth:
     effects : tuple of HiddenEffect
     classes : for each effect the names that mean the same in this campaign
     oracle : Verdict, what the oracle says; None where it is not asked
-    noise : dict with kind, name (in the catalogue) and settings
+    noise : dict with kind and settings
     gross : dict with name (empty for none) and settings
     sensor : dict with the parameters of the sensor
-    left : of an effect outside the catalogue: how much of its noncentrality the best effect of the
-        catalogue leaves, and the best two
     true_place : coordinate and target of an effect outside the catalogue; None where it has
         none, or where the campaign does not record its coordinate
-    seed : entropy and spawn key
+    p_known : float, of effects in a real log: p-value of an F test that knows their form
     """
 
     effects: tuple[HiddenEffect, ...] = ()
@@ -134,9 +124,8 @@ class Truth:
     noise: dict[str, Any] | None = None
     gross: dict[str, Any] = field(default_factory=lambda: {"name": "", "settings": {}})
     sensor: dict[str, list[float]] | None = None
-    left: tuple[float, ...] = ()
     true_place: Place | None = None
-    seed: tuple[int, ...] = ()
+    p_known: float = nan
 
 
 ARRIVAL = 5e-4
@@ -165,7 +154,7 @@ def generate(
     InputError
         If the design cannot see an effect that shall have a size.
     """
-    rng, entropy = np.random.default_rng(seed), np.asarray(seed.entropy)
+    rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
     planned = knowing.atlas.session
     # No joint comes to rest exactly where it was sent.
@@ -180,7 +169,7 @@ def generate(
     conditions = Conditions(session, case.approach, sensor)
     sizes = case.lam or (0.0,) * len(case.effect)
     known = [
-        (given or {}).get(name) or drawn(name, lam, session, conditions, knowing, rng)
+        (given or {}).get(name) or drawn(name, lam, conditions, knowing, rng)
         for name, lam in zip(case.effect, sizes, strict=True)
     ]
     causes = [cause for cause, _ in known]
@@ -213,16 +202,10 @@ def generate(
         effects=tuple(map(HiddenEffect.of, causes, sizes)),
         classes=tuple(same for _, same in known),
         oracle=knowing.judge(left_of(knowing.atlas, sensor, forces, reading), case.lam),
-        noise={
-            "kind": noise.kind,
-            "name": None if noise.kind is None else NOISES[noise.kind],
-            "settings": noise.settings,
-        },
+        noise=dict(vars(noise)),
         gross={"name": case.gross or "", "settings": settings},
         sensor={name: value.tolist() for name, value in vars(sensor).items()},
-        left=knowing.left(left_of(knowing.atlas, sensor, output, encoders)) if strange else (),
         true_place=strange.place if strange and strange.has_place(conditions.robot) else None,
-        seed=(*np.ravel(entropy).tolist(), *seed.spawn_key),
     )
     return campaign, truth
 
@@ -238,21 +221,16 @@ DRAWS = 200
 
 
 def drawn(
-    name: str,
-    lam: float,
-    session: Session,
-    conditions: Conditions,
-    knowing: Oracle,
-    rng: np.random.Generator,
-) -> tuple[Cause, tuple[str, ...]]:
+    name: str, lam: float, conditions: Conditions, knowing: Oracle, rng: np.random.Generator
+) -> Known:
     """Draw an effect, and say what means the same.
 
     Parameters
     ----------
     name : str, of an effect of the catalogue or outside it
     lam : float, its noncentrality; 0 for an effect of usual size, however little of it shows
-    session : Session, in which the joints stand where they really do
-    conditions : Conditions, of this session with the sensor that has the effect
+    conditions : Conditions, of a session in which the joints stand where they really do, with the
+        sensor that has the effect
     knowing : Oracle, of the design
 
     Returns
@@ -269,13 +247,13 @@ def drawn(
     effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
         parameters = effect.typical * rng.standard_normal((1, effect.k))
-        return Cause(effect, effect.settings.draw(session, rng), parameters), (name,)
+        return Cause(effect, effect.settings.draw(conditions.session, rng), parameters), (name,)
     if effect.shows(of_design.session):
         for _ in range(DRAWS):
             shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
             if shape is None:
                 continue
-            cause, change = _scaled(shape, lam, session, conditions, rng)
+            cause, change = _scaled(shape, lam, conditions, rng)
             if name in EFFECTS or knowing.is_outside(change):
                 return cause, of_design.same_as(shape)
     approach = "robot" if conditions.robot else "gravity"
@@ -286,11 +264,11 @@ def drawn(
 
 
 def _scaled(
-    shape: Shape, lam: float, session: Session, conditions: Conditions, rng: np.random.Generator
+    shape: Shape, lam: float, conditions: Conditions, rng: np.random.Generator
 ) -> tuple[Cause, Array]:
     """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
-    parameters = shape.drawn(rng)
-    cause = Cause(shape.effect, dict(shape.settings), shape.effect.typical * parameters[None])
+    session, typical = conditions.session, shape.effect.typical
+    cause = Cause(shape.effect, dict(shape.settings), typical * shape.drawn(rng)[None])
     without = conditions.misclosures(*observe(session, conditions.sensor, ()))
     for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
         with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))

@@ -113,10 +113,9 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
 def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:
     """Effects of the type with their typical parameters; sudden events have none."""
     knowing = oracle(case.design, case.approach)
-    session = knowing.atlas.session
-    conditions = Conditions(session, case.approach, Sensor())
+    conditions = Conditions(knowing.atlas.session, case.approach, Sensor())
     known = {
-        name: drawn(name, case.lam, session, conditions, knowing, rng)
+        name: drawn(name, case.lam, conditions, knowing, rng)
         for name, share in zip(case.effects, case.shares, strict=True)
         if share > 0
     }

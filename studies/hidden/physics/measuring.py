@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -101,6 +101,27 @@ COARSE_SAMPLES = 64
 """Samples that are drawn for the mean of a hold with coarse readings."""
 
 
+def _axis_factors(sigma: float, rng: np.random.Generator) -> dict[str, float]:
+    other = float(rng.choice([1 / rng.uniform(1.5, 2.5), rng.uniform(1.5, 3)]))
+    axis = rng.integers(3)
+    return {name: other if i == axis else 1.0 for i, name in enumerate("xyz")}
+
+
+_SETTINGS: Mapping[str, Callable[[float, np.random.Generator], dict[str, float]]] = {
+    # What disturbs the means may show within the holds, or not.
+    "level": lambda sigma, rng: {
+        "factor": rng.uniform(0.6, 0.8) if rng.random() < 0.4 else rng.uniform(1.25, 2.0),
+        "within": float(rng.random() < 0.5),
+    },
+    "axes": _axis_factors,
+    "tails": lambda sigma, rng: {"freedom": 4.0},
+    "autoregressive": lambda sigma, rng: {"correlation": rng.uniform(0.3, 0.9)},
+    "offsets": lambda sigma, rng: {"ratio": rng.uniform(0.7, 2.0)},
+    "coarse": lambda sigma, rng: {"step": sigma * rng.uniform(4.0, 12.0)},
+}
+"""Kind of wrong noise -> a draw of its settings, by the sigma of a position mean."""
+
+
 @dataclass(frozen=True)
 class Noise:
     """The noise of a session.
@@ -117,26 +138,7 @@ class Noise:
     @classmethod
     def drawn(cls, kind: str | None, session: Session, rng: np.random.Generator) -> Noise:
         """Draw the settings of a kind of noise."""
-        if kind is None:
-            return cls()
-        if kind == "level":
-            below = rng.random() < 0.4
-            factor = rng.uniform(0.6, 0.8) if below else rng.uniform(1.25, 2.0)
-            # What disturbs the means may show within the holds, or not.
-            return cls(kind, {"factor": factor, "within": float(rng.random() < 0.5)})
-        if kind == "axes":
-            factors = np.ones(3)
-            factors[rng.integers(3)] = rng.choice([1 / rng.uniform(1.5, 2.5), rng.uniform(1.5, 3)])
-            return cls(kind, dict(zip(("x", "y", "z"), factors.tolist(), strict=True)))
-        if kind == "tails":
-            return cls(kind, {"freedom": 4.0})
-        if kind == "autoregressive":
-            return cls(kind, {"correlation": rng.uniform(0.3, 0.9)})
-        if kind == "offsets":
-            return cls(kind, {"ratio": rng.uniform(0.7, 2.0)})
-        if kind == "coarse":
-            return cls(kind, {"step": session.sigma * rng.uniform(4.0, 12.0)})
-        raise ValueError(f"there is no kind of noise {kind!r}; there are {', '.join(NOISES)}")
+        return cls(kind, _SETTINGS[kind](session.sigma, rng)) if kind else cls()
 
     @property
     def axes(self) -> Array:

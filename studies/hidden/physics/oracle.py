@@ -9,7 +9,7 @@ most probable answer, which no method beats on average.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -19,8 +19,7 @@ from scipy.special import chdtrc, softmax
 
 from studies.hidden.physics.atlas import Atlas, atlas
 from studies.hidden.physics.designs import Array
-from studies.hidden.physics.kinds import Kind
-from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
+from studies.hidden.physics.outside import NOWHERE
 
 Class = tuple[str, ...]
 
@@ -78,15 +77,10 @@ class Oracle:
         """What each shape cannot be told from."""
         return tuple(self.atlas.same_as(shape) for shape in self.atlas.shapes)
 
-    def left(self, change: Array) -> tuple[float, float]:
-        """Noncentrality of misclosures (m,) that the best effect, and the best two, leave."""
-        size = float(change @ change)
-        one, two = np.max(self.atlas.parts(change)), np.max(self.pairs.parts(change))
-        return size - float(one), size - float(two)
-
     def is_outside(self, change: Array) -> bool:
         """Whether misclosures (m,) are not like those of any two effects of the catalogue."""
-        return self.left(change)[1] > OUTSIDE_SHARE * float(change @ change)
+        size = float(change @ change)
+        return size - float(np.max(self.pairs.parts(change))) > OUTSIDE_SHARE * size
 
     def judge(self, z: Array, sizes: Sequence[float]) -> Verdict:
         """Judge a campaign.
@@ -192,24 +186,15 @@ def oracle(design: str, approach: str) -> Oracle:
 @cache
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
     """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
-    return _not_imitated(oracle(design, approach), OUTSIDE)
-
-
-@cache
-def visible_unforeseen(design: str, approach: str) -> tuple[str, ...]:
-    """As `visible_outside`, of those that were invented last."""
-    return _not_imitated(oracle(design, approach), UNFORESEEN)
-
-
-def _not_imitated(knowing: Oracle, effects: Mapping[str, Kind]) -> tuple[str, ...]:
-    of_design, visible = knowing.atlas, []
-    for name, effect in effects.items():
-        if not effect.shows(of_design.session):
+    knowing, visible = oracle(design, approach), []
+    session = knowing.atlas.session
+    for name, effect in NOWHERE.items():
+        if not effect.shows(session):
             continue
         # No kind changes what another one draws.
         rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
         for _ in range(DRAWS):
-            shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
+            shape = knowing.atlas.shape(effect, effect.settings.draw(session, rng))
             if shape is not None:
                 direction = rng.standard_normal(shape.dim)
                 outside += knowing.is_outside(shape.basis @ direction)

@@ -10,28 +10,80 @@ had been written down first.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from studies.hidden.physics.designs import GRAVITY, Array, Session
-from studies.hidden.physics.kinds import (
-    PHASE,
-    SEED,
-    TURN,
-    Kind,
-    Settings,
-    before,
-    between,
-    cycles,
-    factor,
-    steps_of,
-    table,
-)
+from studies.hidden.physics.kinds import Kind, Place, Settings, steps_of, table, tilted
 from studies.hidden.physics.measuring import flange_force
 
 Drawn = Mapping[str, float]
-TIMED, SHAKEN, WARM = ("time",), ("vibration",), ("course",)
+TIMED, SHAKEN, WARM, WARMING = ("time",), ("vibration",), ("course",), ("warming",)
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "vibration": SHAKEN, "temperature": WARM, "time": TIMED, "dT/dt": WARMING,
+}  # fmt: skip
+"""Coordinate -> attributes of a session without which it does not exist; others always do."""
+FACTORS: Mapping[str, tuple[str, float, Callable[[Array, Array, Array], Array]]] = {
+    "bias": ("output", 5e-3, lambda p, f, h: p * h + np.zeros(f.shape)),
+    "scale": ("output", 5e-4, lambda p, f, h: p * h * f),
+    "tilt": ("tilt", 5e-4, lambda p, f, h: tilted(p * h)),
+    "reading": ("reading", 2e-4, lambda p, f, h: p * h),
+}
+"""Target of a function h of about 1 -> what it is in the rig, usual size, and the change."""
+
+
+def factor(
+    name: str,
+    coordinate: str,
+    target: str,
+    h: Callable[..., Array],
+    settings: Settings | None = None,
+    needs: tuple[str, ...] = (),
+) -> Kind:
+    """Kind by a function h of forces f, settings s and session x, a factor of its parameters.
+
+    It has a place if it is a function of one coordinate.
+    """
+    of_rig, typical, change = FACTORS[target]
+
+    def function(p: Array, f: Array, s: Mapping[str, float], x: Session) -> Array:
+        values = h(f, s, x)
+        return change(p, f, values[:, None] if values.ndim == 1 else values)
+
+    place = (coordinate, target) if coordinate else None
+    needs = needs or NEEDS.get(coordinate, ())
+    return Kind(name, of_rig, typical, function, needs, settings or Settings(), place)
+
+
+def before(values: Array) -> Array:
+    """Values (B, n, 3) of the hold before each; of the first one, 0."""
+    moved = np.zeros(values.shape)
+    moved[:, 1:] = values[:, :-1]
+    return moved
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+TURN = 2 * np.pi
+PHASE = Settings(lambda x, rng: {"phase": rng.uniform(0, TURN)})
+SEED = Settings(lambda x, rng: {"seed": float(rng.integers(1 << 31))})
+"""Of what is random in itself."""
+
+
+def cycles(*orders: float) -> Settings:
+    """A number of cycles per turn among some, with a phase."""
+    return Settings(
+        lambda x, rng: {"order": float(rng.choice(orders)), "phase": rng.uniform(0, TURN)}
+    )
+
+
+def between(**ranges: tuple[float, float]) -> Settings:
+    """Settings, each evenly between two bounds."""
+    return Settings(lambda x, rng: {name: rng.uniform(*ends) for name, ends in ranges.items()})
+
+
+# --- kinds ----------------------------------------------------------------------------------------
 
 RIPPLES = 2.5
 """Periods of a ripple in 1 g; fewer would look like two smooth effects of the catalogue."""
@@ -198,7 +250,6 @@ OUTSIDE = table(
 
 # --- unforeseen -----------------------------------------------------------------------------------
 
-WARMING = ("warming",)
 PLAY = 0.01
 """rad, a move of a joint that is too small to change the flank."""
 
@@ -295,3 +346,11 @@ UNFORESEEN = table(
     Kind("two_back", "output", 2e-3, _two_back),
 )  # fmt: skip
 """Name -> kind."""
+
+NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
+"""Effects that are not in the catalogue, by name."""
+
+
+def place_of(kind: str) -> Place | None:
+    """Coordinate and target of an effect that is not in the catalogue, if it has a place."""
+    return NOWHERE[kind].place if kind in NOWHERE else None

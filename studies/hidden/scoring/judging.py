@@ -1,4 +1,4 @@
-"""Each answer is judged by the truth of its campaign."""
+"""Each answer is judged by the truth of its campaign: a column for each question of a score."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ from collections.abc import Mapping, Sequence
 from itertools import permutations
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from accelstudy.effects import effect_names
 from studies.hidden.physics.designs import DESIGNS, session
 from studies.hidden.physics.oracle import CREDIBLE
+from studies.hidden.physics.outside import place_of
 from studies.hidden.study import Row, family_of
 
 Class = Sequence[str]
 """Names that mean the same in a campaign."""
 
-LISTS = ("classes", "found", "positions", "credible_set", "fits", "place", "true_place", "gross",
-         "oracle_best", "oracle_told")  # fmt: skip
-"""Columns of JSON that are judged."""
 LARGE = 150.0
 """λ from which on physics outside the catalogue must not get a name of the catalogue."""
 LEARNABLE: Mapping[str, Sequence[str]] = {
@@ -30,19 +29,14 @@ LEARNABLE: Mapping[str, Sequence[str]] = {
 }
 """Target -> coordinates of which the diagnosis can learn a function for it."""
 
+JSON = ("classes", "found", "positions", "credible_set", "fits", "place", "true_place", "gross",
+        "oracle_best", "oracle_told")  # fmt: skip
+"""Columns of a campaign that are judged."""
 VERDICTS = ("named", "narrowed", "learned", "unknown", "noise_model", "gross_error")
 """Verdicts that something is missing; the first two give effects."""
-QUESTIONS = (
-    "ok", "alarm", *VERDICTS, "answered", "right", "wrong", "one_of_two", "recognised", "one_name",
-    "set_given", "set_holds", "set_has_noise", "top_right", "has_oracle", "oracle_found",
-    "oracle_right", "told_right", "explanation_right", "has_place", "learnable", "place_right",
-    "place_wrong", "large",
-)  # fmt: skip
-"""What is asked of a campaign; missing where a question does not arise."""
-NUMBERS = ("set_names", "set_explanations", "set_posterior", "top_posterior", "explained")
 RIGHT, NEAR, OTHER, NONE = "right name", "family or set", "other name", "no answer"
-SAID = (RIGHT, NEAR, OTHER, "noise", "unknown", "learned", "nothing", NONE)
-"""What may be said of what is hidden."""
+P_CLASSES = {"> 0.01": 1.1, "10⁻⁴ … 0.01": 1e-2, "< 10⁻⁴": 1e-4}
+"""Classes of the p-value of the F test that knows the form, and their upper ends."""
 
 
 def same_effects(given: Sequence[Class], true: Sequence[Class]) -> bool:
@@ -61,121 +55,101 @@ def all_true(given: Sequence[Class], true: Sequence[Class]) -> bool:
 
 
 def judge(campaigns: pd.DataFrame, own: Mapping[str, Sequence[str]] | None = None) -> pd.DataFrame:
-    """Judge the answers to campaigns: the same with `QUESTIONS`, `NUMBERS`, and one of `SAID`.
+    """Judge the answers to campaigns.
 
     Parameters
     ----------
     campaigns : DataFrame, a row of truth and answer each
     own : of designs the names of what they have by themselves, which count neither as right nor as
         wrong
+
+    Returns
+    -------
+    DataFrame
+        The same with the answers to all questions; of a diagnosis that failed all are no
     """
-    rows = []
     records: Any = campaigns.to_dict("records")
-    for row in records:
-        for name in LISTS:
-            row[name] = json.loads(row[name]) if isinstance(row[name], str) else None
-        rows.append(_judged(_without(row, (own or {}).get(row["design"], ()))))
-    types = dict.fromkeys(QUESTIONS, "boolean") | dict.fromkeys(NUMBERS, "float64")
-    judged = pd.DataFrame(rows, columns=[*types, "said"]).astype({**types, "said": "string"})
-    return pd.concat(
-        [campaigns.reset_index(drop=True).astype({"confirmed": "boolean"}), judged], axis=1
-    )
+    rows = [_judged(row, (own or {}).get(row["design"], ())) for row in records]
+    names = ("set", "what", "design", "approach", "sigma", "verdict", "error")
+    told = campaigns.astype(dict.fromkeys(names, object) | {"oracle_alternatives": float})
+    judged = pd.DataFrame(rows, index=told.index)
+    return told.drop(columns="confirmed").join(judged)
 
 
-def _without(row: Row, own: Sequence[str]) -> Row:
-    """An answer without what a design has by itself."""
-    if not own or row["error"]:
-        return row
-    given = [*zip(row["found"], row["positions"], strict=True)]
-    rest = [(name, place) for name, place in given if name not in own]
-    explanations = [
-        {**one, "names": [name for name in one["names"] if name not in own]}
-        for one in row["credible_set"]
-    ]
-    only = row["verdict"] in ("named", "narrowed") and not rest
-    return {
-        **row,
-        "found": [name for name, _ in rest],
-        "positions": [place for _, place in rest],
-        "verdict": "no_effect" if only else row["verdict"],
-        "credible_set": [one for one in explanations if one["names"]],
-    }
-
-
-def _judged(row: Row) -> Row:
-    """Answers to all questions about a campaign; of a diagnosis that failed all are no."""
-    ok, true = not row["error"], row["classes"]
+def _judged(row: Row, own: Sequence[str]) -> Row:
+    """Answers to all questions about a campaign."""
+    for name in JSON:
+        row[name] = json.loads(row[name]) if isinstance(row[name], str) else None
+    ok, true, place = not row["error"], row["classes"], row["true_place"]
+    explanations = row["credible_set"] or []
+    given = [*zip(row["found"] or (), row["positions"] or (), strict=True)]
     verdict = row["verdict"] if ok else ""
-    names, explanations = [[name] for name in row["found"] or ()], row["credible_set"] or []
+    if own:
+        explanations = [
+            {**one, "names": names}
+            for one in explanations
+            if (names := [name for name in one["names"] if name not in own])
+        ]
+        given = [(name, position) for name, position in given if name not in own]
+        if verdict in ("named", "narrowed") and not given:
+            verdict = "no_effect"
+    row |= {"verdict": verdict, "found": [name for name, _ in given], "credible_set": explanations}
+    names = [[name] for name in row["found"]]
     hits = [same_effects([[name] for name in one["names"]], true) for one in explanations]
     in_set = {name for one in explanations for name in one["names"]}
-    answered = verdict in ("named", "narrowed")
+    answered, learned = verdict in ("named", "narrowed"), verdict == "learned"
     right, correct = answered and same_effects(names, true), answered and all_true(names, true)
-    place, given = row["true_place"], row["place"]
-    learned = verdict == "learned"
+    oracle = bool(true) and not pd.isna(row["oracle_detected"])
+    found = oracle and bool(row["oracle_detected"])
+    top: Row = explanations[0] if explanations else {"names": [], "posterior": np.nan}
+    true_noise = row["design"] in DESIGNS  # of a log it is not known
     judged = {
         "ok": ok,
         "alarm": ok and verdict != "no_effect",
+        "confirmed": ok and bool(row["confirmed"]),
         **{name: verdict == name for name in VERDICTS},
         "answered": answered,
         "right": right,
         # A narrowed answer only says that it is one of the set.
         "wrong": answered and not correct and not (verdict == "narrowed" and any(hits)),
         "one_of_two": correct and not right,
-        "recognised": _recognised(row) if row["gross_name"] else None,
+        "recognised": verdict == "gross_error" and _recognised(row, dict(given)),
         "one_name": len(names) == 1,
+        "large": row["size"] >= LARGE
+        and (row["sigma"] == "given" or (true_noise and session(row["design"]).repeats)),
+        "explained": explained(row["fits"], row["design"]) if learned and true_noise else np.nan,
         "set_given": bool(explanations),
-        "large": row["size"] >= LARGE and _noise_known(row),
-        "has_oracle": bool(true) and not pd.isna(row["oracle_detected"]),
+        "set_holds": any(hits),
+        "set_names": len(in_set),
+        "set_explanations": len(explanations),
+        "set_has_noise": bool(in_set - {*effect_names()}),
+        "set_posterior": sum(one["posterior"] for one in explanations),
+        "explanation": "+".join(top["names"]),
+        "top_posterior": top["posterior"],
+        "top_right": any(hits[:1]),
+        "has_oracle": oracle,
+        "oracle_found": found,
+        "oracle_right": found and same_effects(row["oracle_best"], true),
+        "told_right": oracle and same_effects(row["oracle_told"], true),
+        "its_place": ", ".join(place_of(row["what"]) or ("–",)),
         "has_place": place is not None,
-        # Of a log, no true noise is known.
-        "explained": explained(row["fits"], row["design"])
-        if learned and row["design"] in DESIGNS
-        else None,
+        "learnable": place is not None and place[0] in LEARNABLE.get(place[1], ()),
+        "place_right": learned and place is not None and row["place"] == place,
+        "place_wrong": learned and place is not None and row["place"] != place,
+        "its_column": "not recorded" if row.get("recorded") is False else "recorded",
+        "p_class": next((p for p, end in [*P_CLASSES.items()][::-1] if row["p_known"] < end), None),
     }
-    if explanations:
-        judged |= {
-            "set_holds": any(hits) if true else None,
-            "set_names": len(in_set),
-            "set_explanations": len(explanations),
-            "set_has_noise": bool(in_set - {*effect_names()}),
-            "set_posterior": sum(one["posterior"] for one in explanations),
-            "top_posterior": explanations[0]["posterior"],
-            "top_right": hits[0] if true else None,
-        }
-    if judged["has_oracle"]:
-        found = bool(row["oracle_detected"])
-        judged |= {
-            "oracle_found": found,
-            "oracle_right": found and same_effects(row["oracle_best"], true),
-            "told_right": same_effects(row["oracle_told"], true),
-            "explanation_right": any(hits[:1]),
-        }
-    if place is not None:
-        judged |= {
-            "learnable": place[0] in LEARNABLE.get(place[1], ()),
-            "place_right": learned and given == place,
-            "place_wrong": learned and given != place,
-        }
     return judged | {"said": _said(row, judged)}
 
 
-def _noise_known(row: Row) -> bool:
-    """Whether sigma is given, or repeated positions tell it."""
-    return row["sigma"] == "given" or (row["design"] in DESIGNS and session(row["design"]).repeats)
-
-
-def _recognised(row: Row) -> bool:
-    """Whether a gross error was recognised; one that ended the diagnosis was not."""
-    if row["error"] or row["verdict"] != "gross_error":
-        return False
-    places = dict(zip(row["found"], row["positions"], strict=True))
+def _recognised(row: Row, places: Mapping[str, float | None]) -> bool:
+    """Whether a gross error is named, and a bumped position where it is."""
     true, name = row["gross"].get("settings", {}).get("position"), row["gross_name"]
     return name in places and (true is None or places[name] == true)
 
 
 def _said(row: Row, judged: Row) -> str:
-    """What an answer says of what is hidden, one of `SAID`.
+    """What an answer says of what is hidden, in two or three words.
 
     "family or set": of two effects one; a set that holds the right names; other names of the same
     families; or a verdict "unknown" that leaves no doubt of such a family. Without its column, what
@@ -185,26 +159,25 @@ def _said(row: Row, judged: Row) -> str:
         return NONE
     if judged["right"] or judged["recognised"]:
         return RIGHT
-    verdict, recorded = row["verdict"], row.get("recorded")
-    if judged["one_of_two"] or (verdict == "narrowed" and judged.get("set_holds")):
+    verdict = row["verdict"]
+    if judged["one_of_two"] or (verdict == "narrowed" and judged["set_holds"]):
         return NEAR
-    families = [[kin for name in names for kin in _kin(name, recorded)] for names in row["classes"]]
+    slow = family_of("warm_up") if judged["its_column"] == "not recorded" else ()
+    heat = family_of("thermal_bias") if slow else ()
+    families = [
+        {kin for name in names for kin in (*family_of(name), *(slow if name in heat else ()))}
+        for names in row["classes"]
+    ]
     if verdict in ("named", "narrowed", "gross_error"):
         found = [[name] for name in row["found"]]
-        return NEAR if families and all_true(found, families) else OTHER
+        return NEAR if families and all_true(found, [[*family] for family in families]) else OTHER
     certain = [
-        sum(one["posterior"] for one in row["credible_set"] if {*one["names"]} & {*family})
+        sum(one["posterior"] for one in row["credible_set"] if family & {*one["names"]})
         for family in families
     ]
     if verdict == "unknown" and max(certain, default=0.0) >= CREDIBLE:
         return NEAR
     return str({"no_effect": "nothing", "noise_model": "noise"}.get(verdict, verdict))
-
-
-def _kin(name: str, recorded: object) -> tuple[str, ...]:
-    """Effects of the family of one, and of what it is where its column is missing."""
-    missing = recorded is False and name in family_of("thermal_bias")
-    return (*family_of(name), *(family_of("warm_up") if missing else ()))
 
 
 def explained(fits: Sequence[Mapping[str, float]], design: str) -> float:

@@ -1,11 +1,18 @@
-"""The tables of a score: shares of the judged campaigns, and what `score.yaml` asks for."""
+"""A score: what its YAML asks of judged campaigns, as a page in Markdown.
+
+Each question is put to some campaigns: to those of a `set` for which `filter` holds, for the share
+for which `of` does, or another `statistic` of it. Both are expressions over the columns of `judge`.
+`score.yaml` has the questions of the study of hidden effects, `real.yaml` those of the one with
+real noise.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,327 +20,177 @@ import yaml
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.basics.wording import number, words
-from accelstudy.diagnosis.visibility import POWER, examine_campaign, visibilities
-from accelstudy.effects import get_effect
-from accelstudy.sensors.models import get_model
-from studies.hidden.physics.generate import Case, generate
-from studies.hidden.scoring.judging import all_true, judge, same_effects
-from studies.hidden.study import HiddenConfig, Row
+from studies.hidden.study import Row
 
-Array = NDArray[np.float64]
-Tables = Mapping[str, pd.DataFrame]
-
-SCORE = yaml.safe_load((Path(__file__).parent / "score.yaml").read_text(encoding="utf-8"))
+HERE = Path(__file__).parent
+SCORES = {name: yaml.safe_load((HERE / f"{name}.yaml").read_text("utf-8"))
+          for name in ("score", "real")}  # fmt: skip
+SETS: Mapping[Any, str] = SCORES["score"]["sets"]
+Question = Mapping[str, Any] | str
 
 
-def score_tables(campaigns: pd.DataFrame, limits: pd.DataFrame) -> Tables:
-    """All tables of a score.
+class Measured(NamedTuple):
+    """What was measured of some campaigns, its 95 % interval, and the number of them."""
 
-    Parameters
-    ----------
-    campaigns : DataFrame, truths and outcomes side by side
-    limits : DataFrame, of `study_limits`
-    """
-    judged = with_limits(judge(campaigns), limits)
-    return {
-        "campaigns": judged,
-        "targets": targets(judged),
-        "confusion": confusion(judged),
-        "calibration": calibration(judged),
-        "baselines": baseline_table(judged),
-        "limits": limit_table(judged, limits),
-    }
+    value: float
+    low: float
+    high: float
+    n: int
 
 
-def shares(judged: pd.DataFrame, question: str, *by: str) -> pd.DataFrame:
-    """Share of campaigns of which the answer is yes, of those of which it is asked.
-
-    Parameters
-    ----------
-    judged : DataFrame, of `judge`
-    question : a column
-    by : columns that divide the campaigns
-
-    Returns
-    -------
-    DataFrame
-        `by`, count, n, share, ci95_low, ci95_high
-    """
-    asked = judged[judged[question].notna()].astype({question: int})
-    return with_intervals(asked.groupby([*by])[question].agg(count="sum", n="size").reset_index())
+def chosen(rows: pd.DataFrame, question: Mapping[str, Any]) -> pd.DataFrame:
+    """The campaigns that a question is put to."""
+    if "set" in question:
+        rows = rows[rows["set"] == question["set"]]
+    return rows.query(question["filter"], engine="python") if "filter" in question else rows
 
 
-def with_intervals(table: pd.DataFrame) -> pd.DataFrame:
-    """Add the share and its 95 % interval to a table of `count` and `n`."""
-    low, high = clopper_pearson(table["count"], table["n"])
-    share = table["count"] / table["n"].where(table["n"] > 0)
-    return table.assign(share=share, ci95_low=low, ci95_high=high)
+def measure(rows: pd.DataFrame, question: Question) -> Measured:
+    """Put a question, or the name of a column, to campaigns."""
+    question = {"of": question} if isinstance(question, str) else question
+    rows = chosen(rows, question)
+    values: Any = rows.eval(question["of"], engine="python") if len(rows) else []
+    x = np.sort(np.array(values, dtype=float))
+    return statistic(x[~np.isnan(x)], question.get("statistic", "share"))
 
 
-# --- what is wanted -------------------------------------------------------------------------------
+def statistic(x: NDArray[np.float64], name: str) -> Measured:
+    """Share, mean or median of sorted values; a mean that is `expected` has no interval."""
+    n, low, high = len(x), np.nan, np.nan
+    if name in ("mean", "expected", "median") and n:
+        value = float(np.median(x) if name == "median" else x.mean())
+        if name == "mean" and n > 1:
+            spread = sigmas_95(n - 1) * x.std(ddof=1) / np.sqrt(n)
+            low, high = value - spread, value + spread
+        # The interval of a median is between two order statistics.
+        if name == "median" and (k := int(binom.ppf(0.025, n, 0.5))):
+            low, high = x[k - 1], x[n - k]
+        return Measured(value, low, high, n)
+    low, high = map(float, clopper_pearson(x.sum(), n))
+    return Measured(float(x.sum() / n) if n else np.nan, low, high, n)
 
 
-def targets(judged: pd.DataFrame) -> pd.DataFrame:
-    """What `score.yaml` asks for, a row each.
-
-    Returns
-    -------
-    DataFrame
-        figure, cases (campaigns in words), wanted, least, most, measured, ci95_low, ci95_high, n,
-        met: "yes", "no", or "–" if nothing was measured; no target is wanted of what explains them
-    """
-    told = judged.astype({name: object for name in ("set", "sigma", "approach")})
-    yes = told.select_dtypes("boolean").fillna(value=False).astype(bool)
-    told[yes.columns] = yes
-    return pd.DataFrame([row for line in SCORE["targets"] for row in _lines(line, told)])
+# --- text -----------------------------------------------------------------------------------------
 
 
-def _lines(line: Mapping[str, Any], judged: pd.DataFrame) -> Iterator[Row]:
-    """Rows of a line: one, or some for each λ."""
-    together = line.get("together", [line])
-    of_set = judged if "set" not in together[0] else judged[judged["set"] == together[0]["set"]]
-    by_size = "together" in line or "each" in line
-    for size in sorted(of_set["size"].unique()) if by_size else [np.nan]:
-        part = of_set[of_set["size"] == size] if by_size else of_set
-        for one in together:
-            chosen = part.query(one["filter"], engine="python") if "filter" in one else part
-            row = _line(one, chosen, size)
-            # A line whose bounds are of some λ only leaves out the others.
-            if row["wanted"] or not {"least", "most"} & one.keys():
-                yield row
+def share_text(value: float) -> str:
+    """Write a share to two digits, or three decimals."""
+    return "–" if np.isnan(value) else f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
 
 
-def _line(line: Mapping[str, Any], part: pd.DataFrame, size: float) -> Row:
-    """What was measured of some campaigns, beside what is wanted."""
-    n, fewest = len(part), line.get("n", 0)
-    values: Any = part.eval(line["of"], engine="python") if n else []
-    measured, low, high = _measured(line.get("statistic", "share"), np.array(values, dtype=float))
-    least, most = (
-        bound.get(size) if isinstance(bound, dict) else bound
-        for bound in (line.get("least"), line.get("most"))
-    )
-    oracle = wanted = met = ""
-    if "beside" in line:
-        oracle = f" (oracle {part[line['beside']].mean():.1f})"
-    elif "below_oracle" in line:
-        best, below = part["oracle_right"].mean(), line["below_oracle"]
-        oracle = f" (oracle {best:.2f})" if least else f" (oracle {best:.2f} − {below:.2f})"
-        least = least or best - below
-    if least is not None or most is not None:
-        wanted = "–"
-        if n or not oracle:
-            wanted = _wanted(least, most, oracle) + (f", n ≥ {fewest}" if fewest else "")
-        within = (least or 0) - 1e-9 <= measured <= (np.inf if most is None else most) + 1e-9
-        met = "–" if np.isnan(measured) else "yes" if within and n >= fewest else "no"
-    return {
-        **{"figure": line["figure"], "cases": line["campaigns"].format(size=size)},
-        **{"wanted": wanted, "least": least, "most": most, "measured": measured},
-        **{"ci95_low": low, "ci95_high": high, "n": n, "met": met},
-    }
+def interval_text(measured: Measured) -> str:
+    """Write an interval, if there are any campaigns."""
+    low, high = map(share_text, measured[1:3])
+    return "" if not measured.n else "–" if low == "–" else f"{low} … {high}"
 
 
-def _wanted(least: float | None, most: float | None, oracle: str) -> str:
-    """Say what is wanted."""
-    if most is None:
-        return f"≥ {least:.2f}{oracle}"
-    if least is None:
-        return f"≤ {number(most)}{oracle}" if oracle else f"≤ {most:g}"
+def count_text(measured: Measured) -> str:
+    """Write how many campaigns there are of which it is so."""
+    return f"{measured.value * measured.n:.0f}" if measured.n else "0"
+
+
+def of_text(measured: Measured) -> str:
+    """Write of how many campaigns, of so many, it is so."""
+    return f"{count_text(measured)} of {measured.n}" if measured.n else "–"
+
+
+TEXTS = {"n": lambda measured: str(measured.n), "count": count_text, "of": of_text}
+"""How a question is answered in a cell of a table, if not by the share, the mean or the median."""
+
+
+def answer(rows: pd.DataFrame, question: Question) -> str:
+    """Answer a question in a cell of a table."""
+    shown = "" if isinstance(question, str) else question.get("statistic", "")
+    measured = measure(rows, question)
+    return TEXTS[shown](measured) if shown in TEXTS else share_text(measured.value)
+
+
+def label(value: Any) -> str:
+    """Write a cell that is no share: names, sets of them, a number or a yes."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return number(value)
+    if value is None or "/" in str(value):  # what identifies a campaign stays as it is
+        return str(value or "–")
+    if str(value).startswith("["):
+        names = [one if isinstance(one, str) else " = ".join(one) for one in json.loads(value)]
+        value = " + ".join(names) or "–"
+    return words(str(value))
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def table(section: Mapping[str, Any], frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """A table of a page as text: targets, a list of campaigns, or answers by groups of them."""
+    rows = chosen(frames[section.get("frame", "campaigns")], section)
+    if "targets" in section:
+        lines = [row for line in section["targets"] for row in target_rows(line, rows)]
+        kept = pd.DataFrame(lines)
+        return kept if kept["target"].any() else kept.drop(columns=["target", "met"])
+    if "list" in section:
+        if "sample" in section:
+            rows = sample(rows, section["sample"])
+        columns = section["list"].items()
+        return pd.DataFrame({head: rows[column].map(label) for head, column in columns})
+    heads, lines = [*section["by"]], []
+    for key, part in rows.groupby([*section["by"].values()], observed=True):
+        cells = [f"{one:g}" if isinstance(one, float) else label(SETS.get(one, one)) for one in key]
+        answers = {head: answer(part, one) for head, one in section["columns"].items()}
+        lines.append(dict(zip(heads, cells, strict=True)) | answers)
+    return pd.DataFrame(lines)
+
+
+def target_rows(line: Mapping[str, Any], rows: pd.DataFrame) -> Iterator[Row]:
+    """Rows of a target: one, or one for each λ; bounds that are of some λ leave out the others."""
+    of_set = rows[rows["set"] == line["set"]] if "set" in line else rows
+    for size in sorted(of_set["size"].unique()) if "each" in line else [np.nan]:
+        of_size = of_set[of_set["size"] == size] if "each" in line else of_set
+        asked, measured = chosen(of_size, line), measure(of_size, line)
+        fewest, oracle, target, met = line.get("n", 0), "", "", ""
+        least, most = (
+            bound.get(size) if isinstance(bound, dict) else bound
+            for bound in (line.get("least"), line.get("most"))
+        )
+        if "beside" in line:
+            oracle = f" (oracle {asked[line['beside']].mean():.1f})"
+        elif "below_oracle" in line:
+            best, below = asked["oracle_right"].mean(), line["below_oracle"]
+            oracle = f" (oracle {best:.2f})" if least else f" (oracle {best:.2f} − {below:.2f})"
+            least = least or best - below
+        if least is not None or most is not None:
+            target = bounds_text(least, most, oracle) + (f", n ≥ {fewest}" if fewest else "")
+            highest = np.inf if most is None else most
+            within = (least or 0) - 1e-9 <= measured.value <= highest + 1e-9
+            met = "yes" if within and measured.n >= fewest else "no"
+            if np.isnan(measured.value):
+                target, met = "–" if oracle else target, "–"
+        elif {"least", "most"} & line.keys():
+            continue
+        yield {
+            **{"figure": line["figure"], "campaigns": line["campaigns"].format(size=size)},
+            **{"target": target, "measured": share_text(measured.value)},
+            **{"95 % interval": interval_text(measured), "n": measured.n, "met": met},
+        }
+
+
+def bounds_text(least: float | None, most: float | None, oracle: str) -> str:
+    """Write what is wanted."""
+    if least is None or most is None:
+        digits = "g" if not oracle and least is None else ".2f"
+        return f"≥ {least:.2f}{oracle}" if most is None else f"≤ {most:{digits}}{oracle}"
     if least == most:
         return f"{most:.2f}"
     return f"{(least + most) / 2:.2f} ± {(most - least) / 2:.2f}"
 
 
-def _measured(statistic: str, values: Array) -> tuple[float, float, float]:
-    """Share, mean, or median of values, and its 95 % interval; a mean that is expected has none."""
-    n, x = len(values), np.sort(values)
-    if statistic == "share":
-        low, high = clopper_pearson(x.sum(), n)
-        return float(x.sum() / n) if n else np.nan, float(low), float(high)
-    if not n:
-        return np.nan, np.nan, np.nan
-    if statistic == "median":  # between two order statistics
-        k = int(binom.ppf(0.025, n, 0.5))
-        return float(np.median(x)), *((float(x[k - 1]), float(x[n - k])) if k else (np.nan, np.nan))
-    mean, spread = float(values.mean()), np.nan
-    if statistic == "mean" and n > 1:
-        spread = sigmas_95(n - 1) * x.std(ddof=1) / np.sqrt(n)
-    return mean, mean - spread, mean + spread
-
-
-# --- other tables ---------------------------------------------------------------------------------
-
-NAMELESS = {"no_effect": "nothing", "learned": "learned", "unknown": "unknown",
-            "noise_model": "noise", "gross_error": "gross error"}  # fmt: skip
-"""Verdicts that give no effect, and what they are called."""
-BINS = (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
-"""Bounds of the classes of stated probabilities."""
-
-
-def confusion(judged: pd.DataFrame) -> pd.DataFrame:
-    """What single effects of each family are taken for: truth, answer, count, n and share.
-
-    The answer is the family of the effect that is given first, or the verdict that gives none.
-    """
-    one = judged[(judged["set"] == "one") & judged["ok"]]
-    first = [
-        NAMELESS.get(verdict) or family_name(json.loads(found)[0])
-        for verdict, found in zip(one["verdict"], one["found"], strict=True)
-    ]
-    table = pd.DataFrame({"truth": one["what"].map(family_name), "answer": first})
-    counts = table.value_counts(sort=False).reset_index()
-    return with_intervals(counts.assign(n=counts.groupby("truth")["count"].transform("sum")))
-
-
-def family_name(name: str) -> str:
-    """Return the family of an effect or, where it has none, its name, in plain words."""
-    return get_effect(name).family or words(name)
-
-
-def calibration(judged: pd.DataFrame) -> pd.DataFrame:
-    """Stated probabilities, beside how often they come true.
-
-    Of campaigns with one or two effects in which something was found.
-
-    Returns
-    -------
-    DataFrame
-        of ("explanation": the most probable one, "set": one of the credible set), from and to
-        (bounds of the stated probability), stated (mean), count, n, share, ci95_low, ci95_high
-    """
-    hidden = judged[judged["set"].isin(["one", "two"]) & judged["set_given"]]
-    kinds = {"explanation": ("top_posterior", "top_right"), "set": ("set_posterior", "set_holds")}
-    tables = []
-    for kind, (stated, true) in kinds.items():
-        bin_ = np.clip(np.digitize(hidden[stated], BINS) - 1, 0, len(BINS) - 2)
-        groups = hidden.groupby(bin_).agg(
-            stated=(stated, "mean"), count=(true, "sum"), n=(true, "size")
-        )
-        low, high = (np.array(BINS)[groups.index + up] for up in (0, 1))
-        tables.append(groups.assign(of=kind, **{"from": low, "to": high}))
-    table = pd.concat(tables, ignore_index=True).astype({"count": int})
-    return with_intervals(table[["of", "from", "to", "stated", "count", "n"]])
-
-
-def baseline_table(judged: pd.DataFrame) -> pd.DataFrame:
-    """The simpler methods, the diagnosis and the oracle on the same campaigns.
-
-    Returns
-    -------
-    DataFrame
-        method, set, size (NaN: all), quantity ("detected", "right": all names and no other,
-        "first right": the strongest name, "wrong": some name), count, n, share, ci95_low, ci95_high
-    """
-    rows = []
-    for row in judged[judged["methods"] != "null"].to_dict("records"):
-        told = json.loads(row["methods"])
-        told["diagnosis"] = row["alarm"], json.loads(row["found"]) if row["answered"] else []
-        if not pd.isna(row["oracle_detected"]):
-            told["oracle"] = row["oracle_detected"], json.loads(row["oracle_best"])
-        true = json.loads(row["classes"])
-        for method, (detected, found) in told.items():
-            names = [[one] if isinstance(one, str) else one for one in found]
-            said = (bool(detected), same_effects(names, true), all_true(names[:1], true),
-                    bool(names) and not all_true(names, true))  # fmt: skip
-            rows.append((method, row["set"], row["size"], *said))
-    quantities = ("detected", "right", "first right", "wrong")
-    table = pd.DataFrame(rows, columns=["method", "set", "size", *quantities])
-    return pd.concat(
-        [
-            shares(table, quantity, *by).assign(quantity=quantity)
-            for by in (("method", "set", "size"), ("method", "set"))
-            for quantity in quantities
-        ],
-        ignore_index=True,
-    )
-
-
-# --- the smallest size that a design should show --------------------------------------------------
-
-ALPHA = 0.001
-"""Level of the tests for which the minimal detectable and identifiable sizes are computed."""
-EDGES = (0.4, 0.6, 0.75, 0.9, 1.1, 1.35, 1.7, 2.2, 3.0, 4.5, 7.0)
-"""Bounds of the classes of sizes relative to a limit."""
-PLACE = ["what", "design", "approach"]
-
-
-def study_limits(config: HiddenConfig) -> pd.DataFrame:
-    """Limits of all effects in each design and approach, from a campaign without any effect.
-
-    The minimal detectable and identifiable sizes are also given as noncentralities λ, which do not
-    depend on parameters and units. λ of the MDB is that of a test of one parameter. λ of the MIB is
-    larger by (MIB/MDB)², since the nearest rival has to be excluded as well.
-    """
-    model, rows = get_model(config.model), []
-    for design, approach in dict.fromkeys(place[:2] for place in config.places):
-        case = Case("null", design, approach, sigma_known=True)
-        campaign, _ = generate(case, case.seed(config.seed, 0))
-        rows += [
-            {"what": row.name, "design": design, "approach": approach, "mdb": row.mdb,
-             "mib": row.mib, "unit": row.unit, "nearest": next(iter(row.confused), ("",))[0]}
-            for row in visibilities(examine_campaign(campaign, model), ALPHA)
-            if row.status == "visible" and np.isfinite(row.mdb)
-        ]  # fmt: skip
-    limits, least = pd.DataFrame(rows), noncentrality(1, ALPHA, POWER)
-    ratio = limits["mib"] / limits["mdb"]
-    return limits.assign(lambda_mdb=least, lambda_mib=least * ratio**2)
-
-
-def with_limits(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
-    """Add by_mdb and by_mib, the sizes of single effects as multiples of their limits.
-
-    detected and identified say whether something is found from the MDB on, and the right name from
-    the MIB on; both should be so in 0.8 of the campaigns at least.
-    """
-    table = judged.merge(limits[[*PLACE, "lambda_mdb", "lambda_mib"]], on=PLACE, how="left")
-    one = table["set"] == "one"
-    for limit, answer, question in (("mdb", "alarm", "detected"), ("mib", "right", "identified")):
-        size = table["size"].where(one) / table.pop(f"lambda_{limit}")
-        table[f"by_{limit}"] = np.sqrt(size)
-        table[question] = table[answer].where(table[f"by_{limit}"] >= 1)
-    return table
-
-
-def limit_table(judged: pd.DataFrame, limits: pd.DataFrame) -> pd.DataFrame:
-    """Limits of each effect in each design, beside the power that the study finds there.
-
-    Parameters
-    ----------
-    judged : DataFrame, of `with_limits`
-    limits : DataFrame, of `study_limits`
-
-    Returns
-    -------
-    DataFrame
-        A row per effect, design, approach and noise: the columns of `limits`, and above_mdb,
-        detected, above_mib, right: campaigns from the limit on, and the share of them in which
-        something is found, or the name is right
-    """
-    one = judged[judged["by_mdb"].notna()]
-    counted = one.groupby([*PLACE, "sigma"]).agg(
-        above_mdb=("detected", "count"), detected=("detected", "mean"),
-        above_mib=("identified", "count"), right=("identified", "mean"),
-    )  # fmt: skip
-    return limits.merge(counted.reset_index(), on=PLACE)
-
-
-def power_over(judged: pd.DataFrame, limit: str, answer: str) -> pd.DataFrame:
-    """Share of campaigns with an answer, over their size beside a limit.
-
-    Parameters
-    ----------
-    judged : DataFrame, of `with_limits`
-    limit : str, "by_mdb" or "by_mib"
-    answer : str, a column of `judged`
-
-    Returns
-    -------
-    DataFrame
-        beside (geometric mean), count, n, share, ci95_low, ci95_high
-    """
-    class_ = pd.cut(judged[limit], EDGES, labels=False)
-    table = shares(judged.assign(class_=class_), answer, "class_")
-    beside = np.exp(np.log(judged[limit]).groupby(class_).mean())
-    return table.assign(beside=table["class_"].map(beside))
+def sample(rows: pd.DataFrame, by_kind: Sequence[str]) -> pd.DataFrame:
+    """A campaign of each size or, in some sets, of each kind, as good as at random."""
+    kind = rows["what"].where(rows["set"].isin(by_kind), rows["size"])
+    keys = rows["cell"] + " " + rows["campaign"].astype(str)
+    digest = keys.map(lambda key: hashlib.sha256(key.encode()).hexdigest())
+    mixed = rows.assign(kind=kind, digest=digest).sort_values("digest")
+    return mixed.drop_duplicates(["set", "kind"]).sort_values("cell", kind="stable")

@@ -4,4 +4,4 @@ from studies.hidden.campaigns import parse_hidden, run
 with job(snakemake) as provenance:
     config = parse_hidden(snakemake.config)
     provenance["config_hash"] = config.fingerprint
-    run(config.job(snakemake.wildcards.job, snakemake.input[0]), snakemake.output, provenance)
+    run(config.job(snakemake.wildcards.job), snakemake.output[0], provenance)

@@ -1,8 +1,8 @@
-from accelstudy.jobs import job, lists
+from accelstudy.jobs import job
 from studies.hidden.campaigns import parse_hidden
 from studies.hidden.scoring.page import write_score
 
 with job(snakemake) as provenance:
-    config, inputs = parse_hidden(snakemake.config), lists(snakemake.input)
+    config = parse_hidden(snakemake.config)
     provenance["config_hash"] = config.fingerprint
-    print(write_score(config, inputs, snakemake.output, provenance), end="")
+    print(write_score(config, snakemake.input, snakemake.output, provenance), end="")
