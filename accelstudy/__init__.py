@@ -28,7 +28,13 @@ if TYPE_CHECKING:
         export,
         read_calibration,
     )
-    from accelstudy.verbs.campaigns import find_holds, read_campaign, read_log, simulate_campaign
+    from accelstudy.verbs.campaigns import (
+        find_holds,
+        read_campaign,
+        read_log,
+        simulate_campaign,
+        write_campaign,
+    )
     from accelstudy.verbs.planning import advise, data_sheet, find_positions, plan, simulate
     from accelstudy.verbs.sensors import compare, history, lot
 
@@ -51,7 +57,9 @@ _PLACES = {
     "verbs.calibrations": (
         *("apply", "calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
     ),
-    "verbs.campaigns": ("find_holds", "read_campaign", "read_log", "simulate_campaign"),
+    "verbs.campaigns": (
+        *("find_holds", "read_campaign", "read_log", "simulate_campaign", "write_campaign"),
+    ),
     "verbs.planning": ("advise", "data_sheet", "find_positions", "plan", "simulate"),
     "verbs.sensors": ("compare", "history", "lot"),
 }
@@ -90,6 +98,7 @@ __all__ = [
     "run_study",
     "simulate",
     "simulate_campaign",
+    "write_campaign",
 ]
 
 

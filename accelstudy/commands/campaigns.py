@@ -182,12 +182,10 @@ APPLY = command(
 
 def run_data_sheet(source: Path, out: Path, force: bool, **given: Any) -> None:
     """Write a data sheet, and print what it says of a mean."""
-    from accelstudy.data_sheets.measured import yaml_of
-
     inputs = [source, *inputs_of(planning.data_sheet, given)]
     with new_file(out, inputs, force) as path, stage("Allan deviation"):
         sheet = planning.data_sheet(source, **given)
-        path.write_text(yaml_of(sheet), encoding="utf-8")
+        path.write_text(sheet.as_yaml, encoding="utf-8")
     for duration in (1.0, 10.0, 100.0) if sheet.position_sigma is None else ():
         sigma = 1e3 * sheet.sigma_mean(duration)
         click.echo(f"sigma of the mean of {duration:g} s: {sigma:.3g} mm/s²")

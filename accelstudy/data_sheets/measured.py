@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import yaml
 from pydantic import BaseModel
 from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import recorded_unit
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
 from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.data_sheets.sheet import FLICKER, QUANTITIES, DataSheet
+from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.epochs.history import YEAR
 from accelstudy.files.reading import read_json
@@ -94,17 +92,6 @@ def sheet_of_campaign(folder: str | Path) -> DataSheet:
         position_sigma=campaign.sigma_force,
         sources={"position_sigma": source},
     )
-
-
-def yaml_of(sheet: DataSheet) -> str:
-    """Write a data sheet as YAML for `read_data_sheet`; unknown quantities are comments."""
-    lines = yaml.safe_dump(sheet.content, sort_keys=False, allow_unicode=True, width=96)
-    rest = [
-        f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
-        for key in sheet.unknown
-    ]
-    more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
-    return lines + "\n".join(more) + "\n"
 
 
 def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:

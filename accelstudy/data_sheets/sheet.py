@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+import yaml
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, recorded_unit, to_recorded
+from accelstudy.files.outputs import new_file
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
@@ -116,6 +121,28 @@ class DataSheet:
                 "source": self.sources.get(key, ""),
             }
         return content
+
+    @property
+    def as_yaml(self) -> str:
+        """Text of a file for `read_data_sheet`; unknown quantities are comments."""
+        lines = yaml.safe_dump(self.content, sort_keys=False, allow_unicode=True, width=96)
+        rest = [
+            f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
+            for key in self.unknown
+        ]
+        more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
+        return lines + "\n".join(more) + "\n"
+
+    def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
+        """Write a YAML file for `plan` and `init`, as `accelstudy data-sheet` does.
+
+        Parameters
+        ----------
+        path : path
+        force : bool, whether to replace a file that is there
+        """
+        with new_file(Path(path), force=force) as file:
+            file.write_text(self.as_yaml, encoding="utf-8")
 
     def sigma_mean(self, seconds: float, session: float | None = None) -> float:
         """Standard deviation of the mean of a hold, m/s².

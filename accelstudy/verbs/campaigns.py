@@ -17,6 +17,7 @@ from accelstudy.verbs.kinds import (
     Delimiter,
     EffectName,
     File,
+    Force,
     Frame,
     GrossErrorName,
     ModelName,
@@ -197,6 +198,33 @@ def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Cam
     from accelstudy.campaign.format import read_campaign as read_folder
 
     return read_folder(path_of("folder", folder), plausible=plausible)
+
+
+@verb
+def write_campaign(
+    campaign: Campaign,
+    folder: str | PathLike[str],
+    *,
+    force: Force = False,
+    plausible: bool = True,
+) -> None:
+    """Write the folder of a campaign, which the commands take.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its `warnings` are not written.
+    folder : path
+        Made if it is not there.
+    plausible : bool
+        Whether data that cannot be right is refused, as by `read_campaign`.
+    """
+    from accelstudy.api.given import path_of
+    from accelstudy.campaign.format import write_campaign as write_folder
+    from accelstudy.files.outputs import CAMPAIGN, result_folder
+
+    with result_folder(path_of("folder", folder), CAMPAIGN, force=force) as part:
+        write_folder(campaign, part, plausible=plausible)
 
 
 @verb

@@ -16,7 +16,6 @@ from study_helpers import grid, run_study
 import accelstudy as acs
 from accelstudy.api.given import quantity
 from accelstudy.basics.units import UNITS, Given
-from accelstudy.campaign.format import write_campaign
 from accelstudy.drawing.style import STYLE
 from accelstudy.epochs.history import history_of
 from accelstudy.schemes import get_scheme
@@ -193,7 +192,7 @@ def test_every_calibration_of_a_study_is_in_a_dataset():
 
 def test_what_reading_refuses_is_diagnosed(tmp_path):
     given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
-    write_campaign(given, tmp_path, plausible=False)
+    acs.write_campaign(given, tmp_path, plausible=False)
     with pytest.raises(acs.InputError, match="look like g"):
         acs.read_campaign(tmp_path)
     assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
@@ -210,23 +209,17 @@ WRONG = {
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
     "acs.find_holds({'fx': 1})": "log: expected a path",
     "acs.find_holds(acs.read_log(table, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
-    "acs.find_holds(table, gravity='9.8 feet')": "gravity: '9.8 feet': the unit must be one of",
     "acs.read_campaign(None)": "folder: expected a path, not None",
     "acs.read_log(table.assign(note=[1, 'x'] * 6000))": "log: the DataFrame cannot be a log",
     "acs.find_holds(table / 9.8)": "DataFrame: which column is time?",
     "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g, not m/s^2; give `unit` g",
-    "acs.simulate_campaign(repeats='x')": "repeats: expected a whole number",
-    "acs.simulate_campaign(sigma='2 K')": "sigma: '2 K': the unit must be one of",
     "acs.simulate_campaign(effects=3)": "effects: expected the name of an effect",
-    "acs.simulate_campaign(temperature=20)": "temperature: expected two numbers, as 20:40, not 20",
     "acs.calibrate(3)": "campaign: expected a Campaign",
     "acs.diagnose({})": "campaign: expected a Campaign",
     "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, confidence=2)": "confidence: must be rms, or a share",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected the name of a scheme",
-    "acs.plan(tilt_accuracy=1e-4, sigma=1, holds='10')": "holds: expected a number with its unit",
-    "acs.plan(tilt_accuracy='10', sigma=0.002)": "tilt_accuracy: expected a number with its unit",
     "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",
     "acs.simulate('bias', 'mclaren-24', 'robot', sigma=None)": "sigma: expected a number",
     "acs.simulate('bias', [], 'robot', sigma=1e-3)": "scheme: none is given",

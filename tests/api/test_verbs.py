@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 import accelstudy as acs
-from accelstudy.campaign.format import write_campaign
 from accelstudy.files.tables import read_table
 
 KINDS = (
@@ -37,7 +36,7 @@ def folder(tmp_path_factory):
         campaign = acs.simulate_campaign(
             name=f"sensor-{i}", seed=i, scheme="fibonacci-24", effects=effects, sigma=0.002
         )
-        write_campaign(campaign, root / f"sensor-{i}")
+        acs.write_campaign(campaign, root / f"sensor-{i}")
     return root
 
 
@@ -146,7 +145,12 @@ def test_a_function_gives_what_its_command_writes(tmp_path):
 
     succeed("data-sheet", tmp_path / "found", "--out", tmp_path / "sheet.yaml")
     sheet = acs.data_sheet(tmp_path / "found")
-    assert yaml.safe_load((tmp_path / "sheet.yaml").read_text("utf-8")) == sheet.content
+    sheet.save(tmp_path / "function/sheet.yaml")
+    assert len({path.read_text() for path in tmp_path.rglob("sheet.yaml")}) == 1
+    acs.write_campaign(kept, tmp_path / "function/found")
+    with pytest.raises(acs.InputError, match="is not empty"):
+        acs.write_campaign(kept, tmp_path / "function/found")
+    assert acs.read_campaign(tmp_path / "function/found").forces.tolist() == kept.forces.tolist()
     said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
     advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")
     assert (said.strip(), advice.enough) == (advice.summary().strip(), True)

@@ -249,17 +249,10 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
 def test_a_bad_log_is_one_line(calibrations, tmp_path):
     calibration = calibrations["gravity"][1] / "calibration.json"
     log = tmp_path / "log.csv"
-    for content, words in (
-        (None, "no such file"),
-        ("", "the file is empty"),
-        ("fx,fy\n1,2\n", "two axes"),
-        ("fx,fy,fz\n1,2,x\n", "line 2, column fz (fz): 'x'"),
-    ):
-        if content is not None:
-            log.write_text(content, encoding="utf-8")
-        line = refusal("apply", calibration, log, "--out", tmp_path / "x.csv")
-        assert words in line
-        assert not (tmp_path / "x.csv").exists()
+    log.write_text("fx,fy,fz\n1,2,x\n", encoding="utf-8")
+    line = refusal("apply", calibration, log, "--out", tmp_path / "x.csv")
+    assert "line 2, column fz (fz): 'x'" in line
+    assert not (tmp_path / "x.csv").exists()
     log.write_text("1,2,9\n", encoding="utf-8")
     arguments = "apply", calibration, log, "--out", tmp_path / "x.csv"
     assert "--columns: expected fx=1" in call(*arguments, "--columns", "0,1,2").stderr

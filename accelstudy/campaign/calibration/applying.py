@@ -222,11 +222,6 @@ Ends = Annotated[
 ]
 
 
-class _Affine(BaseModel):
-    matrix: Regular
-    bias_mps2: Triple
-
-
 class _Mended(BaseModel):
     error: str
     reason: str
@@ -261,7 +256,6 @@ class _Document(BaseModel):
     sigmas_95: ParameterSigma | None = None
     parameters: list[_Parameter]
     covariance: list[list[Annotated[float, *within(VARIANCE)] | None]]
-    affine: _Affine | None
     log: LogLayout | None = None
     range_mps2: ParameterSigma | None = None
     mended: _Mended | None = None
