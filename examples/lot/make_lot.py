@@ -5,8 +5,7 @@ The bias of the type follows the temperature. Three sensors have something of th
 
 import numpy as np
 
-from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+import accelstudy as acs
 
 SENSORS = 50
 TYPE = {  # mean of the type, and scatter from sensor to sensor
@@ -28,7 +27,7 @@ for number in range(1, SENSORS + 2):
     if number in OWN:
         effects.append(OWN[number])
     next_one = number > SENSORS
-    settings = CampaignSettings(
+    campaign = acs.simulate_campaign(
         name="next" if next_one else f"sensor-{number}",
         seed=number,
         approach="gravity",
@@ -36,7 +35,6 @@ for number in range(1, SENSORS + 2):
         order="random",
         temperature=(22, 23) if next_one else (10, 40),
         temperature_order="random",
-        effects=tuple(effects),
+        effects=effects,
     )
-    campaign, _ = simulate_campaign(settings)
-    write_campaign(campaign, "next" if next_one else f"sensors/{number}")
+    acs.write_campaign(campaign, "next" if next_one else f"sensors/{number}")
