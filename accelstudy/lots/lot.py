@@ -147,7 +147,160 @@ def weigh_lot(
         If a campaign does not determine the model, or leaves no redundancy.
     """
     with _processes(cores, len(campaigns)) as mapped:
-        return _weigh_lot(campaigns, model, approach, seed, mapped)
+        sensors = _Sensors(campaigns, approach, seed, mapped)
+        n = len(campaigns)
+        passes, whole = [sensors.weighed([model] * n, model, [None] * n)], model
+        effects: list[tuple[Found, str | None]] = []
+        new = _new(passes[-1], whole, effects)
+        for _ in range(PASSES):
+            specs = passes[-1].specs(k for k, _ in new)
+            effects += [(one, specs.get(k)) for k, one in new]
+            whole = extended(whole, specs.values())
+            if (after := sensors.again(whole, passes)) is None:
+                break
+            passes.append(after)
+            if not (new := _new(after, whole, effects)):
+                break
+        nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
+        if not nameless and _explained(sensors, passes, whole, len(effects)):
+            return Lot(tuple(passes), whole, tuple(effects))
+    close = tuple(found.names for found, spec in effects if spec is not None)
+    return Lot(tuple(passes), model, close=close, explained=False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sensors:
+    """The campaigns of a lot, and how they are weighed: an approach, the draws, the processes."""
+
+    campaigns: Sequence[Campaign]
+    approach: Approach | None
+    seed: int
+    mapped: Callable[..., Iterator[Any]]
+
+    def again(self, whole: SensorModel, passes: Sequence[Pass]) -> Pass | None:
+        """Weigh all sensors with what was found, and with the noise that they tell together.
+
+        Parameters
+        ----------
+        whole : SensorModel, with what was found
+        passes : that found it, of which each sensor has its own times of what is sudden
+        """
+        own = [_own(whole, passes, i) for i in range(len(self.campaigns))]
+
+        def fitted(i: int, sigma: float | None = None) -> BaseFit | None:
+            campaign = self.campaigns[i]
+            if sigma is not None:
+                campaign = replace(campaign, sigma_force=sigma, sigma_dof=None)
+            with suppress(InputError):
+                return fit_base(campaign, own[i], self.approach or usual_approach(campaign))
+            return None
+
+        fits = [fitted(i) for i in range(len(own))]
+        # A campaign that does not determine the model says nothing of what else is missing.
+        models = [None if fit is None else fit.solution.model for fit in fits]
+        return self.weighed(models, whole, noises_of_lot(fits, fitted)) if any(models) else None
+
+    def weighed(
+        self,
+        models: Sequence[SensorModel | None],
+        whole: SensorModel,
+        noises: Sequence[SensorNoise | None],
+    ) -> Pass:
+        """Weigh everything that the models of all sensors may lack.
+
+        Parameters
+        ----------
+        models : of the sensors; None for one that its campaign does not determine
+        whole : SensorModel, of their mean
+        noises : of the sensors; None for one that speaks for itself
+        """
+        campaigns, n = self.campaigns, len(self.campaigns)
+        approaches, seeds = [self.approach] * n, range(self.seed, self.seed + n)
+        each = self.mapped(sensor_evidence, campaigns, models, approaches, seeds, noises)
+        sensors, anything = [], Anything()
+        # What noise alone would say is most of what a sensor gives, and is not kept.
+        for sensor, of_test in track(each, "evidence of the sensors", n):
+            sensors.append(replace(sensor, pair_specs={}))
+            anything.add(of_test.names, of_test.odds)
+
+        def retested(i: int) -> AnythingOdds:
+            return sensor_evidence(campaigns[i], models[i], self.approach, seeds[i], noises[i])[1]
+
+        now = Pass(tuple(sensors), anything, retested, noises=tuple(noises))
+        odd = {one.campaign for one in now.odd}
+        usual = [k for k, one in enumerate(sensors) if models[k] and one.campaign not in odd]
+        mean = None
+        # What happens to each sensor at a time of its own has no mean.
+        if not any(effect.sudden for effect in whole.effects):
+            of_mean = mean_sensor(
+                [campaigns[k] for k in usual],
+                [sensors[k] for k in usual],
+                [noises[k] for k in usual],
+            )
+            if of_mean is not None:
+                of_its_own = self.seed - 1 if self.seed else n
+                with suppress(InputError):  # the positions do not determine the model
+                    measured, noise = of_mean
+                    mean, _ = sensor_evidence(measured, whole, self.approach, of_its_own, noise)
+        # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
+        now = replace(
+            now,
+            sensors=tuple(replace(sensor, shown={}) for sensor in sensors),
+            mean=mean,
+            together=together([sensors[k] for k in usual]),
+        )
+        if len(usual) < 2 or not (shapes := now.strongest()):
+            return now
+        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
+        each = self.mapped(told, campaigns, models, approaches, noises, [specs] * n)
+        return replace(now, sizes=TypeSizes.of(list(each), specs, usual), shapes=shapes)
+
+
+def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
+    """Model of a sensor: what is sudden happened when the last pass that looked for it says."""
+    specs: dict[str, str] = {}
+    for one in passes:
+        specs |= one.sensors[i].specs
+    effects = [specs.get(e.name, e.spec) if e.sudden else e.spec for e in whole.effects]
+    return compose(whole.name, tuple(effects))
+
+
+def _new(
+    now: Pass, whole: SensorModel, effects: Sequence[tuple[Found, str | None]]
+) -> list[tuple[int, Found]]:
+    """What a pass found that neither the model nor an earlier pass has."""
+    known = {name for found, _ in effects for name in found.names}
+    return [
+        (k, one) for k, one in now.found if not _has(whole, one.names) and not known & {*one.names}
+    ]
+
+
+def _has(model: SensorModel, names: Sequence[str]) -> bool:
+    """Whether a model has one of some effects."""
+    return any(effect.name in names for effect in model.effects)
+
+
+def _explained(sensors: _Sensors, passes: Sequence[Pass], whole: SensorModel, known: int) -> bool:
+    """Whether what was found explains the lot, with the most probable of what is not sure."""
+    now = passes[-1]
+    while (rest := now.without_odd()).p_value < LEFT:
+        best = int(np.argmax(rest.given))
+        spec = rest.specs([best])
+        if is_noise(rest.classes[best][0]) or _has(whole, rest.classes[best]):
+            return True
+        if not spec or known >= PASSES:
+            return False
+        whole, known = extended(whole, spec.values()), known + 1
+        if (after := sensors.again(whole, passes)) is None:
+            return False
+        now = after
+    return True
+
+
+def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
+    """Model with further effects."""
+    effects = (*(effect.spec for effect in model.effects), *specs)
+    return compose(composition_name(compose("type", effects).effects), effects)
 
 
 @contextmanager
@@ -185,146 +338,3 @@ def _work(reads: int, writes: int) -> None:
         os._exit(1)
 
     Thread(target=wait, daemon=True).start()
-
-
-def _weigh_lot(
-    campaigns: Sequence[Campaign],
-    model: SensorModel,
-    approach: Approach | None,
-    seed: int,
-    mapped: Callable[..., Iterator[Any]],
-) -> Lot:
-    def weighed(
-        models: Sequence[SensorModel | None],
-        with_: SensorModel,
-        noises: Sequence[SensorNoise | None],
-    ) -> Pass:
-        n = len(campaigns)
-        seeds, of_its_own = range(seed, seed + n), seed - 1 if seed else n
-        each = mapped(sensor_evidence, campaigns, models, [approach] * n, seeds, noises)
-        sensors, anything = [], Anything()
-        # What noise alone would say is most of what a sensor gives, and is not kept.
-        for sensor, of_test in track(each, "evidence of the sensors", n):
-            sensors.append(replace(sensor, pair_specs={}))
-            anything.add(of_test.names, of_test.odds)
-
-        def retested(i: int) -> AnythingOdds:
-            return sensor_evidence(campaigns[i], models[i], approach, seeds[i], noises[i])[1]
-
-        now, mean = Pass(tuple(sensors), anything, retested, noises=tuple(noises)), None
-        odd = {one.campaign for one in now.odd}
-        usual = [k for k, one in enumerate(sensors) if models[k] and one.campaign not in odd]
-        of_mean = None
-        # What happens to each sensor at a time of its own has no mean.
-        if not any(effect.sudden for effect in with_.effects):
-            of_mean = mean_sensor(
-                [campaigns[k] for k in usual],
-                [sensors[k] for k in usual],
-                [noises[k] for k in usual],
-            )
-        if of_mean is not None:
-            with suppress(InputError):  # the positions do not determine the model
-                mean, _ = sensor_evidence(of_mean[0], with_, approach, of_its_own, of_mean[1])
-        joint = together([sensors[k] for k in usual])
-        # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
-        kept = tuple(replace(sensor, shown={}) for sensor in sensors)
-        now = replace(now, sensors=kept, mean=mean, together=joint)
-        if len(usual) < 2 or not (shapes := now.strongest()):
-            return now
-        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
-        each = mapped(told, campaigns, models, [approach] * n, noises, [specs] * n)
-        return replace(now, sizes=TypeSizes.of(list(each), specs, usual), shapes=shapes)
-
-    def again(with_: SensorModel) -> Pass | None:
-        own = [_own(with_, passes, i) for i in range(len(campaigns))]
-
-        def refit(i: int, sigma: float) -> BaseFit | None:
-            measured = replace(campaigns[i], sigma_force=sigma, sigma_dof=None)
-            return _fitted(measured, own[i], approach)
-
-        fits = [_fitted(one, of_it, approach) for one, of_it in zip(campaigns, own, strict=True)]
-        # A campaign that does not determine the model says nothing of what else is missing.
-        models = [None if fit is None else fit.solution.model for fit in fits]
-        if not any(models):
-            return None
-        return weighed(models, with_, noises_of_lot(fits, refit))
-
-    passes: list[Pass] = []
-    now, whole = weighed([model] * len(campaigns), model, [None] * len(campaigns)), model
-    passes.append(now)
-    effects: list[tuple[Found, str | None]] = []
-    new = _new(now, whole, effects)
-    for _ in range(PASSES):
-        specs = now.specs(k for k, _ in new)
-        effects += [(one, specs.get(k)) for k, one in new]
-        whole = extended(whole, specs.values())
-        if (after := again(whole)) is None:
-            break
-        now = after
-        passes.append(now)
-        if not (new := _new(now, whole, effects)):
-            break
-    nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
-    explained = not nameless and _explained(now, whole, again, len(effects))
-    if not explained:
-        close = tuple(found.names for found, spec in effects if spec is not None)
-        return Lot(tuple(passes), model, close=close, explained=False)
-    return Lot(tuple(passes), whole, tuple(effects))
-
-
-def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
-    """Model of a sensor: what is sudden happened when the last pass that looked for it says."""
-    specs: dict[str, str] = {}
-    for one in passes:
-        specs |= one.sensors[i].specs
-    effects = [specs.get(e.name, e.spec) if e.sudden else e.spec for e in whole.effects]
-    return compose(whole.name, tuple(effects))
-
-
-def _fitted(campaign: Campaign, model: SensorModel, approach: Approach | None) -> BaseFit | None:
-    """Calibrate a sensor; None if it does not determine the model."""
-    with suppress(InputError):
-        return fit_base(campaign, model, approach or usual_approach(campaign))
-    return None
-
-
-def _new(
-    now: Pass, whole: SensorModel, effects: Sequence[tuple[Found, str | None]]
-) -> list[tuple[int, Found]]:
-    """What a pass found that neither the model nor an earlier pass has."""
-    known = {name for found, _ in effects for name in found.names}
-    return [
-        (k, one) for k, one in now.found if not _has(whole, one.names) and not known & {*one.names}
-    ]
-
-
-def _has(model: SensorModel, names: Sequence[str]) -> bool:
-    """Whether a model has one of some effects."""
-    return any(effect.name in names for effect in model.effects)
-
-
-def _explained(
-    now: Pass,
-    whole: SensorModel,
-    again: Callable[[SensorModel], Pass | None],
-    known: int,
-) -> bool:
-    """Whether what was found explains the lot, with the most probable of what is not sure."""
-    while (rest := now.without_odd()).p_value < LEFT:
-        best = int(np.argmax(rest.given))
-        spec = rest.specs([best])
-        if is_noise(rest.classes[best][0]) or _has(whole, rest.classes[best]):
-            return True
-        if not spec or known >= PASSES:
-            return False
-        whole, known = extended(whole, spec.values()), known + 1
-        if (after := again(whole)) is None:
-            return False
-        now = after
-    return True
-
-
-def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
-    """Model with further effects."""
-    effects = (*(effect.spec for effect in model.effects), *specs)
-    return compose(composition_name(compose("type", effects).effects), effects)
