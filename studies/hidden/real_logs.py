@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -216,43 +215,23 @@ def residuals(atlas: Atlas, forces: Array) -> Array:
     return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
-class Shown(NamedTuple):
-    """Effects in the holds of a log that was imported with them, all of unit weight.
+def p_value(log: Donor, z: Array, shapes: Sequence[Shape], holds: int) -> float:
+    """p-value of an F test that knows the form of effects, of two that of the less certain one.
 
-    Attributes
+    Parameters
     ----------
-    atlas : Atlas, of the holds
-    residuals : (m,) array, of a calibration
-    shapes : tuple of Shape, of each effect
-    p : float, by an F test that knows the form: of two effects that of the one that is less certain
+    log : Donor, of which so many holds are left
+    z : (m,) array, residuals of a calibration with the effects
+    shapes : what each of them leaves in the holds
     """
-
-    atlas: Atlas
-    residuals: Array
-    shapes: tuple[Shape, ...]
-    p: float
-
-
-def shown(
-    log: Donor, spans: Spans, course: Course | None, causes: Sequence[Cause], forces: Array
-) -> Shown:
-    """Show effects in holds with forces (n, 3).
-
-    Raises
-    ------
-    InputError
-        If the holds cannot show them.
-    """
-    atlas = log.atlas(spans, course, log.sigma)
-    shapes = tuple(log.shape(cause.kind, cause.settings, atlas, spans)[1] for cause in causes)
-    z, p = residuals(atlas, forces), 0.0
+    p = 0.0
     for shape in shapes:
         others = [one.basis for one in shapes if one is not shape]
         beside = np.concatenate([np.zeros((len(z), 0)), *others], axis=1)
         left = z - beside @ (beside.T @ z)
         basis = np.linalg.qr(shape.basis - beside @ (beside.T @ shape.basis))[0]
         gain, d = float(np.sum((left @ basis) ** 2)), basis.shape[1]
-        dof = log.redundancy - (len(log.spans) - len(spans)) - beside.shape[1] - d
+        dof = log.redundancy - (len(log.spans) - holds) - beside.shape[1] - d
         variance = (float(left @ left) - gain) / dof
         p = max(p, float(special.fdtrc(d, dof, gain / d / variance)))
-    return Shown(atlas, z, shapes, p)
+    return p

@@ -26,7 +26,7 @@ from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Re
 from studies.hidden.physics.designs import Array, Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.oracle import Oracle
-from studies.hidden.real_logs import BUMPED, PUT, Donor, shown, spans_of
+from studies.hidden.real_logs import BUMPED, PUT, Donor, p_value, residuals, spans_of
 from studies.hidden.study import Job, Study
 
 FEWEST = 5
@@ -153,8 +153,10 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tupl
     truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
     if not causes:
         return campaign, truth
-    found = shown(log, spans, course, causes, campaign.forces)
-    truth = replace(truth, p_known=found.p)
+    atlas = log.atlas(spans, course, log.sigma)
+    shapes = [log.shape(one.kind, one.settings, atlas, spans)[1] for one in causes]
+    z = residuals(atlas, campaign.forces)
+    truth = replace(truth, p_known=p_value(log, z, shapes, len(spans)))
     if BUMPED in case.effect:
         # The hold in which the bumped one lies, whatever its number became.
         middle = np.mean(log.spans[int(causes[0].settings["row"])])
@@ -162,9 +164,8 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tupl
         gross = {"name": BUMPED, "settings": {"position": place[0] if place else None}}
         truth = replace(truth, gross=gross)
     else:
-        said = Oracle(found.atlas).judge(found.residuals, case.lam)
-        classes = tuple(map(found.atlas.same_as, found.shapes))
-        truth = replace(truth, classes=classes, oracle=said)
+        said = Oracle(atlas).judge(z, case.lam)
+        truth = replace(truth, classes=tuple(map(atlas.same_as, shapes)), oracle=said)
     return campaign, truth
 
 
