@@ -107,7 +107,7 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 
 # Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs
 real-noise: $(READY) ## put known effects into public logs, find them again, and take the score into docs
-	snakemake --cores $(CORES) --snakefile studies/hidden/real_noise.smk --config public_folder=$(FOLDER)
+	snakemake --cores $(CORES) --snakefile studies/hidden/hidden.smk --configfile studies/hidden/config/real-noise.yaml --config public_folder=$(FOLDER)
 	cp results/real-noise/score.md docs/guides/real-noise-score.md
 
 pictures: reproduce ## make the pictures of reports, studies and tutorials in docs anew

@@ -1,12 +1,62 @@
-# Simulate campaigns with hidden effects, diagnose each, and score the diagnoses:
-# snakemake --cores 2 --snakefile studies/hidden/hidden.smk
-configfile: "studies/hidden/config/hidden-effects.yaml"
+# Both studies: their jobs make campaigns and diagnose them, and a score judges the answers. The simulated
+# one, and known effects in the readings of public logs:
+# snakemake --cores 2 --snakefile studies/hidden/hidden.smk --configfile studies/hidden/config/hidden-effects.yaml
+# snakemake --cores 2 --snakefile studies/hidden/hidden.smk --configfile studies/hidden/config/real-noise.yaml
+from studies.hidden.campaigns import parse_hidden
 
 
-include: "rules.smk"
+include: "../../workflow/rules/start.smk"
 
 
-rule hidden_effects:
+STUDY, RESULTS = configured(
+    parse_hidden, "study", "name a study: --configfile studies/hidden/config/hidden-effects.yaml"
+)
+VERSION = code_version(workflow.basedir)
+# That of the diagnoses, which take hours: to score them in another way does not run them anew.
+UNUSED = "api commands drawing epochs lots pages planning sequential study/figures study/explorer"
+DIAGNOSING = code_version(
+    workflow.basedir, without=[*UNUSED.split(), f"{workflow.basedir}/scoring"]
+)
+# What the jobs use of it; where the logs are does not matter.
+DIAGNOSED = STUDY.model_dump(mode="json", exclude={"study", "public_folder"})
+
+
+wildcard_constraints:
+    job=one_of(STUDY.jobs),
+
+
+rule hidden_diagnose:
+    output:
+        f"{RESULTS}/campaigns/{{job}}.parquet",
+    log:
+        f"{RESULTS}/logs/{{job}}.log",
+    conda:
+        "../../workflow/envs/accelstudy.yaml"
+    params:
+        spec=DIAGNOSED,
+        version=DIAGNOSING,
+    message:
+        "Make and diagnose the campaigns of {wildcards.job}"
+    script:
+        "scripts/diagnose.py"
+
+
+rule hidden_score:
     default_target: True
     input:
-        rules.hidden_score.output.page,
+        expand(rules.hidden_diagnose.output, job=STUDY.jobs),
+    output:
+        campaigns=f"{RESULTS}/campaigns.parquet",
+        figures=directory(f"{RESULTS}/figures"),
+        page=f"{RESULTS}/score.md",
+    log:
+        f"{RESULTS}/logs/score.log",
+    conda:
+        "../../workflow/envs/accelstudy.yaml"
+    params:
+        spec=DIAGNOSED,
+        version=VERSION,
+    message:
+        "Score the diagnoses of all campaigns"
+    script:
+        "scripts/score.py"

@@ -264,7 +264,9 @@ def test_the_score_is_that_of_the_study():
 
 
 def test_the_workflow_makes_each_log_and_the_score(tmp_path):
-    words = ["--snakefile", ROOT / "studies/hidden/real_noise.smk", "--dry-run", "--configfile"]
-    text = snakemake(tmp_path, *words, ROOT / "studies/hidden/config/real-noise.yaml").stdout
+    words = ["--snakefile", ROOT / "studies/hidden/hidden.smk", "--dry-run"]
+    given = ["--configfile", ROOT / "studies/hidden/config/real-noise.yaml"]
+    text = snakemake(tmp_path, *words, *given).stdout
     assert re.search(rf"hidden_diagnose +{len(CONFIG.logs)}\n", text)
     assert re.search(r"hidden_score +1\n", text)
+    assert "name a study: --configfile" in snakemake(tmp_path, *words).stdout

@@ -22,7 +22,7 @@ def rules(*files):
 
 WORKFLOW = ROOT / "workflow"
 STUDY = rules(*(WORKFLOW / name for name in INCLUDED.findall((WORKFLOW / "Snakefile").read_text())))
-HIDDEN = rules(ROOT / "studies" / "hidden" / "rules.smk")
+HIDDEN = rules(ROOT / "studies" / "hidden" / "hidden.smk")
 
 
 def profile(name):

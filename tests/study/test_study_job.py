@@ -128,7 +128,7 @@ print([name for name in sys.modules if name.startswith(tuple(f"accelstudy.{{x}}"
 
 @pytest.mark.parametrize(("snakefile", "list_of_rooms", "modules"), [
     ("workflow/Snakefile", "NO_NUMBERS", "accelstudy.study.results, accelstudy.study.sensitivity"),
-    ("studies/hidden/rules.smk", "UNUSED", "studies.hidden.campaigns"),
+    ("studies/hidden/hidden.smk", "UNUSED", "studies.hidden.campaigns"),
 ])  # fmt: skip
 def test_numbers_hang_on_no_code_that_their_version_leaves_out(snakefile, list_of_rooms, modules):
     text = (ROOT / snakefile).read_text(encoding="utf-8")

@@ -309,7 +309,7 @@ def test_truncated_estimates(finished):
     ("workflow/campaigns.smk", "config/campaigns"),
     ("workflow/diagnose.smk", "config/diagnose-example"),
     ("studies/hidden/hidden.smk", "studies/hidden/config/hidden-effects"),
-    ("studies/hidden/real_noise.smk", "studies/hidden/config/real-noise"),
+    ("studies/hidden/hidden.smk", "studies/hidden/config/real-noise"),
 ])  # fmt: skip
 def test_lint(snakefile, config, tmp_path):
     given = ["--snakefile", ROOT / snakefile, "--configfile", ROOT / f"{config}.yaml"]
