@@ -25,10 +25,9 @@ APART = 100
 FINE = 1 / 16
 """Step of the number of periods that are tried."""
 TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
-         4: "four times per turn", 5: "five times per turn", 6: "six times per turn"}  # fmt: skip
+         4: "four times per turn"}  # fmt: skip
 """Harmonics of an angle."""
-POWERS = {1: "in proportion to it", 2: "with its square", 3: "with its cube",
-          4: "with its fourth power", 5: "with its fifth power"}  # fmt: skip
+POWERS = {1: "in proportion to it", 2: "with its square", 3: "with its cube"}
 """Powers of a coordinate that has a zero."""
 POLYNOMIALS = {1: "in a straight line", 2: "as a parabola", 3: "as a cubic"}
 """Of a coordinate that has none."""
@@ -149,25 +148,31 @@ class Form:
 def forms(coordinate: str, c: Array) -> list[Form]:
     """Forms that a function of a coordinate with the values c (n, a) may have."""
     of, values = coordinate_of(coordinate), distinct(c)
-    polynomials = [
-        Form(words, partial(_polynomial, p, (values[0], values[-1])))
-        for p, words in POLYNOMIALS.items()
-        if p < len(values)
+    low, high = values[0], values[-1]
+    found = []
+    if len(values) > EACH:  # otherwise a line or a parabola is all that shows
+        found = [_step(of, c)]
+        if coordinate in ANGLES:
+            found += [
+                Form(words, _sine, np.array([float(k)]), is_sine=True) for k, words in TURNS.items()
+            ]
+        else:
+            found += _of_a_range(of, values)
+        if of.has_zero:
+            found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
+            if low < 0 < high:
+                widths = PARTS * np.abs(values).max()
+                found += [
+                    Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
+                    Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
+                    Form("beyond ±{} only", _beyond, widths, of.at),
+                ]
+            return found
+    degrees = {p: words for p, words in POLYNOMIALS.items() if p < len(values)}
+    return [
+        *found,
+        *(Form(words, partial(_polynomial, p, low, high)) for p, words in degrees.items()),
     ]
-    if len(values) <= EACH:  # a line or a parabola is all that shows
-        return polynomials
-    found = [*(_of_an_angle() if coordinate in ANGLES else _of_a_range(of, values)), _step(of, c)]
-    if not of.has_zero:
-        return [*found, *polynomials]
-    found += [Form(words, partial(_power, p)) for p, words in POWERS.items()]
-    if values[0] < 0 < values[-1]:
-        widths = PARTS * np.abs(values).max()
-        found += [
-            Form("with its absolute value", lambda _, x: np.abs(x)[..., None]),
-            Form("by its sign alone", lambda _, x: np.sign(x)[..., None]),
-            Form("beyond ±{} only", _beyond, widths, of.at),
-        ]
-    return found
 
 
 def distinct(c: Array) -> Array:
@@ -179,33 +184,18 @@ def distinct(c: Array) -> Array:
     return chosen
 
 
-def _of_an_angle() -> list[Form]:
-    return [Form(words, _sine, np.array([float(k)]), is_sine=True) for k, words in TURNS.items()]
-
-
 def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
-    """A sine, and exponentials, in the range of some values (n,)."""
-    low, high = values[0], values[-1]
+    """A sine in the range of some values (n,) and, of a course, a decay from its start on."""
+    low, length = values[0], np.ptp(values)
     cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, FINE)
-    constants = (high - low) * PARTS
     found = []
     if len(cycles):
-        turns = 2 * np.pi * cycles / (high - low)
-
-        def period(turn: float) -> str:
-            return of.by(2 * np.pi / turn)
-
-        found = [Form("as a sine with a period of {}", _sine, turns, period, is_sine=True)]
+        words, turns = "as a sine with a period of {}", 2 * np.pi * cycles / length
+        found = [Form(words, _sine, turns, lambda turn: of.by(2 * np.pi / turn), is_sine=True)]
     if of.is_course:
         words = "decaying with a time constant of {}"
-        return [*found, Form(words, partial(_exp, low, -1), constants, of.by)]
-    return [
-        *found,
-        *(
-            Form(verb + " by the factor e every {}", partial(_exp, end, sign), constants, of.by)
-            for end, sign, verb in ((high, 1, "growing"), (low, -1, "decaying"))
-        ),
-    ]
+        found.append(Form(words, partial(_decay, low), length * PARTS, of.by))
+    return found
 
 
 def _step(of: Coordinate, c: Array) -> Form:
@@ -218,24 +208,23 @@ def _step(of: Coordinate, c: Array) -> Form:
         after = int(np.searchsorted(values, place))
         return f"{of.at(values[after - 1])} and {of.at(values[after])}"
 
-    return Form(
-        "in a step between {}",
-        lambda s, x: np.asarray(x > s, dtype=float)[..., None],
-        between[some],
-        gap,
-    )
+    return Form("in a step between {}", _beyond_place, between[some], gap)
+
+
+def _beyond_place(place: float, x: Array) -> Array:
+    return np.asarray(x > place, dtype=float)[..., None]
 
 
 def _power(p: int, _: float, x: Array) -> Array:
     return np.asarray(x[..., None] ** p)
 
 
-def _polynomial(p: int, ends: tuple[float, float], _: float, x: Array) -> Array:
-    return np.asarray(((2 * x[..., None] - sum(ends)) / (ends[1] - ends[0])) ** np.arange(1, p + 1))
+def _polynomial(p: int, low: float, high: float, _: float, x: Array) -> Array:
+    return np.asarray(((2 * x[..., None] - low - high) / (high - low)) ** np.arange(1, p + 1))
 
 
-def _exp(end: float, sign: int, constant: float, x: Array) -> Array:
-    return np.exp(sign * (x[..., None] - end) / constant)
+def _decay(start: float, constant: float, x: Array) -> Array:
+    return np.exp((start - x[..., None]) / constant)
 
 
 def _beyond(width: float, x: Array) -> Array:

@@ -16,7 +16,7 @@ Of a learned function, where to measure to know it better: where its mean varian
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
-from accelstudy.diagnosis.space.residuals import at_an_ideal_sensor
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.learned import Learned
@@ -95,16 +95,16 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     effects = [one.effect for one in (*first, *second) if one.effect is not None]
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     g = frame.solution.gravity
-    repeated = frame.forces[_apart(frame.forces, range(len(frame.forces)), g)]
+    repeated = frame.forces[_apart(frame.forces, g)]
     attitudes = np.concatenate([repeated, -g * get_scheme(GRID).directions])
-    forces, hold, later = _grid(frame, attitudes, needed, frame.forces[-1])
+    forces, hold = _grid(frame, attitudes, needed, frame.forces[-1])
     rivals = [_fitted(frame, one) for one in (first, second)]
     told = [one.values for one in rivals]
     alone, chosen, anywhere, free = np.zeros(0), list[int](), False, np.ones(len(forces), bool)
     while len(chosen) < COUNT and free.any():
         # Steps are those from the position before.
         before = forces[chosen[-1]] if chosen else frame.forces[-1]
-        forces, hold_then, _ = _grid(frame, attitudes, needed, before)
+        forces, hold_then = _grid(frame, attitudes, needed, before)
         rows = [_rows(frame, forces, hold_then, one) for one in (first, second)]
         seen = [a @ values for a, values in zip(rows, told, strict=True)]
         gains = (rivals[1].growth(rows[1], seen[0]) + rivals[0].growth(rows[0], seen[1])) / 2
@@ -120,22 +120,40 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
         chosen.append(i)
         free &= np.linalg.norm(forces - forces[i], axis=1) > DIFFERENT * g
         rivals = [one.after(rows[k][i], seen[1 - k][i]) for k, one in enumerate(rivals)]
-    names = [tuple(one.name for one in explanation) for explanation in (first, second)]
+    names = [[one.name for one in explanation] for explanation in (first, second)]
+    only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
     return [
-        NextPosition(
-            roll=float(hold.column("roll")[i]),
-            pitch=float(hold.column("pitch")[i]),
-            temperature=float(hold.column("temperature")[i]) if "temperature" in needed else None,
-            later=None if later is None else float(later[i]),
-            anywhere=anywhere,
-            separates=(
-                tuple(name for name in names[0] if name not in names[1]),
-                tuple(name for name in names[1] if name not in names[0]),
-            ),
-            gain=float(alone[i]),
-        )
+        _position(frame, hold, i, needed - {"yaw"}, alone[i], anywhere, (only[0], only[1]))
         for i in chosen
     ]
+
+
+def _position(
+    frame: Frame,
+    hold: HoldConditions,
+    i: int,
+    needed: set[str],
+    gain: float,
+    anywhere: bool,
+    separates: tuple[tuple[str, ...], tuple[str, ...]],
+) -> NextPosition:
+    """Position of the candidates, with what matters of its conditions."""
+
+    def shown(name: str) -> float | None:
+        column = getattr(hold, name)
+        return None if name not in needed or column is None else float(column[i])
+
+    time, measured = shown("time"), frame.hold.time
+    return NextPosition(
+        roll=float(hold.column("roll")[i]),
+        pitch=float(hold.column("pitch")[i]),
+        temperature=shown("temperature"),
+        later=None if time is None or measured is None else time - float(measured[-1]),
+        anywhere=anywhere,
+        separates=separates,
+        gain=float(gain),
+        yaw=shown("yaw"),
+    )
 
 
 LEARNABLE = ("force", "previous", "angle", "yaw", "temperature")
@@ -168,22 +186,12 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
     fit, before, chosen = Fit(solution.parameters, solution.cofactors), frame.forces[-1], []
     whole = float(np.sum(weights * fit.cofactors))
     for _ in range(COUNT):
-        forces, hold, _ = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
+        forces, hold = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
         rows = _rows(frame, forces, hold)
         gains = fit.fall(rows, weights)
         i = first_best(-gains, TIED * gains.max())
-        chosen.append(
-            NextPosition(
-                roll=float(hold.column("roll")[i]),
-                pitch=float(hold.column("pitch")[i]),
-                temperature=float(hold.column("temperature")[i]) if by_heat else None,
-                later=None,
-                anywhere=False,
-                separates=((learned.name,), ()),
-                gain=float(np.sqrt(gains[i] / whole)),
-                yaw=float(hold.column("yaw")[i]) if "yaw" in needed else None,
-            )
-        )
+        gain, of = np.sqrt(gains[i] / whole), ((learned.name,), ())
+        chosen.append(_position(frame, hold, i, needed - {"time"}, gain, False, of))
         fit, before = fit.after(rows[i], rows[i] @ fit.values), forces[i]
     return chosen
 
@@ -198,14 +206,13 @@ def _mean_squares(learned: Learned) -> Array:
     return np.asarray(np.array(shown) @ np.array(shown).T / VALUES)
 
 
-def _apart(forces: Array, order: Iterable[int], gravity: float) -> list[int]:
-    """Return the first places, in an order, whose attitudes clearly differ."""
+def _apart(forces: Array, gravity: float) -> list[int]:
+    """Return the first places whose attitudes clearly differ."""
     chosen: list[int] = []
-    for i in order:
-        if all(np.linalg.norm(forces[i] - forces[j]) > DIFFERENT * gravity for j in chosen):
+    for i in range(len(forces)):
+        near = np.linalg.norm(forces[chosen] - forces[i], axis=1) <= DIFFERENT * gravity
+        if len(chosen) < COUNT and not near.any():
             chosen.append(i)
-        if len(chosen) == COUNT:
-            break
     return chosen
 
 
@@ -216,13 +223,12 @@ def _grid(
     before: Array,
     yaws: Array | None = None,
     temperatures: int = 0,
-) -> tuple[Array, HoldConditions, Array | None]:
-    """Forces (k, 3), holds and times after the session (k,) of the positions to choose from.
+) -> tuple[Array, HoldConditions]:
+    """Forces (k, 3) and holds of the positions to choose from.
 
-    All attitudes, by all yaws, stand together for each time and temperature. The times are None
-    where there is nothing to choose. Steps are those from the force `before`, (3,). So many
-    temperatures lie evenly between the lowest and the highest; by default there are three of those
-    that were measured.
+    All attitudes, by all yaws, stand together for each time and temperature. Steps are those from
+    the force `before`, (3,). So many temperatures lie evenly between the lowest and the highest; by
+    default there are three of those that were measured.
     """
     measured, n = frame.hold, len(frame.forces)
     delays: Array = np.zeros(1)
@@ -238,11 +244,11 @@ def _grid(
     yaws = np.zeros(1) if yaws is None else yaws
     counts = (len(delays), len(levels), len(yaws), len(attitudes))
     of_delay, of_level, of_yaw, of_attitude = np.indices(counts).reshape(4, -1)
-    forces, delay = attitudes[of_attitude], delays[of_delay]
+    forces = attitudes[of_attitude]
     last = measured.take(np.full(len(forces), n - 1))
     roll, pitch = angles_of(forces).T
     step_x, step_y, step_z = (forces - before).T
-    time = None if last.time is None else last.time + delay
+    time = None if last.time is None else last.time + delays[of_delay]
     vibration = measured.vibration
     hold = replace(
         last,
@@ -257,7 +263,7 @@ def _grid(
         step_z=step_z,
         order=np.full(len(forces), n + 1.0) if time is None else time,
     )
-    return forces, hold, None if time is None or "time" not in needed else delay
+    return forces, hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +333,7 @@ def _rows(
         common=common,
         hold=hold,
     )
-    space = at_an_ideal_sensor(solution.model, solution.approach, observed)
+    space = Residuals.at(solution.model, solution.approach, observed)
     columns, (k, c) = [space.design], space.whitening.shape[:2]
     for one in explanation:
         assert one.effect is not None

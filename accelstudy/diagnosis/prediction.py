@@ -14,15 +14,15 @@ residuals at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
-from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.quality import Solution, whitening_of
+from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -134,7 +134,7 @@ def held_out_gap(
     """
     if variance is None:
         variance = base.omega / base.redundancy
-    first, second = (Prediction.of(solution, rest) for solution in (base, extended))
+    first, second = (_predicted(solution, rest) for solution in (base, extended))
     d = first.white - second.white
     slope = d @ first.slope
     size = float(d @ d + slope @ base.cofactors @ slope)
@@ -172,8 +172,7 @@ def relative_variance(one: Solution, other: Solution) -> float:
     return (taken[0] / taken[1]) ** 2
 
 
-@dataclass(frozen=True)
-class Prediction:
+class _Prediction(NamedTuple):
     """What a fit leaves in unused positions.
 
     Attributes
@@ -187,23 +186,15 @@ class Prediction:
     slope: Array
     misses: tuple[float, ...]
 
-    @classmethod
-    def of(cls, fit: Solution, observed: Observations) -> Prediction:
-        """Predict by a fit."""
-        problem = CalibrationProblem.of(fit.model, fit.approach, replace(observed, initial=None))
-        at = problem.linearised(fit.parameters[None], problem.observations)
-        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-        psi = at.psi[:, 0].T
-        lower = whitening_of(b, problem.cofactors)
-        white = np.asarray(np.linalg.solve(lower, psi[..., None]), dtype=float)
-        by_parameters = np.moveaxis(at.jac_parameters[:, :, 0], -1, 0)
-        slope = np.asarray(np.linalg.solve(lower, by_parameters), dtype=float)
-        misses = np.sqrt(np.mean(psi**2, axis=1))
-        return cls(
-            white=white.ravel(),
-            slope=slope.reshape(white.size, -1),
-            misses=tuple(float(miss) for miss in misses),
-        )
+
+def _predicted(fit: Solution, observed: Observations) -> _Prediction:
+    """Predict positions by a fit to others."""
+    at = Residuals.at(fit.model, fit.approach, observed, fit.parameters)
+    n, c = at.whitening.shape[:2]
+    white = at.errors[: n * c]
+    missed = (at.whitening @ white.reshape(n, c, 1))[..., 0]
+    misses = np.sqrt(np.mean(missed**2, axis=1)).tolist()
+    return _Prediction(white, at.design[: n * c], tuple(misses))
 
 
 @dataclass(frozen=True)
@@ -266,45 +257,38 @@ class LinearSplit:
         """
         return part.project(errors[:, self.rows[0]].T).T
 
-    def variances(self, left: Array, known: bool) -> Array:
-        """Variance of unit weight, (b,), by what is left of the fitted part; 1 if it is known."""
-        if known:
-            return np.ones(len(left))
-        return np.asarray(np.sum(left**2, axis=1) / (left.shape[1] - len(self.cofactors)))
+    def statistic(self, change: Array, errors: Array, known: bool) -> Array:
+        """Z of corrections (b, h c) of the held-out part, (b,), for errors (b, m).
 
-    def statistic(self, change: Array, missed: Array, variance: Array) -> Array:
-        """Z of corrections and misclosures (b, h c) of the held-out part, (b,).
-
-        It is 0 where a correction does not show there, and so says nothing.
+        The noise is known, or that of what is left of the fitted part. Z is 0 where a correction
+        does not show, and so says nothing.
         """
+        left, missed = self.beside(errors)
+        variance = np.ones(len(left))
+        if not known:
+            variance = np.sum(left**2, axis=1) / (left.shape[1] - len(self.cofactors))
         slope = change @ self.designs[1]
         size = np.sum(change**2, axis=1) + np.sum((slope @ self.cofactors) * slope, axis=1)
         scale = np.sqrt(size * variance)
         return np.asarray(np.sum(change * missed, axis=1) / np.where(scale > 0, scale, np.inf))
 
-    def corrections(self, hypothesis: Hypothesis, left: Array) -> Array:
-        """Corrections of the prediction by an effect that is fitted, too, (b, h c).
+    def predictor(self, columns: Array, prior: float = 0.0) -> tuple[Array, Array]:
+        """Matrices (f c, l) and (l, h c): their product turns what is left into corrections.
 
         Parameters
         ----------
-        hypothesis : Hypothesis, about an effect
-        left : (b, f c) array, what the base model leaves of the fitted part
+        columns : (m, l) array, what l parameters show in all positions
+        prior : float, information on each of them; none by default
         """
-        ((fit, rest),) = self.predictors([hypothesis])
-        return np.asarray(left @ fit @ rest)
+        fitted, rest = self.beside(columns.T)
+        if not prior:
+            return np.asarray(np.linalg.pinv(fitted), dtype=float), rest
+        inner = fitted @ fitted.T + prior * np.eye(len(fitted))
+        return fitted.T @ np.linalg.inv(inner), rest
 
     def predictors(self, hypotheses: Sequence[Hypothesis]) -> list[tuple[Array, Array]]:
-        """Matrices (f c, l) and (l, h c), whose product makes such corrections.
-
-        Parameters
-        ----------
-        hypotheses : shapes of one effect
-        """
+        """Predictors of shapes of one effect."""
         effects = [one.effect for one in hypotheses if one.effect is not None]
         shown = self.frame.residuals.whitened(self.frame.signatures(effects))
-        matrices = []
-        columns = np.split(shown, len(effects), axis=1)
-        for one, column in zip(hypotheses, columns, strict=True):
-            fitted, rest = self.beside((column @ one.directions).T)
-            matrices.append((np.asarray(np.linalg.pinv(fitted), dtype=float), rest))
-        return matrices
+        each = zip(hypotheses, np.split(shown, len(effects), axis=1), strict=True)
+        return [self.predictor(column @ one.directions) for one, column in each]

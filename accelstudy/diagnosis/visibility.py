@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +77,7 @@ def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
     return frame.residuals.project(frame.residuals.whitened(frame.signature(hypothesis.effect)))
 
 
-def whole_shapes(shapes: Sequence[Hypothesis]) -> list[Hypothesis]:
+def whole_shapes(shapes: Iterable[Hypothesis]) -> list[Hypothesis]:
     """Shapes of an effect in which all its parameters show."""
     return [h for h in shapes if h.effect is not None and h.dim == len(h.effect.parameters)]
 
@@ -133,7 +133,7 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
     for name, shapes in examined.candidates.items():
         if name == OUTLIER:
             continue
-        judged = whole_shapes(shapes) or shapes
+        judged = whole_shapes(shapes) or [*shapes]
         columns = [signature_columns(examined.frame, h) for h in judged]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
         mdbs = [_size(root, s) for s in sizes]

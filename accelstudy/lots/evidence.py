@@ -370,7 +370,7 @@ def _by_chance(problem: Problem, chance: Chance, noise: SensorNoise | None) -> A
         if noise is not None:
             half = noise.freedom / 2
             errors = errors * np.sqrt(half / rng.gamma(half, size=(len(errors), 1)))
-        return field.odds(evidence, field.parts(errors), np.sum(errors**2, axis=-1))
+        return field.odds(evidence, field.seen(errors))
 
     if not field.names:
         return np.zeros((DRAWS, 0))

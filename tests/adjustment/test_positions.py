@@ -212,7 +212,7 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
         for axis in range(c if labels[i] != i else 0):
             change = np.zeros((n, c, 1))
             change[i, axis], change[labels[i], axis] = 1, -1
-            differences.append(residuals.rows(change))
+            differences.append(residuals.stacked(np.linalg.solve(residuals.whitening, change)))
     basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
     same = lack_of_fit(residuals, examined.frame.forces)
     errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
@@ -276,7 +276,6 @@ def test_a_jump_among_many_holds_is_found_where_it_is():
 def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
     # What is drawn at once has a size of its own, whatever the positions.
     monkeypatch.setattr(detection, "AT_ONCE", 10_000)
-    monkeypatch.setattr(detection, "KEPT", 0)
     monkeypatch.setattr(pipeline, "Chance", partial(detection.Chance, simulations=20))
 
     def run(n):

@@ -9,10 +9,17 @@ from scipy import stats
 
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, Weighed, credible_set
 from accelstudy.diagnosis.decision.verdict import misfit
-from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.field import log_ratio, simulated
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
-from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
+from accelstudy.diagnosis.evidence.size import (
+    SHAPE_SIZES,
+    SHAPE_WEIGHTS,
+    SIZE_WEIGHTS,
+    SIZES,
+    Evidence,
+    Level,
+)
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 
@@ -20,32 +27,55 @@ R = 40
 LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
 
 
-def exact(level, z, basis):
-    """Log density by multivariate t distributions, up to a constant."""
-    total = -np.inf
-    sizes = [(0.0, 1.0)] if basis is None else zip(SIZES, SIZE_WEIGHTS, strict=True)
-    for size, weight in sizes:
-        shape = np.eye(R) if basis is None else np.eye(R) + size / basis.shape[1] * basis @ basis.T
-        for p, nu in zip(level.weights, level.freedoms, strict=True):
-            log = stats.multivariate_t.logpdf(z, shape=shape, df=nu)
-            total = np.logaddexp(total, log + np.log(weight * p))
-    return total
+def exact(level, z, kernel, sizes=SIZES, weights=SIZE_WEIGHTS):
+    """Log density of z (..., R) by multivariate t distributions, less that of noise alone."""
+
+    def mixed(sizes, weights):
+        logs = [
+            stats.multivariate_t.logpdf(z, shape=np.eye(R) + size * kernel, df=nu)
+            + np.log(weight * p)
+            for size, weight in zip(sizes, weights, strict=True)
+            for p, nu in zip(level.weights, level.freedoms, strict=True)
+        ]
+        return np.logaddexp.reduce(logs)
+
+    return mixed(sizes, weights) - mixed([0.0], [1.0])
+
+
+def against_noise(evidence, logs, z):
+    """Log densities less that of noise alone."""
+    nothing = np.logaddexp.reduce(evidence.of_noise(np.sum(z**2, axis=-1)), axis=-1)
+    return logs - nothing[..., None]
 
 
 @pytest.mark.parametrize("known", LEVELS)
 def test_densities_are_mixtures_of_t_distributions(known):
+    """Of spaces, of which nothing else is known; the integral over sizes is a table."""
     rng = np.random.default_rng(1)
     bases = [np.linalg.qr(rng.standard_normal((R, d)))[0] for d in (1, 3, 6)]
-    evidence, odds = Evidence(LEVELS[known], R), []
-    for scale in (0.5, 1.0, 2.0):
-        z = scale * rng.standard_normal(R) + bases[1] @ np.array([0.0, 6.0, 0.0])
-        parts = np.array([np.sum((z @ b) ** 2) for b in bases])
-        found = [*evidence.of_spaces(parts, [1, 3, 6], z @ z),
-                 np.logaddexp.reduce(evidence.of_noise(z @ z))]  # fmt: skip
-        expected = [exact(LEVELS[known], z, b) for b in (*bases, None)]
-        odds.append(np.array(found) - expected)
-    # The constant is the same for all hypotheses and all residuals; the integral is a table.
-    assert np.ptp(odds) < 0.01
+    z = np.array([[0.5], [1.0], [2.0]]) * rng.standard_normal((3, R)) + 6 * bases[1][:, 1]
+    evidence = Evidence(LEVELS[known], R)
+    parts = np.stack([np.sum((z @ b) ** 2, axis=1) for b in bases], axis=1)
+    found = evidence.of_spaces(parts, [1, 3, 6], np.sum(z**2, axis=1))
+    expected = [exact(LEVELS[known], z, b @ b.T / b.shape[1]) for b in bases]
+    assert pytest.approx(np.array(expected), abs=0.01) == against_noise(evidence, found, z).T
+
+
+@pytest.mark.parametrize("known", LEVELS)
+def test_densities_are_those_of_gaussian_processes(known):
+    """Of shapes with covariances of their own; of many residuals at once to seven digits."""
+    rng = np.random.default_rng(1)
+    bases = [np.linalg.qr(rng.standard_normal((R, k)))[0] for k in (2, 5)]
+    shares = [np.array([0.3, 0.7]), np.array([0.02, 0.05, 0.13, 0.3, 0.5])]
+    z = np.array([[0.5], [1.0], [2.0]]) * rng.standard_normal((3, R)) + 5 * bases[1][:, -1]
+    level, prior = LEVELS[known], (SHAPE_SIZES, SHAPE_WEIGHTS)
+    pairs = zip(bases, shares, strict=True)
+    expected = np.array([exact(level, z, (b * share) @ b.T, *prior) for b, share in pairs]).T
+    evidence, along = Evidence(level, R), [(z @ basis) ** 2 for basis in bases]
+    for some, digits in ((slice(None), 1e-3), (slice(1), 1e-9)):
+        squares = np.sum(z[some] ** 2, axis=1)
+        found = evidence.of_shapes([a[some] for a in along], shares, squares)
+        assert against_noise(evidence, found, z[some]) == pytest.approx(expected[some], abs=digits)
 
 
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
@@ -56,12 +86,12 @@ def examined(request):
 def test_noise_is_not_noise_with_an_effect(examined):
     """What is drawn with an effect is found, and its weight takes it out again."""
     residuals, rng = examined.frame.residuals, np.random.default_rng(3)
-    field = Field(examined.candidates)
-    changed = field.with_effects(np.zeros((400, len(residuals.design))), rng)
+    candidates = [*examined.candidates.values()]
+    changed = simulated(candidates, len(residuals.design), 400, rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
-    parts = field.parts(residuals.project(noise.T).T)
-    weights = np.exp(-field.proposal(parts))
-    squares = np.sum(residuals.project(noise.T).T ** 2, axis=1)
+    z = residuals.project(noise.T).T
+    weights = np.exp(-log_ratio(candidates, [shapes.parts(z) for shapes in candidates]))
+    squares = np.sum(z**2, axis=1)
     r = residuals.redundancy
     assert np.mean(squares) > r + 10
     assert np.sum(weights * squares) / np.sum(weights) == pytest.approx(r, rel=0.25)

@@ -8,7 +8,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, 
 
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis import held_out
+from accelstudy.diagnosis import held_out, held_out_threshold
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equivalents, weigh_singles
@@ -48,20 +48,19 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     singles = weighed(problem)
     classes = classes_of(singles, equivalents(problem.examined, singles))
     rng = np.random.default_rng(3)
-    needed = held_out.threshold(problem, classes, beyond, part, split, rng)
+    needed = held_out_threshold.threshold(problem, classes, None, beyond, part, split, rng)
     assert needed > SIGNIFICANT + 0.3
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
-    logs = field.densities(evidence, z)
-    nothing = np.logaddexp.reduce(evidence.of_noise(np.sum(z**2, axis=1)), axis=-1)
-    odds = np.logaddexp.reduce(logs, axis=1) - np.log(len(field.names)) - nothing
-    label = held_out._labels(classes)
-    named, top = held_out._named(logs, [label[name] for name in field.names])
-    sets = np.flatnonzero(named & (odds > beyond))
-    chosen, values = held_out._on_the_part(part, split, noise[sets], rng)
-    same = np.array([label.get(name, -2) for name in chosen]) == top[sets]
-    n = len(sets)
+    odds = field.odds(evidence, field.seen(z))
+    of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
+    label = held_out_threshold.labels(classes)
+    claimed = held_out_threshold.named(odds, field.names, label)
+    sets = np.flatnonzero((claimed >= 0) & (of_any > beyond))
+    found, change = held_out_threshold.by_name(part, split, noise[sets], label)
+    values = split.statistic(change, noise[sets], evidence.level.known)
+    same, n = found == claimed[sets], len(sets)
     assert n > 150
     rate = np.mean(same & (values > needed))
     # Both the simulation of the bound and that of the rate err.
@@ -78,7 +77,8 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     rest = first.observed.take(split.held)
     gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
     left, missed = split.beside(problem.residuals.errors[None])
-    change = split.corrections(weighed(problem).best["quadratic_scale"], left)
+    ((fitted, rest),) = split.predictors([weighed(problem).best["quadratic_scale"]])
+    change = left @ fitted @ rest
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
 
@@ -129,5 +129,5 @@ def test_an_imitator_leaves_nothing_of_what_it_imitates():
 def test_a_part_that_can_show_no_pair_chooses_none():
     """Positions that are too few for two effects at once would not have chosen these two."""
     part, none = SimpleNamespace(examined=None), Singles({}, {}, {}, {})
-    finding = SimpleNamespace(chosen=("one", "other"), alternatives=())
+    finding = SimpleNamespace(chosen=("one", "other"), alternatives=(), place=None)
     assert held_out._chosen_alike(part, none, finding) == (("one", "other"), True)

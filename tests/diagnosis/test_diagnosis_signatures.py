@@ -86,7 +86,7 @@ def test_a_signature_is_linear_in_the_parameters(name):
     directions = np.random.default_rng(1).standard_normal((len(effect.parameters), 2))
     shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
     model = SensorModel("one", (effect,))
-    reduced = shown.reduced(directions)
+    reduced = shown.force @ directions
     p = effect.typical[0] * 1e-3 * directions[:, 1]
     turned = np.array(effect.axes(tuple(p), np), dtype=float)
     if turned.any():
@@ -95,7 +95,7 @@ def test_a_signature_is_linear_in_the_parameters(name):
     else:
         expected = model.sense(FULL.f_b, p, G, FULL.hold) - FULL.f_b
         tolerance = {"rtol": 1e-9, "atol": 1e-14 * G}
-    found = reduced.force[..., 1] * effect.typical[0] * 1e-3
+    found = reduced[..., 1] * effect.typical[0] * 1e-3
     np.testing.assert_allclose(found, expected, **tolerance)
 
 

@@ -54,7 +54,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         detection = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
         by_chance = detection.by_chance
         z = residuals.project(errors.T).T
-        odds = total_odds(field.odds(evidence, field.parts(z), np.sum(z**2, axis=1)))
+        odds = total_odds(field.odds(evidence, field.seen(z)))
         p = np.array([tail(by_chance.values, by_chance.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(detection.p_value, abs=0.005)

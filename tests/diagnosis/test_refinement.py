@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
-from accelstudy.diagnosis.evidence.hypotheses import refined, shaped, strongest
+from accelstudy.diagnosis.evidence.hypotheses import refined, shaped
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 SIZE = 8.0
@@ -48,7 +48,7 @@ def test_a_time_constant_is_the_best_of_a_fine_search(tau):
     before = examined.candidates["warm_up"]
     after = refined(examined, before)
     z = examined.frame.residuals.z
-    best = strongest(after, z)
+    best = after.strongest(z)
     assert np.sum((z @ best.basis) ** 2) == pytest.approx(parts.max(), abs=0.1)
     assert best.value == pytest.approx(taus[np.argmax(parts)], rel=0.012)
     assert before.parts(z).max() < parts.max() - 1
@@ -66,7 +66,7 @@ def test_of_very_many_times_of_a_jump_the_best_is_found():
     parts = explained((time[:, None] > middles).astype(float))
     before = examined.candidates["bias_jump"]
     assert len(before) < len(middles)
-    best = strongest(refined(examined, before), examined.frame.residuals.z)
+    best = refined(examined, before).strongest(examined.frame.residuals.z)
     assert best.effect.settings["t"] == middles[np.argmax(parts)]
     tried = {h.effect.settings["t"] for h in before}
     assert best.effect.settings["t"] not in tried

@@ -5,48 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, campaign, design, shuffled, some_holds
-from scipy import stats
 
-from accelstudy.diagnosis.evidence.size import SHAPE_SIZES, SHAPE_WEIGHTS, Evidence, Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import LENGTHS
 from accelstudy.sensors.models import get_model
-
-R = 30
-LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
-
-
-@pytest.mark.parametrize("known", LEVELS)
-def test_densities_are_those_of_gaussian_processes(known):
-    """Mixtures of multivariate t distributions with the covariances of the shapes."""
-    rng = np.random.default_rng(1)
-    level, evidence = LEVELS[known], Evidence(LEVELS[known], R)
-    bases = [np.linalg.qr(rng.standard_normal((R, k)))[0] for k in (2, 5)]
-    shares = [np.array([0.3, 0.7]), np.array([0.02, 0.05, 0.13, 0.3, 0.5])]
-    z = rng.standard_normal((3, R)) * np.array([[0.5], [1.0], [2.0]]) + 5 * bases[1][:, -1]
-    expected = np.full((3, 2), -np.inf)
-    for i, (basis, share) in enumerate(zip(bases, shares, strict=True)):
-        for size, weight in zip(SHAPE_SIZES, SHAPE_WEIGHTS, strict=True):
-            shape = np.eye(R) + size * (basis * share) @ basis.T
-            for p, nu in zip(level.weights, level.freedoms, strict=True):
-                log = stats.multivariate_t.logpdf(z, shape=shape, df=nu)
-                expected[:, i] = np.logaddexp(expected[:, i], log + np.log(weight * p))
-    along, total = [(z @ basis) ** 2 for basis in bases], np.sum(z**2, axis=1)
-    at_once = evidence.of_shapes(along, shares, total)
-    one = evidence.of_shapes([a[:1] for a in along], shares, total[:1])
-    nothing = np.logaddexp.reduce(evidence.of_noise(total), axis=-1)
-    white = np.logaddexp.reduce(
-        [
-            stats.multivariate_t.logpdf(z, shape=np.eye(R), df=nu) + np.log(p)
-            for p, nu in zip(level.weights, level.freedoms, strict=True)
-        ],
-        axis=0,
-    )
-    assert at_once - nothing[:, None] == pytest.approx(expected - white[:, None], abs=1e-3)
-    assert one - nothing[0] == pytest.approx(expected[:1] - white[0], abs=1e-9)
 
 
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
@@ -61,14 +26,14 @@ def shapes(frame):
 
 
 def covariances(shapes):
-    pairs = zip(shapes.by_shape(shapes.vectors), shapes.shares, strict=True)
+    pairs = zip(shapes.split(shapes.vectors), shapes.shares, strict=True)
     return [(vectors * share) @ vectors.T for vectors, share in pairs]
 
 
 def test_shapes_live_in_the_space_of_the_residuals(frame, shapes):
-    assert shapes.weights.sum() == pytest.approx(1)
+    assert shapes.prior.sum() == pytest.approx(1)
     assert np.abs(frame.residuals.design.T @ shapes.vectors).max() < 1e-8
-    for vectors, share in zip(shapes.by_shape(shapes.vectors), shapes.shares, strict=True):
+    for vectors, share in zip(shapes.split(shapes.vectors), shapes.shares, strict=True):
         assert share.sum() == pytest.approx(1)
         assert vectors.T @ vectors == pytest.approx(np.eye(len(share)), abs=1e-6)
     targets = {target for _, target in shapes.places}
@@ -83,7 +48,7 @@ def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
     row = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
     row /= np.linalg.norm(row)
     share = {}
-    for place, vectors in zip(shapes.places, shapes.by_shape(shapes.vectors), strict=True):
+    for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
         share[place] = max(share.get(place, 0.0), float(np.sum((row.T @ vectors) ** 2)))
     assert share["temperature", "bias"] > 0.95
     # Few conditions leave room for chance: by gravity there are 21.
@@ -99,7 +64,7 @@ def test_what_is_the_same_in_all_positions_is_no_function(frame, shapes):
     for name in ("base_tilt", "encoder_offset"):
         rows = residuals.project(residuals.whitened(frame.signature(get_effect(name))))
         basis = np.linalg.qr(rows)[0]
-        for place, vectors in zip(shapes.places, shapes.by_shape(shapes.vectors), strict=True):
+        for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
             if place[1] in ("tilt", "reading") and place[0] != "angle":
                 assert np.linalg.norm(basis.T @ vectors[:, -1]) < 0.75, place
 

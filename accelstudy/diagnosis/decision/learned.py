@@ -20,11 +20,11 @@ from accelstudy.diagnosis.decision.posterior import Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible, misfit
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
-from accelstudy.diagnosis.evidence.hypotheses import strongest
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import SURVIVES, Place
 from accelstudy.effects import get_effect
 from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, Learned
@@ -116,23 +116,22 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
 def _choice(problem: Problem, weighing: Weighing, posterior: Posterior, name: str) -> Choice:
     """Effect that an explanation has beside a function, with its probability."""
     having = [one.posterior for one in posterior.each if name in one.names]
-    best = strongest(problem.examined.candidates[name], problem.residuals.z)
+    best = problem.examined.candidates[name].strongest(problem.residuals.z)
     return Choice(best, weighing.members[name], min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
     """Probabilities of the places of something unknown, beside effects with some names."""
-    unknown, z, evidence = problem.field.unknown, problem.residuals.z, problem.evidence
+    unknown, left = problem.field.unknown, problem.residuals
     if unknown is None:
         return {}
     for name in names[: names.index(UNKNOWN)]:
-        beside = strongest(problem.examined.candidates[name], z)
-        z = z - beside.basis @ (beside.basis.T @ z)
-        evidence = replace(evidence, redundancy=evidence.redundancy - beside.dim)
-        unknown = Unknown(unknown.shapes.beside(beside.basis))
+        beside = problem.examined.candidates[name].strongest(left.z).basis
+        left, unknown = left.beside(beside), unknown.beside(beside)
     if not unknown.places:
         return {}
-    places = unknown.by_place(evidence, z)
+    evidence = replace(problem.evidence, redundancy=left.redundancy)
+    places = unknown.by_place(evidence, left.z)
     shares = special.softmax([*places.values()]).tolist()
     return dict(zip(places, shares, strict=True))
 
@@ -222,36 +221,27 @@ class Weighted:
 
     @classmethod
     def of(
-        cls, effect: Learned, frame: Frame, beside: Array, errors: Array, evidence: Evidence
+        cls, effect: Learned, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
     ) -> Weighted | None:
-        """Weigh a shape by residuals (b, m), beside a space (m, l); None if too little shows."""
-        residuals = frame.residuals
+        """Weigh a shape by errors (b, m) in a space of residuals; None if too little shows."""
         rows = residuals.whitened(frame.signature(effect)) * effect.deviations
         left = residuals.project(rows)
-        left -= beside @ (beside.T @ left)
         trace = float(np.sum(left**2))
         if not trace > SURVIVES * float(np.sum(rows**2)):
             return None
         values, turned = np.linalg.eigh(left.T @ left)
         kept = values > 1e-6 * trace
         vectors = left @ turned[:, kept] / np.sqrt(values[kept])
-        shares = values[kept] / trace
-        growth = SIZES[:, None] * shares
-        taken = (errors @ vectors) ** 2 @ (growth / (1 + growth)).T
-        total = np.sum(errors**2, axis=1)
-        noise, logs = evidence.of_noise(total), []
-        for level, nu in enumerate(evidence.level.freedoms):
-            rest = np.log1p(-taken / (nu + total)[:, None])
-            logs.append(noise[:, level, None] - (nu + evidence.redundancy) / 2 * rest)
-        each = np.logaddexp.reduce(logs) - np.sum(np.log1p(growth), axis=1) / 2
-        return cls(effect, vectors, shares, trace, each)
+        shares, squares = values[kept] / trace, np.sum(errors**2, axis=1)
+        logs = evidence.at_sizes((errors @ vectors) ** 2, shares, squares, SIZES)
+        return cls(effect, vectors, shares, trace, logs)
 
 
 def weighted_shapes(
-    place: Place, frame: Frame, beside: Array, errors: Array, evidence: Evidence
+    place: Place, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
 ) -> list[Weighted]:
-    """Shapes of a place, weighed by residuals (b, m) beside a space (m, l)."""
-    each = (Weighted.of(one, frame, beside, errors, evidence) for one in shapes_of(place, frame))
+    """Shapes of a place, weighed by errors (b, m) in the space of residuals of a frame."""
+    each = (Weighted.of(one, frame, residuals, errors, evidence) for one in shapes_of(place, frame))
     return [one for one in each if one is not None]
 
 
@@ -262,11 +252,10 @@ def fit_of_place(
 
     Where no sigma is given, the prior of the function counts beside the noise that it leaves.
     """
-    frame, evidence = problem.frame, problem.evidence
-    z, basis = frame.residuals.z, space_of(beside, len(frame.residuals.z))
-    z = z - basis @ (basis.T @ z)
-    evidence = replace(evidence, redundancy=evidence.redundancy - basis.shape[1])
-    shapes = weighted_shapes(place, frame, basis, z[None], evidence)
+    frame = problem.frame
+    residuals = frame.residuals.beside(space_of(beside, len(frame.residuals.z)))
+    z, evidence = residuals.z, replace(problem.evidence, redundancy=residuals.redundancy)
+    shapes = weighted_shapes(place, frame, residuals, z[None], evidence)
     if not shapes:
         return None
     best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs[0])))

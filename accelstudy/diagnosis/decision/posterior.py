@@ -18,7 +18,7 @@ from scipy import special
 from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Unknown
+from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
@@ -327,12 +327,10 @@ def _noises(problem: Problem, detection: Detection, chance: Chance) -> tuple[lis
     coloured = np.log(priors.COLOUR) + log_mean(processes)
     if problem.absent:
         unknown = problem.field.unknown
-        if unknown is None:
-            courses = LearnedShapes.of(problem.frame, SLOW)
-        else:
-            courses = unknown.shapes.at(SLOW)
-        of_places = Unknown(courses).by_place(evidence, residuals.z).values()
-        course = float(np.logaddexp.reduce([-np.inf, *of_places]))
+        courses = LearnedShapes.of(problem.frame, SLOW) if unknown is None else unknown.at(SLOW)
+        if courses.places:
+            z = residuals.z
+            course = float(courses.log_density(evidence, courses.parts(z), z @ z))
         coloured = np.logaddexp(coloured, np.log(priors.UNRECORDED) + course)
     logs = {
         COLOUR: coloured,

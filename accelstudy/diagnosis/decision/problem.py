@@ -181,4 +181,6 @@ def _best_odds(field: Field, evidence: Evidence, z: NDArray[np.float64]) -> floa
         priors.UNKNOWN if name == UNKNOWN else 1 / len(field.candidates) for name in field.names
     ]
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
-    return max(0.0, float(np.max(field.densities(evidence, z) + np.log(prior)) - nothing))
+    return max(
+        0.0, float(np.max(field.densities(evidence, field.seen(z)) + np.log(prior)) - nothing)
+    )

@@ -29,7 +29,7 @@ from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import equivalents, strongest, weigh_singles
+from accelstudy.diagnosis.evidence.hypotheses import equivalents, weigh_singles
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
     COLOUR,
@@ -352,7 +352,7 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
     z, field = inner.residuals.z, inner.field
     members = equivalents(inner.examined, weigh_singles(inner.examined, field, inner.evidence))
     nothing = float(np.logaddexp.reduce(inner.evidence.of_noise(z @ z)))
-    logs = field.densities(inner.evidence, z) - nothing + alone.log_weight
+    logs = field.densities(inner.evidence, field.seen(z)) - nothing + alone.log_weight
     k, weighed = max(count, 1), []
     for name, log in zip(field.names, logs.tolist(), strict=True):
         if name == UNKNOWN:
@@ -360,7 +360,7 @@ def _beside(problem: Problem, count: int, alone: Weighed, solution: Solution) ->
             names, classes = (*alone.names, UNKNOWN), (*alone.classes, (UNKNOWN,))
             weighed.append(Weighed(names, classes, weight))
             continue
-        other = strongest(inner.examined.candidates[name], z)
+        other = inner.examined.candidates[name].strongest(z)
         both = (*alone.classes, members[name])
         within = float(within_bounds((other,), z, inner.evidence)[0])
         weight = log + within + float(np.log(priors.TWO / k))

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
-from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.field import Field, log_ratio, simulated
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.space.residuals import Residuals
 
@@ -34,15 +33,13 @@ AT_ONCE = 500_000
 
 PRIORS = 1
 """Stream of the rows of priors, apart from all others of the same seed."""
-KEPT = 16_000_000
-"""Most numbers that are kept; more are drawn anew whenever they are needed."""
 
 
 @dataclass(frozen=True)
 class Chance:
     """Simulated residuals without any effect: white noise of unit weight less what a fit absorbs.
 
-    The same numbers are drawn again whenever they are needed; only small sets are kept.
+    The same numbers are drawn again whenever they are needed.
 
     Parameters
     ----------
@@ -67,18 +64,12 @@ class Chance:
         size = max(1, AT_ONCE // self.conditions)
         return [min(size, self.simulations - k) for k in range(0, self.simulations, size)]
 
-    @cached_property
-    def kept(self) -> list[Array] | None:
-        """All draws, if they are few."""
-        few = self.simulations * self.conditions <= KEPT
-        return list(self.noise()) if few else None
-
     def errors(self, residuals: Residuals) -> Iterator[Array]:
         """Yield residuals of a fit, (b, m) each, all simulations one after the other."""
         m = len(residuals.design)
         key = (*self.seed.spawn_key, PRIORS)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
-        for drawn in track(self.kept or self.noise(), "null simulation", len(self.counts)):
+        for drawn in track(self.noise(), "null simulation", len(self.counts)):
             noise = drawn[:, :m]
             more = m - noise.shape[1]
             if more:
@@ -88,12 +79,12 @@ class Chance:
 
     def errors_with_effects(self, residuals: Residuals, field: Field) -> Iterator[Array]:
         """Yield residuals without an effect and as many with a random one."""
-        key = (*self.seed.spawn_key, 0)
+        key, named = (*self.seed.spawn_key, 0), [*field.candidates.values()]
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for errors in self.errors(residuals):
             half = len(errors) // 2 or 1
             yield errors[:half]
-            changed = field.with_effects(errors[-half:], rng)
+            changed = errors[-half:] + simulated(named, errors.shape[1], half, rng)
             yield changed - (changed @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
@@ -154,20 +145,20 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     residuals : Residuals
     chance : Chance
     """
-    z = residuals.z
     if not field.names:
         nobody: Array = np.zeros(0)
-        return Detection(0.0, 1.0, {}, evidence.of_noise(z @ z), {}, {}, Simulated(nobody, nobody))
-    densities = field.densities(evidence, z)
-    noise = evidence.of_noise(z @ z)
+        noise = evidence.of_noise(residuals.z @ residuals.z)
+        return Detection(0.0, 1.0, {}, noise, {}, {}, Simulated(nobody, nobody))
+    seen, k, named = field.seen(residuals.z), len(field.names), [*field.candidates.values()]
+    densities, noise = field.densities(evidence, seen), evidence.of_noise(seen.squares)
     nothing = np.logaddexp.reduce(noise)
-    k = len(field.names)
     odds: list[Array] = []
     weights: list[Array] = []
     for errors in chance.errors_with_effects(residuals, field):
-        parts, squares = field.parts(errors), np.sum(errors**2, axis=-1)
-        odds.append(field.odds(evidence, parts, squares))
-        weights.append(1 / (0.5 + 0.5 * np.exp(np.minimum(field.proposal(parts), 700.0))))
+        drawn = field.seen(errors)
+        odds.append(field.odds(evidence, drawn))
+        ratio = np.exp(np.minimum(log_ratio(named, drawn.parts), 700.0))
+        weights.append(1 / (0.5 + 0.5 * ratio))
     each, w = np.concatenate(odds), np.concatenate(weights)
     total = total_odds(each)
     statistic = float(np.logaddexp.reduce(densities) - np.log(k) - nothing)

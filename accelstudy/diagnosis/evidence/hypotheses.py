@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.bounds import within_bounds
-from accelstudy.diagnosis.evidence.field import Field, Unknown, shape_weights
-from accelstudy.diagnosis.evidence.size import Evidence, log_mean, log_sum
+from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
     BumpedPositions,
     EffectShapes,
+    Hypotheses,
     Hypothesis,
-    Shapes,
+    log_sum,
 )
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.shapes import LearnedShapes
 
 Array = NDArray[np.float64]
 
@@ -62,7 +64,7 @@ class Singles:
     best : dict of candidate to the shape that explains most
     """
 
-    shapes: Mapping[str, Shapes]
+    shapes: Mapping[str, Hypotheses]
     logs: Mapping[str, Array]
     densities: Mapping[str, float]
     best: Mapping[str, Hypothesis]
@@ -80,29 +82,23 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     z = examined.frame.residuals.z
     if not examined.candidates:
         return Singles({}, {}, {}, {})
-    densities = field.named.densities(evidence, z)
-    first = dict(zip(field.candidates, densities.tolist(), strict=True))
+    named = field.named
+    densities = named.densities(evidence, named.seen(z))
+    first = dict(zip(named.names, densities.tolist(), strict=True))
     least = max(first.values()) - WORTH
-    shapes = {
-        name: refined(examined, tried) if first[name] > least else tried
-        for name, tried in examined.candidates.items()
-    }
-    parts = {name: one.parts(z) for name, one in shapes.items()}
-    dims = np.concatenate([one.dims for one in shapes.values()])
-    ends = np.cumsum([len(one) for one in shapes.values()])[:-1]
-    each = np.split(evidence.of_spaces(np.concatenate([*parts.values()]), dims, z @ z), ends)
-    logs = dict(zip(shapes, each, strict=True))
-    for name, own in shapes.items():
-        if isinstance(own, EffectShapes) and own[0].estimates is not None and first[name] > least:
-            within = within_bounds(own, z, evidence)
+    shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
+    for name, tried in examined.candidates.items():
+        worth = first[name] > least
+        own = refined(examined, tried) if worth else tried
+        parts = own.parts(z)
+        shapes[name], logs[name] = own, own.logs(evidence, parts, z @ z)
+        if worth and own[0].estimates is not None:
+            within = within_bounds([*own], z, evidence)
             logs[name] = logs[name] + within
-            parts[name] = parts[name] + 2 * within
-    return Singles(
-        shapes=shapes,
-        logs=logs,
-        densities={n: float(log_mean(logs[n], shape_weights(own))) for n, own in shapes.items()},
-        best={name: own[int(np.argmax(parts[name]))] for name, own in shapes.items()},
-    )
+            parts = parts + 2 * within
+        best[name] = own[int(np.argmax(parts))]
+    total = {name: float(log_sum(log + np.log(shapes[name].prior))) for name, log in logs.items()}
+    return Singles(shapes, logs, total, best)
 
 
 def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str, ...]]:
@@ -138,12 +134,7 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
     return classes
 
 
-def strongest(shapes: Shapes, z: Array) -> Hypothesis:
-    """Shape that explains most of residuals z (m,)."""
-    return shapes[int(np.argmax(shapes.parts(z)))]
-
-
-def refined(examined: ExaminedFit, shapes: Shapes) -> Shapes:
+def refined(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
     """Add shapes between the neighbours of the best one, and again between those."""
     z = examined.frame.residuals.z
     if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
@@ -203,20 +194,19 @@ def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
 
 
 def unknown_beside(
-    hypothesis: Hypothesis, unknown: Unknown, residuals: Residuals, evidence: Evidence
+    hypothesis: Hypothesis, unknown: LearnedShapes, residuals: Residuals, evidence: Evidence
 ) -> float | None:
     """Log evidence of something unknown beside a hypothesis, against the hypothesis alone.
 
     None where no shape has anything of its own beside it.
     """
-    q = hypothesis.basis
-    left = residuals.z - q @ (q.T @ residuals.z)
-    rest = Evidence(evidence.level, residuals.redundancy - hypothesis.dim)
-    beside = Unknown(unknown.shapes.beside(q))
-    if not beside.places:
+    rest, left = unknown.beside(hypothesis.basis), residuals.beside(hypothesis.basis)
+    if not rest.places:
         return None
-    each = beside.densities(rest, beside.parts(left[None]), np.array([left @ left]))
-    return float(log_sum(each[0]) - np.logaddexp.reduce(rest.of_noise(left @ left)))
+    evidence = replace(evidence, redundancy=left.redundancy)
+    squares = left.z @ left.z
+    density = rest.log_density(evidence, rest.parts(left.z), squares)
+    return float(density - np.logaddexp.reduce(evidence.of_noise(squares)))
 
 
 @dataclass(frozen=True)
@@ -228,7 +218,7 @@ class Together:
 
 
 def all_pairs(
-    candidates: Mapping[str, Shapes], residuals: Residuals, evidence: Evidence
+    candidates: Mapping[str, Hypotheses], residuals: Residuals, evidence: Evidence
 ) -> list[Together]:
     """Evidence for all pairs of candidates, over all shapes of both.
 
@@ -313,7 +303,7 @@ def _within_bounds(
     return within
 
 
-def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis], Array]:
+def _tried(candidates: Mapping[str, Hypotheses], z: Array) -> tuple[list[Hypothesis], Array]:
     """Shapes of which pairs are made, and the prior probability of each in its candidate."""
     tried: list[Hypothesis] = []
     weights: list[Array] = []
@@ -322,7 +312,7 @@ def _tried(candidates: Mapping[str, Shapes], z: Array) -> tuple[list[Hypothesis]
         if name == OUTLIER and len(places) > POSITIONS:
             places = np.sort(np.argsort(-shapes.parts(z), kind="stable")[:POSITIONS])
         tried += [shapes[int(k)] for k in places]
-        weights.append(shape_weights(shapes)[places])
+        weights.append(shapes.prior[places])
     return tried, np.concatenate(weights) if weights else np.zeros(0)
 
 

@@ -185,6 +185,28 @@ class Evidence:
             logs.append(top + np.log(np.sum(np.exp(each - top), axis=0)) + noise[:, level])
         return np.asarray(np.logaddexp.reduce(logs, axis=0).T)
 
+    def at_sizes(self, along: Array, share: Array, total: Array, sizes: Array) -> Array:
+        """Something with a covariance λ K beside the noise, by its size λ, over all levels.
+
+        Parameters
+        ----------
+        along : (b, k) array, squares of residuals along the eigenvectors of K
+        share : (k,) array, its eigenvalues
+        total : (b,) array, ‖z‖²
+        sizes : (s,) array, λ
+
+        Returns
+        -------
+        (b, s) array
+        """
+        growth = sizes[:, None] * share
+        taken = along @ (growth / (1 + growth)).T
+        noise, logs = self.of_noise(total), []
+        for level, nu in enumerate(self.level.freedoms):
+            rest = np.log1p(-taken / (nu + total)[:, None])
+            logs.append(noise[:, level, None] - (nu + self.redundancy) / 2 * rest)
+        return np.asarray(np.logaddexp.reduce(logs) - np.sum(np.log1p(growth), axis=1) / 2)
+
 
 def _looked_up(tables: Array, which: NDArray[np.int_], at: Array) -> Array:
     """Interpolate tables (t, k) at some of `_LOGS`, (..., s), each of s with a table of its own."""
@@ -222,9 +244,3 @@ def log_mean(logs: Array, weights: ArrayLike | None = None) -> Array:
     top = np.max(logs, axis=-1, keepdims=True)
     mean = np.sum(np.exp(logs - top) * w, axis=-1) / np.sum(w)
     return np.asarray(top[..., 0] + np.log(mean))
-
-
-def log_sum(logs: Array) -> Array:
-    """Log of the sum of exp(logs) over the last axis."""
-    top = np.max(logs, axis=-1, keepdims=True)
-    return np.asarray(top[..., 0] + np.log(np.sum(np.exp(logs - top), axis=-1)))

@@ -14,11 +14,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.space.hypotheses import (
     ALIKE,
     OUTLIER,
-    Bases,
     BumpedPositions,
     EffectShapes,
+    Hypotheses,
     Hypothesis,
-    Shapes,
     same_space,
 )
 from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, ideal_residuals, spans
@@ -181,7 +180,7 @@ class ExaminedFit:
     """
 
     frame: Frame
-    candidates: Mapping[str, Shapes]
+    candidates: Mapping[str, Hypotheses]
     invisible: tuple[str, ...]
     untestable: Mapping[str, str]
 
@@ -190,7 +189,7 @@ class ExaminedFit:
         """Evaluate the effects that are not in the model, and bumped positions."""
         residuals, solution = frame.residuals, frame.solution
         modelled = {effect.name for effect in solution.model.effects}
-        candidates: dict[str, Shapes] = {}
+        candidates: dict[str, Hypotheses] = {}
         invisible, untestable = [], {}
         for name in effect_names():
             if name in modelled:
@@ -229,7 +228,9 @@ class ExaminedFit:
     def alike(self, others: Sequence[Hypothesis]) -> set[str]:
         """Effects indistinguishable from any of the given hypotheses, in one of their shapes."""
         dims = np.array([other.dim for other in others])
-        products = self._ideals.parts(np.concatenate([other.ideal.T for other in others]))
+        ideals, ends = self._ideals
+        products = np.concatenate([other.ideal for other in others], axis=1).T @ ideals
+        products = np.add.reduceat(products**2, ends[:-1], axis=1)
         # The squared cosines sum to the squares of all products, so most need no decomposition.
         squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
         same: set[str] = set()
@@ -255,11 +256,12 @@ class ExaminedFit:
 
     def _cosines(self, hypothesis: Hypothesis, rank: int) -> Array:
         """Canonical cosine of this rank, 1 for the largest, with each shape; 0 if it has fewer."""
-        products = hypothesis.ideal.T @ self._ideals.together
+        ideals, ends = self._ideals
+        products, dims = hypothesis.ideal.T @ ideals, np.diff(ends)
         cosines = np.zeros(len(self._shapes))
-        for d in np.unique(self._ideals.dims[self._ideals.dims >= rank]):
-            alike = np.flatnonzero(self._ideals.dims == d)
-            blocks = products[:, self._ideals.ends[alike][:, None] + np.arange(d)]
+        for d in np.unique(dims[dims >= rank]):
+            alike = np.flatnonzero(dims == d)
+            blocks = products[:, ends[alike][:, None] + np.arange(d)]
             values = np.linalg.svd(np.swapaxes(blocks, 0, 1), compute_uv=False)[:, rank - 1]
             cosines[alike] = np.minimum(values, 1.0)
         return cosines
@@ -271,9 +273,10 @@ class ExaminedFit:
         return [shape for shapes in effects for shape in shapes]
 
     @cached_property
-    def _ideals(self) -> Bases:
-        """Their spaces for an ideal sensor."""
-        return Bases.beside_each_other([shape.ideal for shape in self._shapes])
+    def _ideals(self) -> tuple[Array, NDArray[np.int_]]:
+        """Bases of their spaces for an ideal sensor, side by side, and where each begins."""
+        bases = [shape.ideal for shape in self._shapes]
+        return np.concatenate(bases, axis=1), np.cumsum([0, *(basis.shape[1] for basis in bases)])
 
 
 def examine(solution: Solution) -> ExaminedFit:

@@ -1,73 +1,35 @@
-"""Hypotheses about what the model lacks: each shape of an effect is a space of residuals.
+"""Everything that may be missing: alternatives, each with a covariance of the residuals.
 
-Two things count of a space: its dimension, and the size of the part of the residuals that lies in
-it. Many spaces of one kind are evaluated together. No matrix of all conditions by all conditions is
-formed, so the effort grows with the number of positions.
+An effect in one of its shapes, or a bumped position, is a space of residuals, K = Q Qᵀ/l: nothing
+is known of its l parameters. A smooth function of a coordinate has a covariance of its own
+(`accelstudy.diagnosis.space.shapes`). Of unknown size, each adds λ K to that of the noise.
+
+No matrix of all conditions by all conditions is formed, so the effort grows with the number of
+positions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, TypeAlias, overload
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import root_of
 from accelstudy.diagnosis.space.residuals import Residuals, position_products
 from accelstudy.effects import Effect
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.evidence.size import Evidence
 
 Array = NDArray[np.float64]
 ALIKE = 0.9999
 """Canonical cosine above which two signatures are the same."""
 
 OUTLIER = "outlier_position"
-
-
-class Spaces(Protocol):
-    """Some spaces of residuals."""
-
-    @property
-    def dims(self) -> NDArray[np.int_]:
-        """Their dimensions, (s,)."""
-
-    def parts(self, errors: Array) -> Array:
-        """Squares of what residuals (..., m) have in each of them, (..., s)."""
-
-
-@dataclass(frozen=True)
-class Bases:
-    """Spaces given by orthonormal bases in the residual space.
-
-    Attributes
-    ----------
-    together : (m, Σ l) array, one basis beside the other
-    dims : (s,) int array, l
-    """
-
-    together: Array
-    dims: NDArray[np.int_]
-
-    @classmethod
-    def beside_each_other(cls, bases: Sequence[Array]) -> Bases:
-        """Gather bases (m, l)."""
-        dims = np.array([basis.shape[1] for basis in bases])
-        return cls(np.concatenate(bases, axis=1), dims)
-
-    def split(self) -> list[Array]:
-        """Each of the bases, (m, l)."""
-        return np.split(self.together, self.ends[1:-1], axis=1)
-
-    def parts(self, errors: Array) -> Array:
-        """Squares of what residuals (..., m) have in each of them, (..., s)."""
-        return np.add.reduceat((errors @ self.together) ** 2, self.ends[:-1], axis=-1)
-
-    @cached_property
-    def ends(self) -> NDArray[np.int_]:
-        """Where the bases begin and the last one ends, (s + 1,)."""
-        return np.concatenate([[0], np.cumsum(self.dims)])
 
 
 @dataclass(frozen=True)
@@ -136,46 +98,136 @@ class Hypothesis:
         return self.effect.settings[self.smooth]
 
 
-@dataclass(frozen=True)
-class EffectShapes(Bases, Sequence[Hypothesis]):
-    """Shapes of one effect.
+class Shapes:
+    """Alternatives of one thing that may be missing: s covariances λ K of the residuals.
 
     Attributes
     ----------
-    hypotheses : tuple of Hypothesis, whose bases are columns of `together`
+    prior : (s,) array, prior probabilities, which sum to 1
+    shares : tuple of s arrays (l,), eigenvalues of each K, which sum to 1
+    vectors : (m, Σ l) array, its eigenvectors, one shape beside the other
     """
 
+    prior: Array
+    shares: tuple[Array, ...]
+    vectors: Array
+
+    @cached_property
+    def dims(self) -> NDArray[np.int_]:
+        """Number of eigenvectors of each shape, (s,)."""
+        return np.array([len(share) for share in self.shares], dtype=int)
+
+    @cached_property
+    def ends(self) -> NDArray[np.int_]:
+        """Where those of each shape begin and those of the last one end, (s + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.dims)])
+
+    def split(self, along: Array) -> list[Array]:
+        """Divide what there is of each eigenvector, (..., Σ l), by shape."""
+        return np.split(along, self.ends[1:-1], axis=-1)
+
+    def parts(self, errors: Array) -> Array:
+        """What the densities need of residuals (..., m): squares along the vectors, (..., Σ l)."""
+        return np.asarray((errors @ self.vectors) ** 2)
+
+    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Log density of residuals under each shape, (..., s), by their parts and ‖z‖² (...)."""
+        along = self.split(np.atleast_2d(parts))
+        logs = evidence.of_shapes(along, self.shares, np.atleast_1d(squares))
+        return logs.reshape(*np.shape(squares), -1)
+
+    def taken(self, parts: Array, size: float) -> tuple[Array, Array]:
+        """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,), of a size λ."""
+        growth = [size * share for share in self.shares]
+        along = zip(self.split(parts), growth, strict=True)
+        taken = np.stack([each @ (g / (1 + g)) for each, g in along], axis=-1)
+        return taken, np.array([np.sum(np.log1p(g)) for g in growth])
+
+    def log_density(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Log density of residuals over all shapes, (...)."""
+        return log_sum(self.logs(evidence, parts, squares) + np.log(self.prior))
+
+    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
+        """Sum vectors of some shapes, (b, m), with weights (Σ l,), one shape after the other."""
+        dims = self.dims[places]
+        rows = np.repeat(np.arange(len(places)), dims)
+        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
+        columns = np.zeros((len(places), self.vectors.shape[1]))
+        columns[rows, first + np.arange(len(rows))] = amounts
+        return np.asarray(columns @ self.vectors.T)
+
+
+class Spaces(Shapes):
+    """Shapes of which nothing is known but a space: all eigenvalues of a K are equal."""
+
+    def parts(self, errors: Array) -> Array:
+        """Squares of what residuals (..., m) have in each space, (..., s)."""
+        return np.add.reduceat((errors @ self.vectors) ** 2, self.ends[:-1], axis=-1)
+
+    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Log density of residuals under each shape, (..., s)."""
+        return evidence.of_spaces(parts, self.dims, squares)
+
+    def taken(self, parts: Array, size: float) -> tuple[Array, Array]:
+        """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,)."""
+        g = size / self.dims
+        return parts * (g / (1 + g)), np.asarray(self.dims * np.log1p(g), dtype=float)
+
+
+def even(dim: int) -> Array:
+    """Eigenvalues of a space of which nothing else is known, (dim,)."""
+    return np.full(dim, 1 / max(dim, 1))
+
+
+class Hypotheses(Spaces):
+    """Spaces that are hypotheses with a name: those of an effect, or all bumped positions."""
+
+    def __len__(self) -> int:
+        return len(self.shares)
+
+    def __getitem__(self, index: int) -> Hypothesis:
+        raise NotImplementedError
+
+    def __iter__(self) -> Iterator[Hypothesis]:
+        return (self[i] for i in range(len(self)))
+
+    def strongest(self, z: Array) -> Hypothesis:
+        """Shape that explains most of residuals z (m,)."""
+        return self[int(np.argmax(self.parts(z)))]
+
+
+@dataclass(frozen=True)
+class EffectShapes(Hypotheses):
+    """Shapes of one effect; even a priori over the logarithm of a smooth setting, else even.
+
+    Attributes
+    ----------
+    prior, shares, vectors : as in `Shapes`
+    hypotheses : tuple of Hypothesis, whose bases are columns of the vectors
+    """
+
+    prior: Array
+    shares: tuple[Array, ...]
+    vectors: Array
     hypotheses: tuple[Hypothesis, ...]
 
     @classmethod
     def of(cls, hypotheses: Sequence[Hypothesis]) -> EffectShapes:
         """Gather shapes."""
-        bases = Bases.beside_each_other([h.basis for h in hypotheses])
-        shared = zip(hypotheses, bases.split(), strict=True)
-        return cls(bases.together, bases.dims, tuple(replace(h, basis=q) for h, q in shared))
+        weights, shares = np.ones(len(hypotheses)), tuple(even(h.dim) for h in hypotheses)
+        if len(hypotheses) > 1 and hypotheses[0].smooth is not None:
+            weights = np.gradient(np.log([h.value for h in hypotheses]))
+        vectors = np.concatenate([h.basis for h in hypotheses], axis=1)
+        shapes = cls(weights / weights.sum(), shares, vectors, ())
+        each = zip(hypotheses, shapes.split(vectors), strict=True)
+        return replace(shapes, hypotheses=tuple(replace(h, basis=basis) for h, basis in each))
 
-    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sum the columns of some bases, (b, m), with weights (Σ l,), one basis after the other."""
-        dims = self.dims[places]
-        rows = np.repeat(np.arange(len(places)), dims)
-        first = np.repeat(self.ends[places] - (np.cumsum(dims) - dims), dims)
-        columns = np.zeros((len(places), self.together.shape[1]))
-        columns[rows, first + np.arange(len(rows))] = amounts
-        return np.asarray(columns @ self.together.T)
-
-    def __len__(self) -> int:
-        return len(self.hypotheses)
-
-    @overload
-    def __getitem__(self, index: int) -> Hypothesis: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Hypothesis, ...]: ...
-    def __getitem__(self, index: int | slice) -> Hypothesis | tuple[Hypothesis, ...]:
+    def __getitem__(self, index: int) -> Hypothesis:
         return self.hypotheses[index]
 
 
 @dataclass(frozen=True)
-class BumpedPositions(Sequence[Hypothesis]):
+class BumpedPositions(Hypotheses):
     """One hypothesis per position: its conditions are shifted by an arbitrary amount.
 
     Its space is spanned by R E_i H_i, with E_i the columns of the unit matrix that belong to the
@@ -183,39 +235,33 @@ class BumpedPositions(Sequence[Hypothesis]):
 
     Attributes
     ----------
+    prior, shares : as in `Shapes`
     residuals : Residuals
     places : (s,) int array, the positions that others control
     root : (s, c, c) array, H of these; columns of zeros for what is not controlled
-    dims : (s,) int array
     """
 
+    prior: Array
+    shares: tuple[Array, ...]
     residuals: Residuals
     places: NDArray[np.int_]
     root: Array
-    dims: NDArray[np.int_]
 
     @classmethod
     def of(cls, residuals: Residuals) -> BumpedPositions:
         """All positions that the others control."""
         root, rank = root_of(residuals.blocks)
         places = np.flatnonzero((rank > 0) & (rank < residuals.redundancy))
-        return cls(residuals, places, root[places], rank[places])
+        prior = np.ones(len(places)) / max(len(places), 1)
+        shares = tuple(even(dim) for dim in rank[places].tolist())
+        return cls(prior, shares, residuals, places, root[places])
 
     def parts(self, errors: Array) -> Array:
         """Squares of what residuals (..., m) have in each of them, (..., s)."""
         parts = position_products(errors, self.root, self.places)
         return np.sum([part**2 for part in parts], axis=0)
 
-    def __len__(self) -> int:
-        return len(self.places)
-
-    @overload
-    def __getitem__(self, index: int) -> Hypothesis: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Hypothesis, ...]: ...
-    def __getitem__(self, index: int | slice) -> Hypothesis | tuple[Hypothesis, ...]:
-        if isinstance(index, slice):
-            return tuple(self[i] for i in range(*index.indices(len(self))))
+    def __getitem__(self, index: int) -> Hypothesis:
         place = int(self.places[index])
         where, directions = self.rows_of(int(index))
         rows = np.zeros((len(self.residuals.design), directions.shape[1]))
@@ -224,7 +270,7 @@ class BumpedPositions(Sequence[Hypothesis]):
         return Hypothesis(OUTLIER, None, directions, basis, basis, place)
 
     def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
-        """Sum the columns of some bases as `EffectShapes.drawn` does, but without R, (b, m)."""
+        """Sum vectors of some shapes, but without R, (b, m)."""
         n, c = len(self.residuals.whitening), self.root.shape[-1]
         each = np.zeros((len(places), c))
         # The columns of H that are zero are the first ones.
@@ -243,8 +289,10 @@ class BumpedPositions(Sequence[Hypothesis]):
         return slice(place * c, (place + 1) * c), root[:, np.any(root != 0, axis=0)]
 
 
-Shapes: TypeAlias = EffectShapes | BumpedPositions
-"""All shapes of one thing that may be missing: a sequence of hypotheses, and their spaces."""
+def log_sum(logs: Array) -> Array:
+    """Log of the sum of exp(logs) over the last axis."""
+    top = np.max(logs, axis=-1, keepdims=True)
+    return np.asarray(top[..., 0] + np.log(np.sum(np.exp(logs - top), axis=-1)))
 
 
 def cosines(a: Array, b: Array) -> Array:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.space.hypotheses import Spaces, even
 from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ def lack_of_fit(residuals: Residuals, forces: Array) -> LackOfFit | None:
 
 
 @dataclass(frozen=True)
-class LackOfFit:
+class LackOfFit(Spaces):
     """All that positions of one attitude have in common: everything but their differences.
 
     A change of conditions by t that is the same in all positions of an attitude is L_iᵀ t at unit
@@ -48,12 +49,14 @@ class LackOfFit:
     starts : (a,) int array, where each attitude begins there
     weights : (n, c, c) array, W_i with Σ W_i e_i the coordinates (c,) of an attitude, sorted
     absorbed : (a c + k, l) array, orthonormal basis of what the model absorbs, in coordinates
+    shares : tuple of one array (l,), as in `Shapes`
     """
 
     order: NDArray[np.int_]
     starts: NDArray[np.int_]
     weights: Array
     absorbed: Array
+    shares: tuple[Array, ...]
 
     @classmethod
     def of(cls, residuals: Residuals, labels: NDArray[np.int_]) -> LackOfFit:
@@ -64,15 +67,12 @@ class LackOfFit:
         normal = np.add.reduceat(whitening @ np.swapaxes(whitening, 1, 2), starts, axis=0)
         inverse = np.linalg.inv(np.linalg.cholesky(normal))
         counts = np.diff(np.append(starts, len(labels)))
-        same = cls(order, starts, np.repeat(inverse, counts, axis=0) @ whitening, np.empty((0, 0)))
+        weights = np.repeat(inverse, counts, axis=0) @ whitening
+        same = cls(order, starts, weights, np.empty((0, 0)), ())
         left, values, _ = np.linalg.svd(same._means(residuals.absorbed.T).T, full_matrices=False)
-        return cls(order, starts, same.weights, left[:, values > ABSORBED])
-
-    @property
-    def dims(self) -> NDArray[np.int_]:
-        """Its dimension, (1,)."""
-        rows, absorbed = self.absorbed.shape
-        return np.array([rows - absorbed])
+        absorbed = left[:, values > ABSORBED]
+        shares = (even(absorbed.shape[0] - absorbed.shape[1]),)
+        return replace(same, absorbed=absorbed, shares=shares)
 
     def parts(self, errors: Array) -> Array:
         """Squares of what residuals (..., m) have in it, (..., 1)."""

@@ -65,6 +65,36 @@ class Residuals:
             np.sqrt(solution.variances),
         )
 
+    @classmethod
+    def at(
+        cls,
+        model: SensorModel,
+        approach: Approach,
+        observed: Observations,
+        parameters: Array | None = None,
+        variances: Array | None = None,
+    ) -> Residuals:
+        """Residual space of observations as they are, without any adjustment.
+
+        Parameters
+        ----------
+        model, approach, observed : as in `calibrate`, one session
+        parameters : (u,) array; those of an ideal sensor by default
+        variances : (n, o) array, of the observations; by default as they say
+        """
+        problem = CalibrationProblem.of(model, approach, replace(observed, initial=None))
+        x = problem.initial[0] if parameters is None else parameters
+        at = problem.linearised(x[None], problem.observations)
+        b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
+        taken = problem.cofactors if variances is None else variances
+        whitening, seen = whitening_of(b, taken), problem.weights > 0
+        a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
+        e = np.linalg.solve(whitening, at.psi[:, 0].T[..., None])
+        root = np.sqrt(problem.weights)
+        design = np.concatenate([a.reshape(-1, a.shape[-1]), np.diag(root)[seen]])
+        errors = np.concatenate([e.ravel(), (root * (x - problem.direct[0]))[seen]])
+        return cls(design, errors, whitening, b, np.sqrt(taken))
+
     @cached_property
     def absorbed(self) -> Array:
         """U, (m, u)."""
@@ -74,6 +104,10 @@ class Residuals:
     def z(self) -> Array:
         """Residuals of unit weight, (m,)."""
         return self.project(self.errors)
+
+    def beside(self, basis: Array) -> Residuals:
+        """Residuals of a fit that takes up a further space, too, with a basis (m, l)."""
+        return replace(self, design=np.concatenate([self.design, basis], axis=1))
 
     @property
     def redundancy(self) -> int:
@@ -117,10 +151,6 @@ class Residuals:
         unit = np.sqrt(np.mean(np.sum(self.whitening**2, axis=2)))
         force, turned = signature.force, g * signature.angles
         return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1))) / unit
-
-    def rows(self, change: Array) -> Array:
-        """Scale changes of the conditions, (n, c, k), to unit weight, (m, k)."""
-        return self.stacked(np.asarray(np.linalg.solve(self.whitening, change), dtype=float))
 
     def stacked(self, change: Array) -> Array:
         """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k)."""
@@ -182,35 +212,7 @@ def ideal_residuals(solution: Solution) -> tuple[Residuals, Array]:
     variances = solution.variances.copy()
     variances[:, :3] = variances[:, :3].mean()
     ideal = replace(observed, forces=forces[None], angles=angles[None], gravity=g)
-    return at_an_ideal_sensor(model, approach, ideal, variances), forces
-
-
-def at_an_ideal_sensor(
-    model: SensorModel,
-    approach: Approach,
-    observed: Observations,
-    variances: Array | None = None,
-) -> Residuals:
-    """Residual space of an ideal sensor, of which these are the true observations.
-
-    Parameters
-    ----------
-    model, approach, observed : as in `calibrate`, one session
-    variances : (n, o) array, of the observations; by default as they say
-    """
-    problem = CalibrationProblem.of(model, approach, observed)
-    if variances is None:
-        variances = problem.cofactors
-    x = np.zeros(problem.initial.shape[1])
-    if problem.with_gravity:
-        x[-1] = np.ravel(observed.gravity)[0]
-    at = problem.linearised(x[None], problem.observations)
-    b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
-    whitening = whitening_of(b, variances)
-    a = np.linalg.solve(whitening, np.moveaxis(at.jac_parameters[:, :, 0], -1, 0))
-    prior = np.diag(np.sqrt(problem.weights))[problem.weights > 0]
-    design = np.concatenate([a.reshape(-1, a.shape[-1]), prior])
-    return Residuals(design, np.zeros(len(design)), whitening, b, np.sqrt(variances))
+    return Residuals.at(model, approach, ideal, variances=variances), forces
 
 
 def spans(

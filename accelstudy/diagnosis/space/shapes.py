@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.diagnosis.space.signatures import Columns
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import (
@@ -33,6 +33,9 @@ from accelstudy.effects.smooth import (
     spectrum,
 )
 from accelstudy.leveling.angles import wrapped
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.evidence.size import Evidence
 
 Array = NDArray[np.float64]
 
@@ -47,32 +50,42 @@ Place: TypeAlias = tuple[str, str]
 """A coordinate, and the target that depends on it."""
 
 
+OF_ATTITUDE = ("force", "bias")
+"""Place of anything that repeated positions of one attitude have in common."""
+
+
 @dataclass(frozen=True)
-class LearnedShapes:
-    """Shapes, each with a covariance K in the space of residuals.
+class LearnedShapes(Shapes):
+    """Something without a name: shapes, and anything of the attitude alone where that repeats.
 
     Attributes
     ----------
     places : tuple of Place, s
-    weights : (s,) array, prior probabilities: even over the coordinates, then over their targets,
-        over the kinds of functions that are tried of each, and over their smoothness
+    prior : (s,) array, even over the coordinates, then over their targets, over the kinds of
+        functions that are tried of each, and over their smoothness; the attitude counts as one
+        coordinate
     vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
-    shares : tuple of s arrays (k,), eigenvalues of K, which sum to 1
+    shares : tuple of arrays (k,), eigenvalues of K of each shape, which sum to 1
+    attitude : Spaces or None, everything but the differences of repeated positions, the last place
     """
 
     places: tuple[Place, ...]
-    weights: Array
+    prior: Array
     vectors: Array
     shares: tuple[Array, ...]
+    attitude: Spaces | None = None
 
     @classmethod
-    def of(cls, frame: Frame, only: Collection[Place] = ()) -> LearnedShapes:
+    def of(
+        cls, frame: Frame, only: Collection[Place] = (), attitude: Spaces | None = None
+    ) -> LearnedShapes:
         """All shapes that the coordinates of a session allow, and that its model leaves.
 
         Parameters
         ----------
         frame : Frame
         only : places; all by default
+        attitude : Spaces or None, what repeated positions of one attitude have in common
         """
         places: list[Place] = []
         kinds: list[int] = []
@@ -88,11 +101,16 @@ class LearnedShapes:
         targets = Counter(coordinate for coordinate, _ in dict.fromkeys(places))
         of_place = Counter(dict(zip(kinds, places, strict=True)).values())
         settings = Counter(kinds)
-        weights = [
+        weights = np.array([
             1 / (len(targets) * targets[place[0]] * of_place[place] * settings[kind])
             for place, kind in zip(places, kinds, strict=True)
-        ]
-        return cls._of(places, np.array(weights), covariances, len(frame.residuals.design))
+        ])  # fmt: skip
+        shapes = cls._of(places, weights, covariances, len(frame.residuals.design))
+        if attitude is None:
+            return shapes
+        share = 1 / (len(targets) + 1)
+        prior = np.append(weights * (1 - share), share)
+        return replace(shapes, places=(*places, OF_ATTITUDE), prior=prior, attitude=attitude)
 
     @classmethod
     def _of(
@@ -117,38 +135,48 @@ class LearnedShapes:
     def beside(self, basis: Array) -> LearnedShapes:
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
         left = self.vectors - basis @ (basis.T @ self.vectors)
-        roots = self.by_shape(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
+        roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
         seen = [i for i, root in enumerate(roots) if np.sum(root**2) > SURVIVES]
-        weights = self.weights[seen]
-        return self._of(
-            [self.places[i] for i in seen],
-            weights / weights.sum(),
-            [roots[i] for i in seen],
-            len(basis),
-        )
+        places, weights = [self.places[i] for i in seen], self.prior[seen]
+        return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
 
     def at(self, places: Collection[Place]) -> LearnedShapes:
         """Those of some places, whose weights sum to 1."""
-        some = [i for i, place in enumerate(self.places) if place in places]
-        vectors = self.by_shape(self.vectors)
+        some = [i for i in range(len(self.shares)) if self.places[i] in places]
+        vectors, weights = self.split(self.vectors), self.prior[some]
         return LearnedShapes(
             tuple(self.places[i] for i in some),
-            self.weights[some] / self.weights[some].sum(),
+            weights / weights.sum(),
             np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
             tuple(self.shares[i] for i in some),
         )
 
-    def __len__(self) -> int:
-        return len(self.places)
+    def parts(self, errors: Array) -> Array:
+        """Squares of residuals (..., m) along the vectors, and in the space of the attitude."""
+        squares = super().parts(errors)
+        if self.attitude is None:
+            return squares
+        return np.concatenate([squares, self.attitude.parts(errors)], axis=-1)
 
-    def squares(self, errors: Array) -> Array:
-        """Squares of residuals (..., m) along the eigenvectors, (..., Σ k)."""
-        return np.asarray((errors @ self.vectors) ** 2)
+    def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
+        """Log density of residuals under each shape, (..., s), by their parts and ‖z‖² (...)."""
+        logs = [np.zeros((*np.shape(squares), 0))]
+        if self.shares:
+            logs.append(super().logs(evidence, parts[..., : self.ends[-1]], squares))
+        if self.attitude is not None:
+            logs.append(self.attitude.logs(evidence, parts[..., self.ends[-1] :], squares))
+        return np.concatenate(logs, axis=-1)
 
-    def by_shape(self, along: Array) -> list[Array]:
-        """Divide what there is of each eigenvector, (..., Σ k), by shape."""
-        ends = np.cumsum([0, *map(len, self.shares)]).tolist()
-        return [along[..., low:high] for low, high in pairwise(ends)]
+    def of_place(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> dict[Place, Array]:
+        """Log density of residuals under the shapes of each place, times its prior, (...)."""
+        logs = self.logs(evidence, parts, squares) + np.log(self.prior)
+        of_place = {p: [q == p for q in self.places] for p in dict.fromkeys(self.places)}
+        return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
+
+    def by_place(self, evidence: Evidence, z: Array) -> dict[Place, float]:
+        """Return the same of residuals z (m,)."""
+        each = self.of_place(evidence, self.parts(z), z @ z)
+        return {place: float(log) for place, log in each.items()}
 
 
 # --- coordinates --------------------------------------------------------------------------------

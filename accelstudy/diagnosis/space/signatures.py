@@ -27,10 +27,6 @@ class Signature:
     force: Array
     angles: Array
 
-    def reduced(self, directions: Array) -> Signature:
-        """Signature of combinations of the parameters, `directions` (k, l)."""
-        return Signature(self.force @ directions, self.angles @ directions)
-
 
 class Columns:
     """The columns of a `HoldConditions` with further axes, for arrays of parameters or settings.
