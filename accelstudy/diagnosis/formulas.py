@@ -19,9 +19,9 @@ from scipy.stats import f as f_distribution
 from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import comma_list, estimate
 from accelstudy.diagnosis.decision.learned import coordinate_values, weighted_shapes
-from accelstudy.diagnosis.decision.priors import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, spans
 from accelstudy.diagnosis.space.shapes import (
@@ -94,8 +94,8 @@ def ranked(
         if np.isfinite(logs).any():
             mean = float(logsumexp(logs) - np.log(len(logs)))
             found.append((form, float(form.settings[np.argmax(logs)]), mean))
-    each = np.log((1 - UNKNOWN) / max(len(found), 1))
-    other = functions.density_of_others(place, evidence) + np.log(UNKNOWN)
+    each = np.log((1 - RULES.prior_unknown) / max(len(found), 1))
+    other = functions.density_of_others(place, evidence) + np.log(RULES.prior_unknown)
     posterior = softmax([*(log + each for _, _, log in found), other]).tolist()
 
     target = TARGETS[effect.target]

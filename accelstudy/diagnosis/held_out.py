@@ -12,11 +12,10 @@ from scipy.special import softmax
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.learned import fit_of_place, most_probable_place
 from accelstudy.diagnosis.decision.posterior import (
+    Explanation,
     Posterior,
-    Weighed,
     Weighing,
     weigh_beside,
     weigh_pairs,
@@ -41,6 +40,7 @@ from accelstudy.diagnosis.prediction import (
     relative_variance,
     split_positions,
 )
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.shapes import Place
 
 Array = NDArray[np.float64]
@@ -223,7 +223,7 @@ def _place_of(part: Problem, singles: Singles) -> Place | None:
     if unknown is None:
         return None
     density = float(unknown.log_density(part.evidence, unknown.parts(z), z @ z))
-    alone = Weighed((UNKNOWN,), ((UNKNOWN,),), density + float(np.log(priors.UNKNOWN)))
+    alone = Explanation((UNKNOWN,), ((UNKNOWN,),), density + float(np.log(RULES.prior_unknown)))
     classes = classes_of(singles, equivalents(part.examined, singles))
     posterior = Posterior.of([alone, *weigh_beside(part, singles, classes)])
     found = most_probable_place(part, posterior)
@@ -243,4 +243,4 @@ def _is_of(
             ((fit, rest),) = split.predictors(one.best)
             logs.append(-float(np.sum((missed - left @ fit @ rest) ** 2)) / (2 * variance))
             of_group.append(one.names[0] in group)
-    return bool(np.sum(softmax(logs)[of_group]) >= priors.SURE)
+    return bool(np.sum(softmax(logs)[of_group]) >= RULES.sure)

@@ -18,14 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.decision.learned import SIZES, weighted_shapes
-from accelstudy.diagnosis.decision.posterior import CREDIBLE
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import total_odds
 from accelstudy.diagnosis.evidence.field import Seen, log_ratio, simulated
 from accelstudy.diagnosis.evidence.hypotheses import Class
 from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
 from accelstudy.diagnosis.space.shapes import Place
 
@@ -107,9 +106,9 @@ def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
     classes = np.unique(of[of >= 0])
     each = np.column_stack([*(odds[:, of == c].max(axis=1) for c in classes), odds[:, of < 0]])
     p = softmax(each, axis=1)
-    few = np.sort(p, axis=1)[:, -priors.MANY :].sum(axis=1) >= CREDIBLE
+    few = np.sort(p, axis=1)[:, -RULES.many :].sum(axis=1) >= RULES.credible
     top = np.append(classes, np.full(each.shape[1] - len(classes), -1))[np.argmax(p, axis=1)]
-    return np.where((p.max(axis=1) >= priors.SURE) | few, top, -1)
+    return np.where((p.max(axis=1) >= RULES.sure) | few, top, -1)
 
 
 def by_name(
@@ -139,10 +138,10 @@ def learned(problem: Problem, seen: Seen, place: Place) -> Ints:
     assert unknown is not None
     densities = field.densities(evidence, seen)
     densities[:, :-1] -= np.log(len(field.candidates))
-    densities[:, -1] += np.log(priors.UNKNOWN)
+    densities[:, -1] += np.log(RULES.prior_unknown)
     of_place = unknown.of_place(evidence, seen.parts[-1], seen.squares)[place]
-    share = np.exp(of_place + np.log(priors.UNKNOWN) - log_sum(densities))
-    return np.where(share >= priors.SURE, 0, -1)
+    share = np.exp(of_place + np.log(RULES.prior_unknown) - log_sum(densities))
+    return np.where(share >= RULES.sure, 0, -1)
 
 
 def by_place(part: Problem, split: LinearSplit, noise: Array, place: Place) -> tuple[Ints, Array]:

@@ -61,39 +61,25 @@ class Loop:
         chosen = (s["simulation"] == simulation) & (s["calibration"] == calibration)
         return s[chosen & s["converged"] & _comparable(s["sigma0_squared"])]
 
-    def interval(self, simulation: str, calibration: str) -> tuple[float, float]:
-        """Where the central 95 % of the simulated variances of unit weight lie."""
-        values = self.case(simulation, calibration)["sigma0_squared"]
-        low, high = np.quantile(values, [0.025, 0.975])
-        return float(low), float(high)
-
-    def contains(self, simulation: str, calibration: str) -> bool:
-        """Whether the measured variance of unit weight lies there."""
-        low, high = self.interval(simulation, calibration)
-        return low <= self.measured[calibration] <= high
-
-    def tilt(self, simulation: str, calibration: str) -> float:
-        """Tilt error, rms over the sessions, rad."""
-        values = self.case(simulation, calibration)["tilt_error_rad"]
-        return float(np.sqrt(np.mean(values**2)))
-
     @property
     def document(self) -> dict[str, Any]:
-        """Plain data for `diagnosis.json`."""
-        return {
-            "replicates": int(self.sessions["replicate"].max()) + 1,
-            "measured_sigma0_squared": dict(self.measured),
-            "cases": [
+        """Plain data for `diagnosis.json`; tilt errors are rms over the sessions."""
+        cases = []
+        for simulation, calibration in CASES:
+            case = self.case(simulation, calibration)
+            low, high = np.quantile(case["sigma0_squared"], [0.025, 0.975]).tolist()
+            cases.append(
                 {
                     "simulation": simulation,
                     "calibration": calibration,
-                    "sigma0_squared_central95": list(self.interval(simulation, calibration)),
-                    "contains_measurement": self.contains(simulation, calibration),
-                    "tilt_rms_mgon": self.tilt(simulation, calibration) / MGON,
+                    "sigma0_squared_central95": [low, high],
+                    "contains_measurement": low <= self.measured[calibration] <= high,
+                    "tilt_rms_mgon": float(np.sqrt(np.mean(case["tilt_error_rad"] ** 2))) / MGON,
                 }
-                for simulation, calibration in CASES
-            ],
-        }
+            )
+        replicates = int(self.sessions["replicate"].max()) + 1
+        measured = dict(self.measured)
+        return {"replicates": replicates, "measured_sigma0_squared": measured, "cases": cases}
 
 
 def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1) -> Loop | None:

@@ -2,113 +2,235 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from accelstudy.adjustment.quality import GlobalTest, Solution, global_test
+from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
 from accelstudy.approaches import Approach
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.progress import stage
+from accelstudy.campaign.calibration.assessment import SUSPECT
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.consequences import Change, LikeShape
-from accelstudy.diagnosis.decision.posterior import Explanation
+from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
+from accelstudy.diagnosis.decision.learned import shares_of_places
+from accelstudy.diagnosis.decision.noise import (
+    sigma_holds,
+    tests_of_noise,
+    unit_variance,
+    worst_of,
+)
+from accelstudy.diagnosis.decision.posterior import Case, Explanation
+from accelstudy.diagnosis.decision.problem import Problem, is_exact
+from accelstudy.diagnosis.decision.refits import with_settings
 from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.decision.verdict import Named
+from accelstudy.diagnosis.decision.verdict import (
+    Choice,
+    Finding,
+    Reason,
+    because,
+    coloured,
+    unrecorded,
+)
 from accelstudy.diagnosis.evidence.detection import Detection
-from accelstudy.diagnosis.evidence.noise_tests import NoiseTest
+from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.noise_tests import LEVEL, NoiseTest
 from accelstudy.diagnosis.held_out import Gap
-from accelstudy.diagnosis.next_positions import NextPosition
-from accelstudy.diagnosis.shape import LearnedShape
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.shape import LearnedShape, shape_of
+from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
+from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
-from accelstudy.diagnosis.visibility import UpperLimit
+from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
+from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
-LEVEL_EFFECTS = 0.04
-"""Level of the test for anything that is missing, where the noise level is not tested as well."""
-LARGER = 1.02
-"""Ratio of tilt errors from which on one counts as larger."""
+MISSING = ("named", "narrowed", "learned", "unknown")
+"""Verdicts by which the model lacks something."""
 
 
-def level_of_effects(sigma_known: bool) -> float:
-    """Level of the test for anything that is missing.
+class Estimate(NamedTuple):
+    """Value of a parameter or setting with its sigma, SI."""
 
-    With the tests of the noise it makes 5 % in all. Where sigma is given, its test takes a part.
-    """
-    return LEVEL_EFFECTS - REFUTED if sigma_known else LEVEL_EFFECTS
+    name: str
+    value: float
+    sigma: float | None
+    unit: str
+
+
+class Rival(NamedTuple):
+    """An effect with a similar signature, and the cosine between them."""
+
+    name: str
+    cosine: float
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What is found in a campaign, and how sure that is.
+class Named:
+    """An effect, noise effect or gross error that was found.
 
     Attributes
     ----------
-    campaign : Campaign, with a recognised gross error mended
-    approach : Approach
-    model, extended : SensorModel, without and with the effects that were found
-    verdict : str, "no_effect", "named", "narrowed", "learned", "unknown", "noise_model" or
-        "gross_error"
-    reason : str, why the verdict is what it is
-    says_the_level : bool, whether the reason says how large the residuals are
-    coloured : float, probability of coloured noise that may be an effect of an absent column
-    unrecorded : bool, whether the reason says so
-    weak : bool, whether there is evidence that something is missing, too weak for a verdict
-    credible_set : tuple of Explanation, most probable first; empty if nothing is missing
-    found : tuple of Named; of the unknown, what is certain all the same
-    place : Place or None, coordinate and target of a learned function, which is found first
-    base : Solution, of the base model with equal axes
-    frame : Frame, of the base fit with unequal axes weighted
-    final : Frame, of the extended fit, or the same
-    invisible : tuple of str, effects that the parameters of the model absorb whatever their size
-    untestable : dict of effect to the reason why it cannot be tested
-    sigma_known : bool
-    sigma_holds : bool, whether sigma is given, and the final fit does not refute it
-    unit_variance : float, variance of unit weight that is taken for the noise
-    noise_tests : tuple of NoiseTest
-    screening : Detection, of all candidates
-    simulations : int, of residuals without any effect
-    probabilities : dict of name to posterior probability, given that something is missing
-    gap : Gap
+    name, spec : str; of a bumped position `spec` is the name
+    position : int, of a bumped position
+    equivalence_class : tuple of str, names that mean the same in this campaign
+    p_value : float, family-wise; None of a gross error that is recognised by its size
+    posterior : float; None of what is no rival of the others
+    parameters : tuple of Estimate; empty of what is no effect
+    settings : tuple of Estimate, of those that were searched for
+    imitators : tuple of str, further names that could leave the same, and more
+    rivals : tuple of Rival
+    """
+
+    name: str
+    spec: str
+    position: int | None
+    equivalence_class: tuple[str, ...]
+    p_value: float | None
+    posterior: float | None
+    parameters: tuple[Estimate, ...] = ()
+    settings: tuple[Estimate, ...] = ()
+    imitators: tuple[str, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+
+
+@dataclass(frozen=True)
+class LikeShape:
+    """Where what is missing may live: a target that is a function of a coordinate.
+
+    Attributes
+    ----------
+    coordinate, target : str
+    posterior : float, given that it is such a function, or one of the attitude alone
+    """
+
+    coordinate: str
+    target: str
+    posterior: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is found in a campaign, and how sure that is; what follows is found when it is asked.
+
+    Attributes
+    ----------
+    case : Case, the campaign, with a recognised gross error mended, and the evidence
+    finding : Finding
+    gap : Gap, how far the disagreement shrinks by what was added
     recognised : Recognised or None, a gross error of unit, axes or order
     """
 
-    campaign: Campaign
-    approach: Approach
-    model: SensorModel
-    extended: SensorModel
-    verdict: str
-    reason: str
-    says_the_level: bool
-    coloured: float
-    unrecorded: bool
-    weak: bool
-    credible_set: tuple[Explanation, ...]
-    found: tuple[Named, ...]
-    place: Place | None
-    base: Solution
-    frame: Frame
-    final: Frame
-    invisible: tuple[str, ...]
-    untestable: Mapping[str, str]
-    sigma_known: bool
-    sigma_holds: bool
-    unit_variance: float
-    noise_tests: tuple[NoiseTest, ...]
-    screening: Detection
-    simulations: int
-    probabilities: Mapping[str, float]
+    case: Case
+    finding: Finding
     gap: Gap
-    recognised: Recognised | None
+    recognised: Recognised | None = None
 
     @property
-    def kept(self) -> NDArray[np.bool_]:
-        """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
-        bumped = [named.position for named in self.found if named.position is not None]
-        return ~np.isin(self.campaign.positions, bumped)
+    def campaign(self) -> Campaign:
+        """With a recognised gross error mended."""
+        return self.case.campaign
+
+    @property
+    def problem(self) -> Problem:
+        """The fit of the base model, and all that it may lack."""
+        return self.case.problem
+
+    @property
+    def detection(self) -> Detection:
+        """Whether anything is missing, all candidates together."""
+        return self.case.detection
+
+    @property
+    def base(self) -> Solution:
+        """Fit of the base model with equal axes."""
+        return self.problem.base.solution
+
+    @property
+    def frame(self) -> Frame:
+        """Of the base fit with unequal axes weighted."""
+        return self.problem.frame
+
+    @property
+    def final(self) -> Frame:
+        """Of the fit with what was found, or of the base fit."""
+        return self.finding.frame
+
+    @property
+    def approach(self) -> Approach:
+        """Of the calibration."""
+        return self.base.approach
+
+    @property
+    def model(self) -> SensorModel:
+        """Without what was found."""
+        return self.base.model
+
+    @property
+    def extended(self) -> SensorModel:
+        """With the effects that were found; the model itself if there are none."""
+        return self.final.solution.model
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Effects that the parameters of the model absorb whatever their size."""
+        return self.problem.examined.invisible
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        """Effects that cannot be tested, with the reasons."""
+        return self.problem.examined.untestable
+
+    # --- the verdict --------------------------------------------------------------------------
+
+    @cached_property
+    def verdict(self) -> str:
+        """One of no_effect, named, narrowed, learned, unknown, noise_model and gross_error."""
+        return self.finding.verdict if self.recognised is None else "gross_error"
+
+    @cached_property
+    def reason(self) -> Reason | None:
+        """Why the verdict is what it is."""
+        if self.recognised is not None:
+            return because("recognised", reason=self.recognised.reason)
+        return unrecorded(self.case, self.finding) or self.finding.reason
+
+    @cached_property
+    def coloured(self) -> float:
+        """Probability of coloured noise that may be an effect of an absent column."""
+        return coloured(self.case, self.finding)
+
+    @property
+    def code(self) -> str:
+        """Of the reason; empty if there is none."""
+        return "" if self.reason is None else self.reason.code
+
+    @cached_property
+    def credible_set(self) -> tuple[Explanation, ...]:
+        """Explanations of what is missing, most probable first; empty if nothing is."""
+        return self.finding.credible_set
+
+    @property
+    def certain(self) -> tuple[Part, ...]:
+        """What is missing whatever else is open."""
+        return self.finding.says.certain
+
+    @cached_property
+    def found(self) -> tuple[Named, ...]:
+        """All that was found; of the unknown, what is certain all the same."""
+        gross = () if self.recognised is None else self.recognised.named
+        named = [Named(name, name, at, (name,), None, None) for name, at in gross]
+        if self.finding.verdict == "noise_model":
+            return (*named, self._noise())
+        return (*named, *self._chosen())
 
     @property
     def effects(self) -> tuple[Named, ...]:
@@ -116,9 +238,125 @@ class Verdict:
         return () if self.verdict == "unknown" else self.found
 
     @property
+    def place(self) -> Place | None:
+        """Coordinate and target of a learned function, which is found first."""
+        return self.finding.place if self.recognised is None else None
+
+    @cached_property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
+        bumped = [named.position for named in self.found if named.position is not None]
+        return ~np.isin(self.campaign.positions, bumped)
+
+    def _noise(self) -> Named:
+        """What is wrong with the noise."""
+        worst, posterior = worst_of(self.noise_tests), self.finding.posterior
+        assert posterior is not None
+        name = next(one.names[0] for one in posterior.told if one.of_noise)
+        # Of larger residuals the level says least; what they are, the evidence says.
+        if worst is not None and not (worst.name == LEVEL and posterior.of_noise >= RULES.sure):
+            name = worst.name
+        p = self.detection.p_value if worst is None else worst.p_value
+        return Named(name, name, None, (name,), p, posterior.of_noise)
+
+    def _chosen(self) -> list[Named]:
+        """What was chosen, with its estimates."""
+        solution, chosen = self.final.solution, self.finding.chosen
+        cofactors = with_settings(self.problem.examined, solution, [one.best for one in chosen])
+        sigma = np.sqrt(np.diag(cofactors) * self.unit_variance).tolist()
+        each = zip(solution.parameters.tolist(), sigma, strict=False)
+        values = dict(zip(solution.model.parameter_names, each, strict=False))
+        searched = iter(sigma[len(solution.parameters) :])
+        return [self._named(choice, values, searched) for choice in chosen]
+
+    def _named(
+        self, choice: Choice, values: dict[str, tuple[float, float]], searched: Iterator[float]
+    ) -> Named:
+        """Describe a choice by the values of all parameters, and sigmas of the log settings."""
+        best, members, examined = choice.best, choice.members, self.problem.examined
+        p = self.detection.p_family[UNKNOWN if best.name == LEARNED else best.name]
+        if best.place is not None:
+            at = int(self.campaign.positions[best.place])
+            return Named(OUTLIER, OUTLIER, at, (OUTLIER,), p, choice.probability)
+        assert best.effect is not None
+        assert best.shown is not None
+        # What is beside a large effect was found in what its refit leaves.
+        here = None if best.name == LEARNED else examined.hypothesis(best.effect)
+        near = () if here is None else examined.nearest(here)
+        like = () if here is None else examined.imitators(here)
+        smooth = [s for s in best.effect.takes if s.name == best.smooth]
+        of_logs = zip(smooth, searched, strict=False)
+        return Named(
+            best.name,
+            best.effect.spec,
+            None,
+            members,
+            p,
+            choice.probability,
+            tuple(Estimate(q.name, *values[q.name], q.unit) for q in best.shown.parameters),
+            tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
+            tuple(other for other in like if other not in members),
+            tuple(Rival(n, c) for n, c in near if c >= RULES.rival and n not in members),
+        )
+
+    @cached_property
+    def probabilities(self) -> dict[str, float]:
+        """Posterior of each name, alone or with another; a class stands under its first name.
+
+        Where nothing is missing, they only show which name would come first, each by itself.
+        """
+        if self.finding.posterior is None:
+            logs = self.detection.densities
+            ranked = sorted(logs, key=lambda name: -logs[name])
+            shares = special.softmax([logs[name] for name in ranked]).tolist() if ranked else []
+            return dict(zip(ranked, shares, strict=True))
+        first = dict[tuple[str, ...], str]()
+        total: dict[str, float] = defaultdict(float)
+        for one in self.finding.posterior.all:
+            # Two bumped positions have one name.
+            named = zip(one.classes, one.names, strict=True)
+            for name in {first.setdefault(members, name): None for members, name in named}:
+                total[name] += one.posterior
+        return dict(sorted(total.items(), key=lambda item: -item[1]))
+
+    # --- the noise ----------------------------------------------------------------------------
+
+    @property
+    def sigma_known(self) -> bool:
+        """Whether the campaign states its noise."""
+        return self.problem.evidence.level.known
+
+    @cached_property
+    def sigma_holds(self) -> bool:
+        """Whether sigma is given, and the final fit does not refute it."""
+        return sigma_holds(self.problem, self.final)
+
+    @cached_property
+    def unit_variance(self) -> float:
+        """Variance of unit weight that is taken for the noise."""
+        return unit_variance(self.problem, self.final)
+
+    @cached_property
+    def noise_tests(self) -> tuple[NoiseTest, ...]:
+        """Tests of the noise on the residuals of the final fit."""
+        return tests_of_noise(self.case, self.final)
+
+    @property
+    def sigma_position(self) -> float:
+        """Noise of a position mean, m/s², that the diagnosis assumes."""
+        return float(np.sqrt(self.unit_variance) * np.mean(self.final.residuals.sigmas[:, :3]))
+
+    @property
+    def weights(self) -> list[float]:
+        """Variances of the axes over their mean; empty if they are weighted alike."""
+        variances = self.frame.solution.variances[0, :3]
+        differ = self.frame.solution is not self.base
+        return (variances / variances.mean()).tolist() if differ else []
+
+    @property
     def level(self) -> float:
         """Level of the test for anything that is missing."""
-        return level_of_effects(self.sigma_known)
+        return RULES.level(self.sigma_known)
 
     @property
     def global_test(self) -> GlobalTest | None:
@@ -127,43 +365,35 @@ class Verdict:
             return None
         return global_test(self.base.omega, self.base.redundancy, sigma_dof=self.base.sigma_dof)
 
-    @property
-    def sigma_position(self) -> float:
-        """Noise of a position mean, m/s², that the diagnosis assumes."""
-        return float(np.sqrt(self.unit_variance) * np.mean(self.final.residuals.sigmas[:, :3]))
+    # --- what follows -------------------------------------------------------------------------
 
+    @cached_property
+    def shape(self) -> LearnedShape | None:
+        """The function that was learned."""
+        learned = self.verdict == LEARNED
+        return shape_of(self.problem, self.finding, self.unit_variance) if learned else None
 
-@dataclass(frozen=True)
-class Diagnosis(Verdict):
-    """A verdict with all that follows from it.
+    @cached_property
+    def like(self) -> tuple[LikeShape, ...]:
+        """Where what is missing may live, most probable first; nothing if nothing is missing.
 
-    Attributes
-    ----------
-    certain : tuple of Part, what is missing whatever else is open
-    open : tuple of Explanation, what may be missing beside that, most probable first; one without
-        names stands for nothing
-    repeated : bool, whether attitudes were measured repeatedly
-    shape : LearnedShape or None, the function that was learned
-    like : tuple of LikeShape, where what is missing may live, most probable first
-    leveling : (float, float), tilt error without and with what was found, rad, or None
-    changes : tuple of Change, of the parameters of the base model by effects that were added
-    upper_limits : tuple of UpperLimit, of the effects that were not found
-    next_positions : tuple of NextPosition, that would separate what is left best
-    suspects : tuple of (label, p-value), positions that the calibration marks, each by itself
-    implausible : tuple of str, parameters of the final fit that no sensor has
-    """
+        The places are those of all that is missing or, where the most probable explanation with
+        something unknown has effects with names, of what is beside these.
+        """
+        finding = self.finding
+        if finding.verdict not in MISSING:
+            return ()
+        told = finding.credible_set if finding.verdict in ("unknown", LEARNED) else ()
+        names = next((one.names for one in told if UNKNOWN in one.names), (UNKNOWN,))
+        like = [LikeShape(*at, p) for at, p in shares_of_places(self.problem, names).items()]
+        return tuple(sorted(like, key=lambda one: -one.posterior))
 
-    certain: tuple[Part, ...]
-    open: tuple[Explanation, ...]
-    repeated: bool
-    shape: LearnedShape | None
-    like: tuple[LikeShape, ...]
-    leveling: tuple[float, float] | None
-    changes: tuple[Change, ...]
-    upper_limits: tuple[UpperLimit, ...]
-    next_positions: tuple[NextPosition, ...]
-    suspects: tuple[tuple[int, float], ...]
-    implausible: tuple[str, ...]
+    @cached_property
+    def leveling(self) -> tuple[float, float] | None:
+        """Tilt error without and with what was found, rad; None if there is nothing to compare."""
+        if not self.finding.chosen:
+            return None
+        return leveling_rms(self.base, self.final.solution, self.frame.hold, self.unit_variance)
 
     @property
     def better_for_leveling(self) -> str | None:
@@ -171,4 +401,59 @@ class Diagnosis(Verdict):
         if self.leveling is None or self.extended is self.model:
             return None
         before, after = self.leveling
-        return "base" if after > LARGER * before else "extended"
+        return "base" if after > RULES.larger_tilt * before else "extended"
+
+    @cached_property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes of the parameters of the base model; none if a position was left out."""
+        effects = [one.best.shown for one in self.finding.chosen if one.best.shown is not None]
+        if not effects or len(effects) < len(self.finding.chosen):
+            return ()
+        final, variance = self.final.solution, self.unit_variance
+        return parameter_changes(self.base, self.frame, effects, final, variance)
+
+    @cached_property
+    def upper_limits(self) -> tuple[UpperLimit, ...]:
+        """Limits of the effects that were neither found nor left open."""
+        finding = self.finding
+        names = [choice.best.name for choice in finding.chosen]
+        if finding.verdict == "narrowed":
+            classes = [alike for one in finding.credible_set for alike in one.classes]
+            names += [name for alike in classes for name in alike]
+        same = self.final is self.frame
+        examined = self.problem.examined if same else ExaminedFit.of(self.final)
+        return tuple(upper_limits(examined, self.sigma_holds, names))
+
+    @cached_property
+    def next_positions(self) -> tuple[NextPosition, ...]:
+        """Positions that tell the two most probable explanations apart, or that show a function."""
+        finding = self.finding
+        if finding.place is not None:
+            learned = finding.chosen[0].best.effect
+            assert isinstance(learned, Learned)
+            with stage("next positions"):
+                return tuple(positions_to_learn(self.final, learned))
+        if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
+            return ()
+        rivals = [one.best for one in finding.credible_set if one.of_effects]
+        if len(rivals) < 2:
+            return ()
+        with stage("next positions"):
+            return tuple(next_positions(self.frame, *rivals[:2]))
+
+    @cached_property
+    def suspects(self) -> dict[int, float]:
+        """Positions that a calibration with the base model marks, and the p-value of each."""
+        base = self.base
+        if is_exact(base):
+            return {}
+        trusted = sigma_holds(self.problem, self.frame)
+        marked = suspects(base.model, base.approach, base.observed, SUSPECT, trusted)
+        return {int(self.campaign.positions[s.position]): s.p_value for s in marked}
+
+    @cached_property
+    def implausible(self) -> list[str]:
+        """Parameters of the final fit that no sensor has."""
+        final, u = self.final.solution, self.extended.n_parameters
+        sigma = np.sqrt(np.diag(final.cofactors)[:u] * self.unit_variance)
+        return implausible_parameters(self.extended.effects, final.parameters[:u], sigma)

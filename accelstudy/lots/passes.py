@@ -9,10 +9,10 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.lots.evidence import (
     COMMON,
@@ -47,11 +47,11 @@ SETS = 12
 EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
-    UNKNOWN: priors.UNKNOWN,
-    COMMON: priors.UNKNOWN,
-    **dict.fromkeys(NOISES, priors.COLOUR),
-    AXES: priors.AXES,
-    TAILS: priors.TAILS,
+    UNKNOWN: RULES.prior_unknown,
+    COMMON: RULES.prior_unknown,
+    **dict.fromkeys(NOISES, RULES.prior_coloured),
+    AXES: RULES.prior_axes,
+    TAILS: RULES.prior_tails,
 }
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
 ODD = "odd"
@@ -215,7 +215,7 @@ class Pass:
 
         It is that of the sensors or of their mean, whichever is the smaller one, for both.
         """
-        each = self.anything.p_value({UNKNOWN: priors.UNKNOWN})
+        each = self.anything.p_value({UNKNOWN: RULES.prior_unknown})
         return each if self.mean is None else min(2 * min(each, self.mean.p_value), 1.0)
 
     @property
@@ -245,7 +245,7 @@ class Pass:
                 continue
             alike = [k] if self.given[k] >= CERTAIN else [k, *self._rivals(k)]
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
-            if posterior >= priors.SURE:
+            if posterior >= RULES.sure:
                 taken.update(alike)
                 names = tuple(name for one in alike for name in self.classes[one])
                 share, low, high = self.mixture.share(k)

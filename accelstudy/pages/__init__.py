@@ -150,6 +150,7 @@ def _environment(markup: bool) -> Environment:
         amount=amount,
         comma_list=lambda items, last="and": comma_list(list(items), last),
         counted=counted,
+        each=lambda items, function: [function(item) for item in items],
         number=number,
         p=probability,
         p_value=p_value,

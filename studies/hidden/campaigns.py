@@ -15,8 +15,8 @@ import pandas as pd
 from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.pipeline import judge
-from accelstudy.diagnosis.result import Verdict
+from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
 from accelstudy.files.tables import write_table
 from accelstudy.files.validation import checked
@@ -68,7 +68,9 @@ def row_of(job: Job, case: Case, k: int) -> Row:
     campaign, truth = made or (None, Truth())
     methods = None
     with effects_without(removed(case)):
-        answer, error = tried(lambda: outcome(judge(campaign, model, seed=job.seed)), what, failed)
+        answer, error = tried(
+            lambda: outcome(diagnose(campaign, model, seed=job.seed)), what, failed
+        )
         if job.baselines_every and int.from_bytes(case.digest(k)[:8]) % job.baselines_every == 0:
             told, _ = tried(lambda: dict(answers(campaign, model)), what, failed)
             # Where the model cannot be fitted, no method can work: each finds nothing.
@@ -116,7 +118,7 @@ def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, st
         return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
-def outcome(d: Verdict) -> Row:
+def outcome(d: Diagnosis) -> Row:
     """Row of the table of outcomes."""
     test, held = d.global_test, d.gap.held_out
     fits = (d.base, d.final.solution) if d.verdict == "learned" else ()

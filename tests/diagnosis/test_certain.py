@@ -11,11 +11,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.certain import without_the_refuted
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Choice, Finding
-from accelstudy.diagnosis.pipeline import diagnose, judge
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, because
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
 from accelstudy.diagnosis.report.words import headline
 from accelstudy.diagnosis.space.examined import examine
@@ -69,7 +69,7 @@ def test_what_an_effect_only_imitates_is_not_certain():
         campaign, up = session(36, rng, "robot")
         ripple = 0.02 * np.sin(3 * np.pi * up / G + rng.uniform(0, 2 * np.pi, 3))
         forces = campaign.forces + ripple + 1e-3 * rng.standard_normal((36, 3))
-        found = judge(replace(campaign, forces=forces), NINE)
+        found = diagnose(replace(campaign, forces=forces), NINE)
         assert [one.name for one in found.found] == ["learned"]
         assert found.place == ("force", "bias")
 
@@ -102,14 +102,16 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
     assert gap.refutes
     problem = pose(fit_base(campaign, NINE, GRAVITY))
     best = problem.examined.candidates["quadratic_scale"][0]
-    weighed = Weighed((best.name,), ((best.name,),), 0.0, (best,))
+    weighed = Explanation((best.name,), ((best.name,),), 0.0, (best,))
     finding = Finding(
         "named", problem.frame, chosen=(Choice(best, (best.name,), 1.0),),
         posterior=Posterior.of([weighed]),
     )  # fmt: skip
     said = without_the_refuted(finding, problem.frame, gap)
     assert said.verdict == "unknown"
-    assert f"goes from {gap.before:.3g} to {gap.after:.3g} times" in said.reason
+    assert said.reason == because(
+        "refuted", names=["quadratic_scale"], before=gap.before, after=gap.after
+    )
     assert [one.posterior for one in said.credible_set] == pytest.approx([0.5, 0.5])
 
 
@@ -130,7 +132,7 @@ def test_what_a_rate_of_temperature_does_is_no_bumped_position(approach):
         bias = rng.standard_normal(3)
         bias *= 0.03 / np.linalg.norm(bias)
         forces = campaign.forces + np.outer(rate, bias) + 1e-3 * rng.standard_normal((36, 3))
-        found = judge(replace(campaign, forces=forces), NINE)
+        found = diagnose(replace(campaign, forces=forces), NINE)
         assert found.verdict in ("unknown", "learned")
         assert found.credible_set[0].names[-1] == "unknown"
         assert found.place in (None, ("dT/dt", "bias"))
@@ -169,5 +171,5 @@ def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():
     campaign, _ = session(24, rng, "robot")
     other, _ = session(24, rng)
     with pytest.raises(InputError, match="does not converge") as error:
-        judge(replace(campaign, forces=other.forces), NINE)
+        diagnose(replace(campaign, forces=other.forces), NINE)
     assert "accelstudy diagnose" not in str(error.value)

@@ -15,8 +15,8 @@ from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equiva
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit, held_out_gap, split_positions
-from accelstudy.diagnosis.report.words import confirmation
-from accelstudy.diagnosis.result import LEVEL_EFFECTS
+from accelstudy.diagnosis.report.words import said
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.simulation.sessions import Noise, session
 
 SETS = 25_000
@@ -44,7 +44,7 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     problem, part, split = parts
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
-    beyond = detect(field, evidence, residuals, chance).by_chance.beyond(LEVEL_EFFECTS)
+    beyond = detect(field, evidence, residuals, chance).by_chance.beyond(RULES.level_effects)
     singles = weighed(problem)
     classes = classes_of(singles, equivalents(problem.examined, singles))
     rng = np.random.default_rng(3)
@@ -107,8 +107,8 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
     assert found.gap.confirmed
     assert set(found.gap.names) == GROUPS[case]
     assert found.gap.statement == ("name" if len(GROUPS[case]) == 1 else "effect")
-    said = confirmation(found)
-    assert all(words(name) in said for name in GROUPS[case])
+    (line,) = said("confirmation", found)
+    assert all(words(name) in line for name in GROUPS[case])
 
 
 def test_an_imitator_leaves_nothing_of_what_it_imitates():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.decision.statement import statement, with_purity
+from accelstudy.diagnosis.decision.statement import purity, statement
 from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
@@ -24,7 +24,7 @@ def made(*explanations):
     found = []
     for text, p in explanations:
         classes = tuple(tuple(part.split("=")) for part in text.split("+"))
-        found.append(Explanation(tuple(c[0] for c in classes), classes, p))
+        found.append(Explanation(tuple(c[0] for c in classes), classes, posterior=p))
     return tuple(found)
 
 
@@ -171,8 +171,7 @@ def test_purity_is_the_least_cosine_of_two_names():
         for name, angles in turned.items()
     }
     (part,) = statement(made(*((name, 0.32) for name in turned))).certain
-    (with_it,) = with_purity([part], SimpleNamespace(candidates=shapes))
-    assert with_it.purity == pytest.approx(np.cos(0.9))
+    assert purity(part, SimpleNamespace(candidates=shapes)) == pytest.approx(np.cos(0.9))
 
 
 @pytest.mark.parametrize("explanations", [

@@ -8,10 +8,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from places import ROOT
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow
-
-from accelstudy.study.config import read_study
 
 TINY = {
     "campaign": {
@@ -61,11 +58,6 @@ def test_all_is_made(made):
     # With two temperatures a curve would be the same.
     assert "The model lacks thermal bias or thermal curve." in log
     assert remains(made) == []
-
-
-def test_what_was_found_is_a_study(made):
-    study = read_study(ROOT / "config/config.yaml", made / "results/tiny/diagnosis/model.yaml")
-    assert "thermal_bias" in [effect.name for effect in study.simulated_effects.effects]
 
 
 def test_a_second_run_does_nothing(made):

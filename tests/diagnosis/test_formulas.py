@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROBOT, G, least, most
+from diagnosis_helpers import NINE, ROBOT, G, least, most, otherwise
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.session import Campaign
@@ -144,7 +144,7 @@ def test_what_was_learned_is_said(learned):
     assert f"It varies {first.text} (" in text
     assert "mgon with the function of the yaw" in text
     places = " gon or ".join(f"{place / GON:.3g}" for place in shape.least_known[-2:])
-    anywhere = replace(learned, next_positions=())
+    anywhere = otherwise(learned, next_positions=())
     assert places.replace("-", "−") in " ".join(advice(anywhere))
     assert "known least" not in " ".join(advice(learned))
     widest = np.sqrt(np.mean(shape.sigmas[:, :2] ** 2, axis=1))

@@ -14,7 +14,7 @@ from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.pipeline import judge
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.drawing.style import group_of, symbol
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.leveling.angles import specific_force
@@ -172,7 +172,7 @@ def hidden():
     turn = np.column_stack(
         [8e-3 * np.cos(clean.yaw - 0.3), 6e-3 * np.cos(clean.yaw - 1.2), 0 * clean.yaw]
     )
-    return judge(replace(clean, forces=clean.forces + turn), NINE)
+    return diagnose(replace(clean, forces=clean.forces + turn), NINE)
 
 
 def test_a_function_without_a_name_is_learned(hidden):
@@ -194,4 +194,4 @@ def test_a_function_without_a_name_is_learned(hidden):
 
 def test_nothing_is_learned_where_nothing_is_missing():
     for seed in range(6):
-        assert judge(campaign(seed=seed, sigma=1e-3)[0], NINE).verdict != "learned"
+        assert diagnose(campaign(seed=seed, sigma=1e-3)[0], NINE).verdict != "learned"

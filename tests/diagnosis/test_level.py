@@ -10,13 +10,13 @@ from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
-from accelstudy.diagnosis import pipeline
+from accelstudy.diagnosis.decision import posterior
 from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, Level
-from accelstudy.diagnosis.pipeline import judge
+from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
-from accelstudy.diagnosis.result import level_of_effects
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.repeats import lack_of_fit
 from accelstudy.pages import lines
 
@@ -58,7 +58,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         p = np.array([tail(by_chance.values, by_chance.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(detection.p_value, abs=0.005)
-        rates.append(np.mean(p < level_of_effects(level.known)))
+        rates.append(np.mean(p < RULES.level(level.known)))
         seen.append(odds)
         weights.append(np.mean(by_chance.weights))
     error = np.std(rates, ddof=1) / np.sqrt(RUNS)
@@ -88,10 +88,10 @@ def test_a_diagnosis_decides_at_the_levels(monkeypatch, known, level):
         (REFUTED - 1e-6, "unknown", False),
     ):
         monkeypatch.setattr(
-            pipeline, "detect", lambda *given, p=p: replace(detect(*given), p_value=p)
+            posterior, "detect", lambda *given, p=p: replace(detect(*given), p_value=p)
         )
-        found = judge(measured, NINE)
-        assert (found.verdict, found.weak) == (verdict, weak)
+        found = diagnose(measured, NINE)
+        assert (found.verdict, found.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:
             assert "weak" in headline(found)

@@ -9,14 +9,14 @@ from diagnosis_helpers import GRAVITY, NINE, G, posed, shuffled
 from scipy import stats
 
 from accelstudy.diagnosis.decision import verdict
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighed
-from accelstudy.diagnosis.decision.verdict import (
-    judge_noise,
+from accelstudy.diagnosis.decision.noise import (
     lack_of_fit,
     sigma_holds,
     unit_variance,
     worst_of,
 )
+from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
+from accelstudy.diagnosis.decision.verdict import judge_noise
 from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.simulation.sessions import Noise, session
@@ -89,37 +89,44 @@ def test_where_sigma_is_not_given_the_holds_say_how_large_the_noise_is():
 def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     """The finding where a test is significant, and so much of the posterior is of the noise."""
     weighed = [
-        Weighed((LEVEL,), ((LEVEL,),), np.log(of_noise)),
-        Weighed(("hysteresis",), (("hysteresis",),), np.log1p(-of_noise)),
+        Explanation((LEVEL,), ((LEVEL,),), np.log(of_noise)),
+        Explanation(("hysteresis",), (("hysteresis",),), np.log1p(-of_noise)),
     ]
     monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
     test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
-    return judge_noise(SimpleNamespace(frame="fit"), Posterior.of(weighed), test)
+    problem, weighing = (
+        SimpleNamespace(frame="fit"),
+        SimpleNamespace(posterior=Posterior.of(weighed)),
+    )
+    return judge_noise(SimpleNamespace(problem=problem, weighing=weighing), test)
 
 
-@pytest.mark.parametrize(("case", "said", "says_the_level"), [
-    ({"name": AXES, "of_noise": 0.1}, "noise_model", False),
-    ({"name": LEVEL, "of_noise": 0.51}, "noise_model", True),
-    ({"name": LEVEL, "of_noise": 0.49}, "unknown", True),
-    ({"name": LEVEL, "of_noise": 0.1, "factor": 0.5}, "noise_model", True),
-    ({"name": TAILS, "fit": 0.009}, "unknown", False),
-    ({"name": TAILS, "fit": 0.011}, "noise_model", False),
-    ({"name": LEVEL, "of_noise": 0.9, "fit": 0.009}, "unknown", False),
-    ({"name": STEPS, "fit": 0.009}, "noise_model", False),
+@pytest.mark.parametrize(("case", "said", "code"), [
+    ({"name": AXES, "of_noise": 0.1}, "noise_model", "noise"),
+    ({"name": LEVEL, "of_noise": 0.51}, "noise_model", "noise"),
+    ({"name": LEVEL, "of_noise": 0.49}, "unknown", "noise or effect"),
+    ({"name": LEVEL, "of_noise": 0.1, "factor": 0.5}, "noise_model", "noise"),
+    ({"name": TAILS, "fit": 0.009}, "unknown", "lack of fit"),
+    ({"name": TAILS, "fit": 0.011}, "noise_model", "noise"),
+    ({"name": LEVEL, "of_noise": 0.9, "fit": 0.009}, "unknown", "lack of fit"),
+    ({"name": STEPS, "fit": 0.009}, "noise_model", "noise"),
 ])  # fmt: skip
-def test_what_a_significant_test_means(monkeypatch, case, said, says_the_level):
+def test_what_a_significant_test_means(monkeypatch, case, said, code):
     """Larger residuals may be an effect; a misfit that repeats share is no noise, but steps are."""
     found = judged(monkeypatch, **case)
-    assert (found.verdict, found.says_the_level) == (said, says_the_level)
+    assert (found.verdict, found.code) == (said, code)
     assert found.posterior is not None
-    if said == "noise_model":
-        assert found.reason == "what it says"
+    if code != "lack of fit":
+        assert (found.reason.of["name"], found.reason.of["remark"]) == (
+            case["name"],
+            "what it says",
+        )
 
 
 def test_an_effect_that_is_not_excluded_is_named(monkeypatch):
     found = judged(monkeypatch, LEVEL, of_noise=0.3)
-    assert "probability 0.30" in found.reason
-    assert "an effect such as hysteresis is not excluded" in found.reason
+    assert found.reason.of["p"] == pytest.approx(0.3)
+    assert found.reason.of["other"] == "hysteresis"
 
 
 # --- sigma and repeats ---------------------------------------------------------------------------

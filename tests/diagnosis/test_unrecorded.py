@@ -63,7 +63,7 @@ def test_a_course_that_a_thermometer_shows_is_an_effect():
     t = measured.time / measured.time[-1]
     found = diagnose(replace(measured, temperature=20 + 3 * wandering(t)), NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
-    assert not found.unrecorded
+    assert found.code != "unrecorded"
     assert found.coloured == 0
 
 

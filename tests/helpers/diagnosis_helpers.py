@@ -1,5 +1,7 @@
 """Simulated campaigns for the tests of the diagnosis, and examined fits of ideal sensors."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import binom
 
@@ -70,6 +72,13 @@ def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=N
 def posed(approach, observed, level=None):
     """The problem of a session, whose sigma is known or of a given level of knowledge."""
     return pose(BaseFit(solve(NINE, approach, observed), level or Level.given(), None))
+
+
+def otherwise(diagnosis, finding=None, **told):
+    """The diagnosis with another finding, or with other things that follow from it."""
+    changed = replace(diagnosis, finding=finding or diagnosis.finding)
+    vars(changed).update(told)
+    return changed
 
 
 def most(count, level, error=1e-4):

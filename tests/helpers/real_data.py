@@ -48,7 +48,7 @@ def told(name, variant=""):
     shown = "" if sigma is None else number(1e3 * float(np.mean(sigma)))
     given = f"{shown}, {variant or 'Allan'}" if shown else UNKNOWN
     size = probability(None if d.global_test is None else d.global_test.p_value)
-    pattern = probability(d.screening.p_value if d.screening.p_family else None)
+    pattern = probability(d.detection.p_value if d.detection.p_family else None)
     verdict = f"`{d.verdict}`" + "".join(f": {words(f.name)}" for f in d.found)
     cells = (f"`{name}`", d.campaign.n_positions, d.base.redundancy, given, size, pattern, verdict)
     return [f"| {' | '.join(map(str, cells))} |", *verdict_lines(d)[:-1]]

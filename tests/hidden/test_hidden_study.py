@@ -173,7 +173,7 @@ def test_a_second_run_writes_the_same(job, told, tmp_path):
 
 def test_the_diagnosis_sees_the_campaign_only(job, monkeypatch):
     seen = []
-    monkeypatch.setattr(campaigns, "judge", lambda *given, **more: seen.append((given, more)))
+    monkeypatch.setattr(campaigns, "diagnose", lambda *given, **more: seen.append((given, more)))
     table(job._replace(baselines_every=0))
     for (campaign, _), more in seen:
         assert list(more) == ["seed"]
@@ -186,7 +186,7 @@ def test_what_fails_is_a_row_with_its_error(job, monkeypatch):
     def refuse(campaign, *_, **__):
         raise InputError("too few positions") if campaign.angles is None else KeyError("x")
 
-    monkeypatch.setattr(campaigns, "judge", refuse)
+    monkeypatch.setattr(campaigns, "diagnose", refuse)
     errors = table(job._replace(baselines_every=0))["error"]
     assert len(errors) == 3
     assert set(errors) <= {"refused: too few positions", "KeyError: 'x'"}

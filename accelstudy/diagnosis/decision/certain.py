@@ -14,41 +14,36 @@ from dataclasses import replace
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.basics.wording import comma_list, words
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Posterior, Weighing
+from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import best_refit
-from accelstudy.diagnosis.decision.statement import Part, statement
-from accelstudy.diagnosis.decision.verdict import Choice, Finding
+from accelstudy.diagnosis.decision.statement import Part, Statement, statement
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, because
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.prediction import HeldOutGap
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
-NEARLY_ALL = 0.9
-"""Share of the disagreement that something outside of the catalogue hardly ever has in common with
-one effect of it."""
 
-
-def with_what_is_certain(problem: Problem, weighing: Weighing, finding: Finding) -> Finding:
+def with_what_is_certain(case: Case, finding: Finding) -> Finding:
     """Say what is certain, and add it to the fit whatever else is missing."""
-    if finding.verdict != "unknown":
-        says = statement(finding.credible_set)
-        return replace(finding, certain=says.certain, open=says.open)
     posterior = finding.posterior
     assert posterior is not None
-    beyond = sum(one.posterior for one in posterior.each if UNKNOWN in one.names)
-    if finding.left_over or beyond > 1 - CREDIBLE:
+    if finding.verdict != "unknown":
+        return replace(finding, says=statement(finding.credible_set))
+    problem, weighing = case.problem, case.weighing
+    beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
+    if finding.code == "misfit" or beyond > 1 - RULES.credible:
         posterior = posterior.doubting(_perhaps_imitations(problem, weighing, posterior))
-    says = statement(posterior.each)
-    finding = replace(finding, posterior=posterior, certain=says.certain, open=says.open)
+    finding = replace(finding, posterior=posterior, says=statement(posterior.all))
     chosen = [choice for _, choice in _certain_effects(weighing, posterior)]
     if not chosen:
         return finding
     fit = _fit_of(problem, weighing, chosen)
     if fit is None:
-        return replace(finding, certain=(), open=())
+        return replace(finding, says=Statement((), ()))
     added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
     return replace(finding, frame=Frame.of(fit[1]), chosen=added)
 
@@ -56,7 +51,7 @@ def with_what_is_certain(problem: Problem, weighing: Weighing, finding: Finding)
 def _certain_effects(weighing: Weighing, posterior: Posterior) -> list[tuple[Part, Choice]]:
     """Effects and families of effects that are certain, each with its most probable member."""
     chosen = []
-    for part in statement(posterior.each).certain:
+    for part in statement(posterior.all).certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
             best = next(shapes, weighing.singles.best[name.name])
@@ -75,7 +70,7 @@ def _perhaps_imitations(problem: Problem, weighing: Weighing, posterior: Posteri
     after = _disagreement(problem, _fit_of(problem, weighing, chosen))
     for i, (part, _) in enumerate(seeming):
         without = _fit_of(problem, weighing, [*chosen[:i], *chosen[i + 1 :]])
-        if after > (1 - NEARLY_ALL) * _disagreement(problem, without):
+        if after > (1 - RULES.nearly_all) * _disagreement(problem, without):
             names |= {name.name for name in part.names}
     return names
 
@@ -110,15 +105,10 @@ def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Fin
     """
     reason = finding.reason
     if finding.verdict != "unknown":
-        named = comma_list([words(choice.best.name) for choice in finding.chosen])
-        reason = (
-            f"{named} fit{'s' * (len(finding.chosen) == 1)} all positions best, but predict"
-            f"{'s' * (len(finding.chosen) == 1)} those that were held out no better than nothing "
-            f"does: the mean square of their residuals goes from {held.before:.3g} to "
-            f"{held.after:.3g} times that of the noise"
-        )
+        names = [choice.best.name for choice in finding.chosen]
+        reason = because("refuted", names=names, before=held.before, after=held.after)
     assert finding.posterior is not None
-    names = [name for choice in finding.chosen for name in choice.members]
-    posterior = finding.posterior.doubting(names)
-    open_now = statement(posterior.each).open
-    return Finding("unknown", frame, reason, posterior=posterior, open=open_now)
+    doubted = [name for choice in finding.chosen for name in choice.members]
+    posterior = finding.posterior.doubting(doubted)
+    says = Statement((), statement(posterior.all).open)
+    return Finding("unknown", frame, reason, posterior=posterior, says=says)

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.decision import priors
-from accelstudy.diagnosis.decision.posterior import Posterior, Weighing
+from accelstudy.diagnosis.decision.noise import misfit
+from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible, misfit
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -40,45 +41,38 @@ FOLLOWS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
 
-def with_a_learned_shape(
-    problem: Problem, weighing: Weighing, posterior: Posterior | None, finding: Finding
-) -> Finding:
-    """Learn the function where nothing has a name, and yet it is plain where it lives.
+def learned(case: Case, posterior: Posterior, finding: Finding) -> Finding | None:
+    """Learn the function where nothing has a name, and yet it is plain where it lives; else None.
 
     Beside it is what is certain or, where that leaves a misfit, all of the explanation that has it,
     such as the mean of what it changes.
 
     Parameters
     ----------
-    problem : Problem
-    weighing : Weighing, of the same
+    case : Case
     posterior : Posterior, before any effect of it was doubted
-    finding : Finding
+    finding : Finding, that it is unknown
     """
-    if finding.verdict != "unknown" or posterior is None:
-        return finding
+    problem = case.problem
     found = most_probable_place(problem, posterior)
-    if found is None or found.probability < priors.SURE:
-        return finding
+    if found is None or found.probability < RULES.sure:
+        return None
     certain = [choice for choice in finding.chosen if choice.best.name not in found.names]
-    doubted = [_choice(problem, weighing, posterior, name) for name in found.names]
+    doubted = [_choice(problem, case.weighing, posterior, name) for name in found.names]
     # What is doubted may be the mean of what the function changes, or a part of the function.
     for beside in (finding.chosen, (*certain, *doubted)):
         fitted = fit_of_place(problem, found.place, [choice.best for choice in beside])
         if fitted is not None and not misfit(problem, fitted[1]) and not impossible(fitted[1]):
-            break
-    else:
-        return finding
-    hypothesis, solution = fitted
-    learned = Choice(hypothesis, (LEARNED,), found.probability)
-    return replace(
-        finding,
-        verdict=LEARNED,
-        frame=Frame.of(solution),
-        chosen=(learned, *beside),
-        place=found.place,
-        unlearned=finding,
-    )
+            chosen = (Choice(fitted[0], (LEARNED,), found.probability), *beside)
+            return replace(
+                finding,
+                verdict=LEARNED,
+                frame=Frame.of(fitted[1]),
+                chosen=chosen,
+                place=found.place,
+                unlearned=finding,
+            )
+    return None
 
 
 @dataclass(frozen=True)
@@ -101,7 +95,7 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
     """Coordinate and target that hold most of a posterior; None if nothing unknown does."""
     totals: dict[Place, float] = defaultdict(float)
     beside: dict[Place, tuple[float, tuple[str, ...]]] = {}
-    for one in posterior.each:
+    for one in posterior.all:
         if UNKNOWN in one.names and one.posterior > LIKELY:
             names = tuple(name for name in one.names if name != UNKNOWN)
             for place, share in shares_of_places(problem, one.names).items():
@@ -115,7 +109,7 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
 
 def _choice(problem: Problem, weighing: Weighing, posterior: Posterior, name: str) -> Choice:
     """Effect that an explanation has beside a function, with its probability."""
-    having = [one.posterior for one in posterior.each if name in one.names]
+    having = [one.posterior for one in posterior.all if name in one.names]
     best = problem.examined.candidates[name].strongest(problem.residuals.z)
     return Choice(best, weighing.members[name], min(sum(having), 1.0))
 

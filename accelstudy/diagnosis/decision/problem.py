@@ -13,10 +13,10 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision import priors
 from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
 from accelstudy.diagnosis.space.repeats import lack_of_fit
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -145,7 +145,7 @@ def pose(base: BaseFit) -> Problem:
         residuals = examined.frame.residuals
         evidence = Evidence(base.level, residuals.redundancy)
         axes = UnequalAxes.of(residuals, evidence, base.within)
-        noisier = float(np.log(priors.AXES) + axes.log_evidence)
+        noisier = float(np.log(RULES.prior_axes) + axes.log_evidence)
         # Something unknown is asked last, as it takes longest.
         if noisier > _best_odds(field.named, evidence, residuals.z) and (
             noisier > _best_odds(field, evidence, residuals.z)
@@ -178,7 +178,8 @@ def _best_odds(field: Field, evidence: Evidence, z: NDArray[np.float64]) -> floa
     if not field.names:
         return 0.0
     prior = [
-        priors.UNKNOWN if name == UNKNOWN else 1 / len(field.candidates) for name in field.names
+        RULES.prior_unknown if name == UNKNOWN else 1 / len(field.candidates)
+        for name in field.names
     ]
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
     return max(

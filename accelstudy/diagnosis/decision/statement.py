@@ -9,13 +9,14 @@ the catalogue, such as drifts and jumps of the bias.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import cosines
 from accelstudy.effects import effect_names, get_effect
@@ -70,14 +71,11 @@ class Part:
     family : str, what its names have in common in plain words; "" if they have nothing
     names : tuple of Name, most probable first
     posterior : float, that it is one of these
-    purity : float or None, the smallest canonical cosine of two of the names: whether they are
-        rivals, or what happened to be left over
     """
 
     family: str
     names: tuple[Name, ...]
     posterior: float
-    purity: float | None = None
 
     @property
     def is_effect(self) -> bool:
@@ -100,7 +98,9 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def statement(explanations: Sequence[Explanation], probability: float = CREDIBLE) -> Statement:
+def statement(
+    explanations: Sequence[Explanation], probability: float = RULES.credible
+) -> Statement:
     """Say what explanations leave no doubt of, and what they leave open.
 
     A name is certain if the explanations that have it hold enough together. A family is certain if
@@ -177,30 +177,27 @@ def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
     )
 
 
-def cosine_in(examined: ExaminedFit) -> Callable[[str, str], float]:
-    """Return a function for the largest canonical cosine of two effects; 0 for other names."""
+def purity(part: Part, examined: ExaminedFit) -> float | None:
+    """Smallest canonical cosine of two of the names of a part; None if it has one name.
+
+    It tells whether they are rivals, or what happened to be left over. Of two effects it is that of
+    the shapes that are most alike, and 0 of what is no effect.
+    """
 
     def cosine(one: str, other: str) -> float:
         shapes = [examined.candidates.get(name, ()) for name in (one, other)]
         return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
 
-    return cosine
-
-
-def with_purity(parts: Iterable[Part], examined: ExaminedFit) -> tuple[Part, ...]:
-    """What is certain, with the purity of each part in a campaign."""
-    cosine = cosine_in(examined)
-    pairs = [(part, combinations([name.name for name in part.names], 2)) for part in parts]
-    return tuple(
-        replace(part, purity=min((cosine(*pair) for pair in of), default=None))
-        for part, of in pairs
-    )
+    pairs = combinations([name.name for name in part.names], 2)
+    return min((cosine(*pair) for pair in pairs), default=None)
 
 
 def effects_and_others(
     explanations: Sequence[Explanation],
 ) -> tuple[list[Explanation], list[Explanation]]:
     """Explanations by effects alone, and the others."""
-    catalogue = effect_names()
-    effects = [one for one in explanations if all(name in catalogue for name in one.names)]
-    return effects, [one for one in explanations if one not in effects]
+    catalogue = {*effect_names()}
+    parts: tuple[list[Explanation], list[Explanation]] = [], []
+    for one in explanations:
+        parts[not catalogue.issuperset(one.names)].append(one)
+    return parts

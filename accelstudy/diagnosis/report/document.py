@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from accelstudy.adjustment.quality import Solution, position_tests
 from accelstudy.basics import plugins
 from accelstudy.basics.names import LONGEST
 from accelstudy.basics.units import GON, MGON
-from accelstudy.basics.wording import amount, comma_list, words
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     calibration_document,
@@ -25,11 +23,12 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.decision.verdict import Named
+from accelstudy.diagnosis.decision.statement import Part, purity
 from accelstudy.diagnosis.forms import TARGETS
-from accelstudy.diagnosis.report.words import beyond, explanation_words, keep_base, missing
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.next_positions import NextPosition
+from accelstudy.diagnosis.report.words import reason, warnings
+from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
@@ -40,195 +39,146 @@ Array = NDArray[np.float64]
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Describe a diagnosis; numbers are in SI unless their key names another unit."""
-    d = diagnosis
+    d, screening = diagnosis, diagnosis.detection
     test = d.global_test
-    return {
+    content = {
         "schema_version": 1,
         "campaign": d.campaign.name,
         "approach": d.approach.name,
         "model": d.model.name,
         "axes": FRD.name,
         "verdict": d.verdict,
-        "reason": d.reason,
+        "reason": reason(d),
         "global_test": {
-            "statistic": json_number(d.base.omega if test is None else test.statistic),
+            "statistic": d.base.omega if test is None else test.statistic,
             "dof": d.base.redundancy,
-            "p_value": None if test is None else json_number(test.p_value),
+            "p_value": None if test is None else test.p_value,
             "sigma": "known" if d.sigma_known else "unknown",
         },
         "noise": {
-            "sigma_mps2": json_number(d.sigma_position),
+            "sigma_mps2": d.sigma_position,
             "sigma_source": "a-priori" if d.sigma_holds else "residuals",
-            "tests": [
-                {
-                    "name": test.name,
-                    "statistic": json_number(test.statistic),
-                    "p_value": json_number(test.p_value),
-                    "remark": test.remark,
-                }
-                for test in d.noise_tests
-            ],
+            "tests": [_some(t, "name", "statistic", "p_value", "remark") for t in d.noise_tests],
         },
         "screening": {
-            "p_value": json_number(d.screening.p_value),
-            "simulations": d.simulations,
+            "p_value": screening.p_value,
+            "simulations": d.case.chance.simulations,
             "candidates": [
-                {
-                    "name": name,
-                    "p_single": json_number(d.screening.p_candidate[name]),
-                    "p_family": json_number(d.screening.p_family[name]),
-                }
-                for name in sorted(d.screening.p_family, key=lambda n: d.screening.p_family[n])
+                {"name": name, "p_single": screening.p_candidate[name], "p_family": p}
+                for name, p in sorted(screening.p_family.items(), key=lambda item: item[1])
             ],
         },
-        "posterior": {name: json_number(p) for name, p in d.probabilities.items()},
-        "credible_set": [
-            {
-                "names": list(one.names),
-                "classes": [list(names) for names in one.classes],
-                "posterior": json_number(one.posterior),
-            }
-            for one in d.credible_set
-        ],
-        "certain": [_certain(part, d.found) for part in d.certain],
+        "posterior": d.probabilities,
+        "credible_set": [_some(one, "names", "classes", "posterior") for one in d.credible_set],
+        "certain": [_certain(part, d) for part in d.certain],
         "effects": [effect_document(named) for named in d.effects],
-        "suspects": [{"position": label, "p_value": json_number(p)} for label, p in d.suspects],
+        "suspects": [{"position": label, "p_value": p} for label, p in d.suspects.items()],
         "shape": None if d.shape is None else shape_document(d.shape),
-        "like": [asdict(place) for place in d.like],
+        "like": d.like,
         "gap": _gap(d),
-        "parameter_changes": [
-            {
-                "parameter": change.parameter,
-                "unit": change.unit,
-                "before": json_number(change.before),
-                "after": json_number(change.after),
-                "predicted": json_number(change.predicted),
-                "estimated": json_number(change.estimated),
-                "sigma": json_number(change.sigma),
-            }
-            for change in d.changes
-        ],
-        "invisible_effects": list(d.invisible),
+        "parameter_changes": d.changes,
+        "invisible_effects": d.invisible,
         "untestable_effects": list(d.untestable),
         "untestable_reasons": dict(d.untestable),
-        "upper_limits": [
-            {
-                "name": limit.name,
-                "parameter": limit.parameter,
-                "value": json_number(limit.value),
-                "unit": limit.unit,
-            }
-            for limit in d.upper_limits
-        ],
-        "next_positions": [
-            {
-                "roll_gon": position.roll / GON,
-                "pitch_gon": position.pitch / GON,
-                **(
-                    {}
-                    if position.temperature is None
-                    else {"temperature_degC": position.temperature}
-                ),
-                **({} if position.yaw is None else {"yaw_gon": position.yaw / GON}),
-                **({} if position.later is None else {"later_s": json_number(position.later)}),
-                "any_attitude": position.anywhere,
-                "separates": [name for names in position.separates for name in names],
-            }
-            for position in d.next_positions
-        ],
+        "upper_limits": d.upper_limits,
+        "next_positions": [_next(position) for position in d.next_positions],
         "redundancy": d.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
-        "warnings": list(d.campaign.warnings),
+        "warnings": d.campaign.warnings,
+        "rules": RULES,
     }
+    return dict(_plain(content))
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it: records are mappings, and what is no finite number is null."""
+    if is_dataclass(value):
+        value = {part.name: getattr(value, part.name) for part in fields(value)}
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, dict):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return json_number(value) if isinstance(value, float) else value
+
+
+def _some(record: object, *names: str) -> dict[str, Any]:
+    """Some attributes of a record; None where there is no record."""
+    return {name: getattr(record, name, None) for name in names}
 
 
 def shape_document(shape: LearnedShape) -> dict[str, Any]:
     """Describe a learned function, SI."""
-    ranking = shape.ranking
-    each = list(zip(shape.components, shape.values.T, shape.sigmas.T, strict=True))
+    ranking, names = shape.ranking, shape.components
     return {
         "coordinate": shape.coordinate,
         "target": shape.target,
-        "axes": list(ranking.axes),
+        "axes": ranking.axes,
         "subject": ranking.subject,
         "function": {
             "unit": TARGETS[shape.effect.target].unit,
             "coordinate": shape.grid.tolist(),
-            "value": {name: h.tolist() for name, h, _ in each},
-            "sigma": {name: sigma.tolist() for name, _, sigma in each},
+            "value": dict(zip(names, shape.values.T.tolist(), strict=True)),
+            "sigma": dict(zip(names, shape.sigmas.T.tolist(), strict=True)),
         },
         "formulas": [
-            {"text": f"{ranking.subject}: {one.text}", "posterior": json_number(one.posterior)}
+            {"text": f"{ranking.subject}: {one.text}", "posterior": one.posterior}
             for one in ranking.formulas
         ],
-        "least_known": list(shape.least_known),
+        "least_known": shape.least_known,
     }
 
 
-def _certain(part: Part, found: Sequence[Named]) -> dict[str, Any]:
+def _certain(part: Part, d: Diagnosis) -> dict[str, Any]:
     """Describe what is certain, with what stands for it in the extended model, if anything does."""
     names = [name.name for name in part.names]
-    added = next((one for one in found if one.name in names and one.parameters), None)
+    added = next((one for one in d.found if one.name in names and one.parameters), None)
     return {
         "family": part.family,
         "names": names,
-        "posterior": json_number(part.posterior),
-        "purity": json_number(part.purity),
+        "posterior": part.posterior,
+        "purity": purity(part, d.problem.examined),
         "spec": None if added is None else added.spec,
-        "parameters": [] if added is None else _estimates(added.parameters),
+        "parameters": () if added is None else added.parameters,
     }
 
 
 def effect_document(named: Named) -> dict[str, Any]:
     """Describe an effect, a noise effect or a gross error that was found."""
-    return {
-        "name": named.name,
-        "spec": named.spec,
-        **({} if named.position is None else {"position": named.position}),
-        "equivalence_class": list(named.equivalence_class),
-        "p_value": json_number(named.p_value),
-        "posterior": json_number(named.posterior),
-        "parameters": _estimates(named.parameters),
-        **({"settings": _estimates(named.settings)} if named.settings else {}),
-        "imitators": list(named.imitators),
-        "rivals": [{"name": name, "cosine": json_number(cosine)} for name, cosine in named.rivals],
+    optional = ("position", "settings")
+    return {k: v for k, v in _plain(named).items() if k not in optional or v not in (None, [])}
+
+
+def _next(position: NextPosition) -> dict[str, Any]:
+    """Describe a position that would separate what is left."""
+    shown = {
+        "roll_gon": position.roll / GON,
+        "pitch_gon": position.pitch / GON,
+        "temperature_degC": position.temperature,
+        "yaw_gon": None if position.yaw is None else position.yaw / GON,
+        "later_s": position.later,
+        "any_attitude": position.anywhere,
+        "separates": [name for names in position.separates for name in names],
     }
-
-
-def _estimates(
-    estimates: Iterable[tuple[str, float, float | None, str]],
-) -> list[dict[str, Any]]:
-    return [
-        {"name": name, "value": json_number(value), "sigma": json_number(sigma), "unit": unit}
-        for name, value, sigma, unit in estimates
-    ]
+    return {key: value for key, value in shown.items() if value is not None}
 
 
 def _gap(d: Diagnosis) -> dict[str, Any]:
     gap, held = d.gap, d.gap.held_out
     tilt = (None, None) if d.leveling is None else [value / MGON for value in d.leveling]
-
-    def of_held_out(name: str) -> float | None:
-        return None if held is None else json_number(getattr(held, name))
-
+    used = () if held is None else held.held
     return {
-        "sigma0_squared": {"before": json_number(gap.before), "after": json_number(gap.after)},
-        "held_out_mse": {
-            **{name: of_held_out(name) for name in ("before", "after", "floor")},
-            "reduction_ci95": (
-                None if held is None else [json_number(value) for value in held.reduction_ci95]
-            ),
-        },
-        "held_out_z": of_held_out("z"),
-        "held_out_z_needed": of_held_out("needed"),
-        "held_out_positions": []
-        if held is None
-        else [int(d.campaign.positions[i]) for i in held.held],
-        "leveling_rms_mgon": {"before": json_number(tilt[0]), "after": json_number(tilt[1])},
+        "sigma0_squared": {"before": gap.before, "after": gap.after},
+        "held_out_mse": _some(held, "before", "after", "floor", "reduction_ci95"),
+        "held_out_z": _some(held, "z")["z"],
+        "held_out_z_needed": _some(held, "needed")["needed"],
+        "held_out_positions": d.campaign.positions[list(used)].tolist(),
+        "leveling_rms_mgon": dict(zip(("before", "after"), tilt, strict=True)),
         "better_for_leveling": d.better_for_leveling,
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,
-        "confirmed_names": list(gap.names),
+        "confirmed_names": gap.names,
         "reason": gap.reason,
     }
 
@@ -278,42 +228,18 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
         **calibration_document(fit),
         "quality": quality_document(assess(fit, without_gross_error=as_recognised)),
     }
-    warnings = list(fit.campaign.warnings)
-    if diagnosis.verdict == "narrowed":
-        warnings.append(
-            f"What is missing is {missing(diagnosis.credible_set)}. The calibration "
-            f"takes {explanation_words(diagnosis.credible_set[0])}, and its sigmas do not know of "
-            "the others."
-        )
-    if diagnosis.verdict == "unknown" and diagnosis.found:
-        added = comma_list([words(one.name) for one in diagnosis.found])
-        warnings.append(
-            f"The calibration takes {added}, which is certain. Its sigmas do not know of what is "
-            "missing besides."
-        )
-    if reach := beyond(diagnosis):
-        warnings.append(f"The function was learned from {reach}, and keeps its value beyond.")
-    warnings += keep_base(diagnosis)
-    weights = np.asarray(fit.observed.sigma_force)
-    if weights.ndim:
-        sigmas = np.sqrt(fit.variance_factor) * weights[0]
-        content["sigma_position_axes_mps2"] = sigmas.tolist()
-        x, y, z = (amount(sigma, "m/s^2") for sigma in sigmas)
-        warnings.append(
-            f"The axes are weighted by their noise, {x}, {y} and {z} mm/s² in x, y and z; "
-            "`accelstudy calibrate` takes them as equal, and differs by that."
-        )
-    if (recognised := diagnosis.recognised) is not None:
-        warning = f"The calibration is of mended data: {recognised.reason}."
-        if recognised.matrix is not None:
-            warning += " Readings need the same mending; `accelstudy apply` and `export` do it."
-        warnings.append(warning)
+    weights, recognised = np.asarray(fit.observed.sigma_force), diagnosis.recognised
+    axes = (np.sqrt(fit.variance_factor) * weights[0]).tolist() if weights.ndim else []
+    if axes:
+        content["sigma_position_axes_mps2"] = axes
+    if recognised is not None:
+        matrix = recognised.matrix
         content["mended"] = {
             "error": recognised.name,
             "reason": recognised.reason,
-            "matrix": None if recognised.matrix is None else recognised.matrix.tolist(),
+            "matrix": None if matrix is None else matrix.tolist(),
         }
-    return {**content, "warnings": warnings}
+    return {**content, "warnings": [*fit.campaign.warnings, *warnings(diagnosis, axes)]}
 
 
 def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -332,51 +258,41 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
     predicted_before_mps2, predicted_after_mps2 : of held-out positions, rms of the residuals by
         the fits to the other positions, without and with the effects that were found
     """
-    d = diagnosis
-    campaign, solution = d.campaign, d.final.solution
-    n = campaign.n_positions
-    kept = d.kept
-    held = np.zeros(n, dtype=bool)
-    if d.gap.held_out is not None:
-        held[list(d.gap.held_out.held)] = True
-
-    def column(values: Array | None) -> Array:
-        return np.full(n, np.nan) if values is None else values
-
-    angles = d.frame.angles
-    table = {
-        "position": campaign.positions,
-        "time_s": column(campaign.time),
-        "roll_gon": angles[:, 0] / GON,
-        "pitch_gon": angles[:, 1] / GON,
-        "temperature_degC": column(campaign.temperature),
-        "split": np.where(held, "held-out", np.where(kept, "fit", "left out")),
-    }
-    fits = (("before", d.base, np.ones(n, dtype=bool)), ("after", solution, kept))
+    d, campaign, held = diagnosis, diagnosis.campaign, diagnosis.gap.held_out
+    n, kept = campaign.n_positions, np.flatnonzero(diagnosis.kept)
+    split = np.where(d.kept, "fit", "left out").astype(object)
+    if held is not None:
+        split[list(held.held)] = "held-out"
+    table = pd.DataFrame(
+        {
+            "position": campaign.positions,
+            "time_s": np.nan if campaign.time is None else campaign.time,
+            "roll_gon": d.frame.angles[:, 0] / GON,
+            "pitch_gon": d.frame.angles[:, 1] / GON,
+            "temperature_degC": np.nan if campaign.temperature is None else campaign.temperature,
+            "split": split,
+        }
+    )
+    fits = (("before", d.base, np.arange(n)), ("after", d.final.solution, kept))
     for when, fitted, rows in fits:
         names = ("norm",) if fitted.misclosures.shape[1] == 1 else ("x", "y", "z")
         for name, values in zip(names, fitted.misclosures.T, strict=True):
-            table[f"residual_{name}_{when}_mps2"] = _placed(values, rows)
+            table[f"residual_{name}_{when}_mps2"] = pd.Series(values, rows)
     for when, fitted, rows in fits:
         tests = position_tests(fitted)
-        table[f"test_{when}"] = _placed(tests.w / np.sqrt(d.unit_variance), rows)
-        table[f"p_{when}"] = _placed(tests.p_known if d.sigma_holds else tests.p_unknown, rows)
-    missed = ((), ()) if d.gap.held_out is None else d.gap.held_out.misses
-    for when, values in zip(("before", "after"), missed, strict=True):
-        table[f"predicted_{when}_mps2"] = _placed(np.array(values), held)
-    return pd.DataFrame(table)
+        table[f"test_{when}"] = pd.Series(tests.w / np.sqrt(d.unit_variance), rows)
+        p = tests.p_known if d.sigma_holds else tests.p_unknown
+        table[f"p_{when}"] = pd.Series(p, rows)
+    for k, when in enumerate(("before", "after")):
+        missed = {} if held is None else dict(zip(held.held, held.misses[k], strict=True))
+        table[f"predicted_{when}_mps2"] = pd.Series(missed, dtype=float)
+    return table
 
 
 def condition_sigma(solution: Solution, variance: float) -> float:
     """Noise of a residual, m/s²: rms over positions and conditions, without that of parameters."""
     covariance = solution.whitening @ np.swapaxes(solution.whitening, 1, 2)
     return float(np.sqrt(variance * np.mean(np.einsum("ncc->nc", covariance))))
-
-
-def _placed(values: Array, rows: NDArray[np.bool_]) -> Array:
-    placed = np.full(len(rows), np.nan)
-    placed[rows] = values
-    return placed
 
 
 REPLICATES = 1000

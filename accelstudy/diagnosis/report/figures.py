@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import number, words
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.forms import TARGETS, coordinate_of
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import COORDINATES as IN_WORDS
 from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.drawing.style import (
@@ -49,7 +50,7 @@ def diagnosis_figures(
     """
     d = diagnosis
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
-    if d.screening.p_family:
+    if d.detection.p_family:
         figures["evidence"] = lambda: evidence_figure(d)
     if len(d.credible_set) > 1:
         figures["explanations"] = lambda: explanations_figure(d.credible_set)
@@ -96,7 +97,7 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
             ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
             ax.axhline(0, color=INK, linewidth=0.6)
             for i, name in enumerate(names):
-                _draw_component(ax, positions, name, when, abscissa(i), explained)
+                _draw_component(ax, positions, name, when, abscissa[:, i], explained)
             ax.margins(y=0.08)
             ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
             if when == rows[-1]:
@@ -109,33 +110,26 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     return figure
 
 
-def _panels(
-    diagnosis: Diagnosis, positions: pd.DataFrame, count: int
-) -> dict[str, Callable[[int], Array]]:
-    """Abscissa of each panel by its label, as a function of the component; there are `count`."""
-    frame = diagnosis.frame
-    unit = frame.forces / frame.solution.gravity
-    panels: dict[str, Callable[[int], Array]] = {}
+def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[str, Array]:
+    """Abscissas (n, count) of the components in each panel, by its label."""
+    unit = diagnosis.frame.forces / diagnosis.frame.solution.gravity
+    panels = {"$f/g$ of the same axis": unit}
     if count == 1:
-        for k, axis in enumerate("xyz"):
-            panels[f"$f_{axis}/g$"] = lambda _, k=k: unit[:, k]  # type: ignore[misc]
-    else:
-        panels["$f/g$ of the same axis"] = lambda i: unit[:, i]
+        panels = {f"$f_{axis}/g$": unit[:, [k]] for k, axis in enumerate("xyz")}
     for column, label, scale in (
         ("time_s", "time / min", 60),
         ("temperature_degC", "temperature / °C", 1),
     ):
         values = positions[column].to_numpy() / scale
         if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = lambda i, v=values: _abreast(v, i, count)  # type: ignore[misc]
+            panels[label] = _abreast(values, count)
     return panels
 
 
-def _abreast(values: Array, i: int, count: int) -> Array:
-    """Move component i of `count` aside where few values would let components hide each other."""
-    if len(np.unique(values)) > FEW:
-        return values
-    return values + ABREAST * np.ptp(values) * (i - (count - 1) / 2)
+def _abreast(values: Array, count: int) -> Array:
+    """Abscissas (n, count) of components, aside of each other where few values would hide them."""
+    aside = ABREAST * np.ptp(values) * (np.arange(count) - (count - 1) / 2)
+    return values[:, None] + aside * (len(np.unique(values)) <= FEW)
 
 
 def _draw_component(
@@ -163,7 +157,7 @@ SMALLEST_P = 1e-12
 
 def evidence_figure(diagnosis: Diagnosis) -> Figure:
     """Family-wise p-value and posterior probability of each candidate."""
-    p_values = diagnosis.screening.p_family
+    p_values = diagnosis.detection.p_family
     # A class of equal effects has its probability under one name, the rest has none.
     probabilities = diagnosis.probabilities
 
@@ -196,13 +190,22 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xlabel("p-value, all candidates counted")
     left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)
-    percent = [100 * probabilities.get(name, 0.0) for name in shown]
-    drawn = right.barh(place, percent, color=colours, height=0.6)
-    right.bar_label(drawn, [_percent(probabilities.get(n)) for n in shown], padding=2, fontsize=7.5)
+    _draw_shares(right, place, [probabilities.get(name) for name in shown], colours)
     right.set(xlim=(0, 115), xlabel="posterior probability, alone or with another / %")
-    right.set_xticks([0, 25, 50, 75, 100])
-    right.grid(axis="y", visible=False)
     return figure
+
+
+def _draw_shares(
+    ax: Axes,
+    place: Sequence[str] | NDArray[np.int_],
+    shares: Sequence[float | None],
+    colour: str | list[str],
+) -> None:
+    """Draw probabilities as bars, with their numbers."""
+    drawn = ax.barh(place, [100 * (share or 0.0) for share in shares], color=colour, height=0.6)
+    ax.bar_label(drawn, [_percent(share) for share in shares], padding=2, fontsize=7.5)
+    ax.set_xticks([0, 25, 50, 75, 100])
+    ax.grid(axis="y", visible=False)
 
 
 def _percent(probability: float | None) -> str:
@@ -230,19 +233,17 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     panels = 1 if together else values.shape[1]
     figure = new_figure(FULL, 22 + 8 * max(len(bars), 4))
     left, *axes = figure.subplots(1, 1 + panels, width_ratios=[1.1, *[1.4 / panels] * panels])
-    drawn = left.barh(list(bars), [100 * p for p in bars.values()], color=AFTER, height=0.6)
-    left.bar_label(drawn, [_percent(p) for p in bars.values()], padding=2, fontsize=7.5)
+    _draw_shares(left, [*bars], [*bars.values()], AFTER)
     left.set(xlim=(0, 118), xlabel="posterior probability / %")
-    left.set_xticks([0, 25, 50, 75, 100])
     left.invert_yaxis()
-    left.grid(axis="y", visible=False)
     words, size, unit = _shown_coordinate(best.coordinate, d.frame.hold.time is None)
     when = "after" if d.verdict == "unknown" and d.found else "before"
     for k, ax in enumerate(axes):
         ax.axhline(0, color=INK, linewidth=0.6)
         for i, name in enumerate(names):
             x = values[:, min(i, values.shape[1] - 1) if together else k] / size
-            _draw_component(ax, positions, name, when, _abreast(x, i, len(names)), False)
+            x = _abreast(x, len(names))[:, i]
+            _draw_component(ax, positions, name, when, x, False)
         ax.set_title("" if together else ("roll", "pitch")[k] if panels == 2 else "xyz"[k])
         ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         ax.sharey(axes[0])
@@ -279,59 +280,51 @@ HEIGHT = 0.64
 
 def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
     """Posterior of each explanation, each bar from where the one above it ends."""
-    shown = explanations[:BARS]
-    rest = np.cumsum([one.posterior for one in shown])[-1] < 1
-    figure = new_figure(COLUMN, 14 + 4 * len(_colours(shown)) + 7 * (len(shown) + rest))
+    rows, colours = _rows(explanations)
+    figure = new_figure(COLUMN, 14 + 4 * len(colours) + 7 * len(rows))
     draw_explanations(figure.add_subplot(), explanations)
     return figure
 
 
-def _colours(shown: tuple[Explanation, ...]) -> dict[str, str]:
-    """Colour of each family."""
-    families = [family for one in shown for family in _families(one) if family]
-    return dict(zip(dict.fromkeys(families), COLOURS, strict=False))
+def _rows(
+    explanations: tuple[Explanation, ...],
+) -> tuple[list[tuple[str, float, list[str]]], dict[str, str]]:
+    """Label, posterior and colours of each bar, and the colour of each family."""
+    families = [[family_of(*members) for members in one.classes] for one in explanations[:BARS]]
+    named = dict.fromkeys(family for of_one in families for family in of_one if family)
+    colours = dict(zip(named, COLOURS, strict=False))
+    rows = [
+        ("\nwith ".join(map(words, one.names)), one.posterior, [colours.get(f, ALONE) for f in of])
+        for one, of in zip(explanations, families, strict=False)
+    ]
+    rest = 1 - sum(posterior for _, posterior, _ in rows)
+    return rows + [("all others", rest, [MISSING])] * (rest > 0), colours
 
 
 def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
     """Draw what `explanations_figure` shows; nothing is missing if there are none."""
-    shown = explanations[:BARS]
-    if not shown:
+    if not explanations:
         say_empty(ax, "nothing is missing")
         return
-    colours = _colours(shown)
-    ends = np.cumsum([one.posterior for one in shown])
-    rest = max(0.0, 1 - float(ends[-1]))
-    for row, (one, end) in enumerate(zip(shown, ends, strict=True)):
-        parts = _families(one)
+    (rows, colours), end = _rows(explanations), 0.0
+    for row, (_, posterior, parts) in enumerate(rows):
         height = HEIGHT / len(parts)
-        for i, family in enumerate(parts):
-            ax.barh(
-                row - HEIGHT / 2 + (i + 0.5) * height,
-                one.posterior,
-                left=end - one.posterior,
-                height=height,
-                color=colours.get(family, ALONE),
-            )
-    if rest > 0:
-        ax.barh(len(shown), rest, left=1 - rest, height=HEIGHT, color=MISSING)
-    ax.axvline(CREDIBLE, color=INK, linewidth=0.8, linestyle="--")
-    ax.text(CREDIBLE, 1.0, f"{CREDIBLE:g}", transform=ax.get_xaxis_transform(),
-            ha="center", va="bottom", fontsize=7.5)  # fmt: skip
-    for row, posterior in enumerate([*(one.posterior for one in shown), *([rest] * (rest > 0))]):
+        for i, colour in enumerate(parts):
+            at = row - HEIGHT / 2 + (i + 0.5) * height
+            ax.barh(at, posterior, left=end, height=height, color=colour)
         ax.annotate(f"{posterior:.2f}", (1, row), xytext=(4, 0), textcoords="offset points",
                     va="center", fontsize=7.5, annotation_clip=False)  # fmt: skip
-    labels = ["\nwith ".join(map(words, one.names)) for one in shown]
-    ax.set_yticks(range(len(shown) + (rest > 0)), labels + ["all others"] * (rest > 0))
+        end += posterior
+    ax.axvline(RULES.credible, color=INK, linewidth=0.8, linestyle="--")
+    ax.text(RULES.credible, 1.0, f"{RULES.credible:g}", transform=ax.get_xaxis_transform(),
+            ha="center", va="bottom", fontsize=7.5)  # fmt: skip
+    ax.set_yticks(range(len(rows)), [label for label, _, _ in rows])
     ax.set(xlim=(0, 1), xlabel="posterior probability, summed")
     ax.invert_yaxis()
     ax.grid(axis="y", visible=False)
     if colours:
         handles = [Patch(color=colour, label=family) for family, colour in colours.items()]
         ax.figure.legend(handles=handles, loc="outside upper left", ncols=1)
-
-
-def _families(explanation: Explanation) -> list[str]:
-    return [family_of(*members) for members in explanation.classes]
 
 
 COMPONENTS = {

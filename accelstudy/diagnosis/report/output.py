@@ -7,36 +7,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import yaml
 
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.levels import REFUTED
 from accelstudy.campaign.calibration.applying import needs_of
 from accelstudy.campaign.calibration.device import unknown
 from accelstudy.campaign.calibration.document import write_json
-from accelstudy.diagnosis.consequences import MISSING
-from accelstudy.diagnosis.decision.posterior import CREDIBLE
-from accelstudy.diagnosis.decision.priors import SURE
-from accelstudy.diagnosis.decision.verdict import LEVEL_NOISE
 from accelstudy.diagnosis.loop import Loop
-from accelstudy.diagnosis.report import words as wording
+from accelstudy.diagnosis.report import words
 from accelstudy.diagnosis.report.document import (
     diagnosed_calibration,
     diagnosis_document,
-    effect_document,
     positions_table,
     study_overlay,
 )
 from accelstudy.diagnosis.report.figures import diagnosis_figures, hardly_shown
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import MISSING, Diagnosis
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
-from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
+
+MODEL_HEADER = """\
+# The sensor and the noise that were found, as a study of their own:
+# snakemake --cores 2 --configfile config/config.yaml THIS_FILE
+"""
 
 
 def write_diagnosis(
@@ -61,103 +59,41 @@ def write_diagnosis(
         The content of diagnosis.json.
     """
     folder = Path(folder)
-    document = diagnosis_document(diagnosis)
+    document, calibration = diagnosis_document(diagnosis), None
     if loop is not None:
         document["loop"] = loop.document
         write_frame(folder / "loop.parquet", loop.sessions)
     positions = positions_table(diagnosis)
     write_frame(folder / "positions.parquet", positions)
-    calibration = _calibration(diagnosis, document)
-    if calibration is not None:
+    try:
+        calibration = diagnosed_calibration(diagnosis)
+    except (InputError, np.linalg.LinAlgError) as error:
+        document["calibration"] = {"file": None, "reason": str(error)}
+    else:
         write_json(folder / "calibration.json", calibration)
+        document["calibration"] = {"file": "calibration.json", "mended": calibration["mended"]}
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    _write_report(diagnosis, document, positions, folder, calibration, source, place)
-    write_json(folder / "diagnosis.json", document)
-    return document
-
-
-def _calibration(diagnosis: Diagnosis, document: dict[str, Any]) -> dict[str, Any] | None:
-    """Content of calibration.json; None, with the reason in the document, if there is none."""
-    try:
-        content = diagnosed_calibration(diagnosis)
-    except (InputError, np.linalg.LinAlgError) as error:
-        document["calibration"] = {"file": None, "reason": str(error)}
-        return None
-    document["calibration"] = {"file": "calibration.json", "mended": content["mended"]}
-    return content
-
-
-MODEL_HEADER = """\
-# The sensor and the noise that were found, as a study of their own:
-# snakemake --cores 2 --configfile config/config.yaml THIS_FILE
-"""
-
-
-def _write_report(
-    diagnosis: Diagnosis,
-    document: dict[str, Any],
-    positions: pd.DataFrame,
-    folder: Path,
-    calibration: dict[str, Any] | None,
-    source: str | Path,
-    place: str | Path,
-) -> None:
-    """Write figures/ and report.html.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    document : dict, of `diagnosis_document`
-    positions : DataFrame, of `positions_table`
-    folder : Path
-    calibration : dict, of `diagnosed_calibration`, optional
-    source, place : paths of the campaign and of the results, for the commands that the page gives
-    """
-    drawn = save_all(diagnosis_figures(diagnosis, positions), folder / "figures")
-    lines = wording.verdict_lines(diagnosis)
+    shape, lines = diagnosis.shape, words.verdict_lines(diagnosis)
     write_page(
         folder / "report.html",
         "diagnosis/report/report.html.j2",
         " ".join(lines),
         d=diagnosis,
         doc=document,
-        missing=MISSING,
-        effects=[effect_document(named) for named in diagnosis.found],
-        verdict=wording.badge(diagnosis),
-        headline=lines[0],
-        lines=lines[1:],
-        sentence=wording.sentence,
-        described=wording.described,
-        confirmation=wording.confirmation(diagnosis),
-        advice=wording.advice(diagnosis),
-        stands_for=wording.stands_for(diagnosis),
-        equation=lambda effect: get_effect(effect["spec"]).equation,
-        possible=lambda effect: wording.possible(effect["spec"]),
-        is_effect=lambda name: name in effect_names(),
-        called=lambda effect: wording.called(effect["name"], effect["spec"]),
-        figures=drawn,
-        beyond=wording.beyond(diagnosis),
-        small_dots=diagnosis.shape is not None and bool(hardly_shown(diagnosis.shape).any()),
-        changed=wording.changed(diagnosis),
-        keep_base=wording.keep_base(diagnosis),
+        w=words,
+        lines=lines,
+        figures=save_all(diagnosis_figures(diagnosis, positions), folder / "figures"),
+        small_dots=shape is not None and bool(hardly_shown(shape).any()),
         calibration=calibration,
-        added=diagnosis.extended is not diagnosis.model,
-        judged=wording.judged(diagnosis),
-        may_be_an_effect=wording.may_be_an_effect(diagnosis),
-        question=wording.question(diagnosis.next_positions),
-        family=wording.family_words,
-        shares_a_direction=IMITATES,
-        credible=CREDIBLE,
-        wrong=round(10 * SURE),
-        withheld=round(10 * (1 - SURE)),
-        level=diagnosis.level,
-        level_noise=LEVEL_NOISE,
-        level_sigma=REFUTED,
-        sure=SURE,
+        rules=RULES,
+        missing=MISSING,
+        imitates=IMITATES,
         next_steps=next_steps(diagnosis, calibration, source, place),
     )
+    write_json(folder / "diagnosis.json", document)
+    return document
 
 
 def next_steps(

@@ -1,16 +1,17 @@
-"""A diagnosis in plain words: what is certain first, then what is open."""
+"""A diagnosis in plain words: what is certain first, then what is open.
+
+The sentences stand in `words.txt.j2`; here are the phrases of which it makes them, as `w`.
+"""
 
 from __future__ import annotations
 
-import math
+import sys
 from collections import defaultdict
 from collections.abc import Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
-from accelstudy.basics.units import display_unit
-from accelstudy.basics.wording import amount, comma_list, grouped, probability, words
-from accelstudy.diagnosis.decision.posterior import CREDIBLE, Explanation, of_effects
-from accelstudy.diagnosis.decision.priors import MANY, SURE
+from accelstudy.basics.wording import comma_list, grouped, probability, words
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
     Name,
     Part,
@@ -19,15 +20,15 @@ from accelstudy.diagnosis.decision.statement import (
     family_of,
     statement,
 )
-from accelstudy.diagnosis.decision.verdict import Named
+from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.forms import coordinate_of
 from accelstudy.diagnosis.formulas import OTHER
-from accelstudy.diagnosis.next_positions import NextPosition
-from accelstudy.diagnosis.result import Diagnosis
-from accelstudy.effects import effect_names, get_effect
+from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.pages import lines
-from accelstudy.sensors.plausibility import USUAL_CAUSE
+from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
 
 TEMPLATE = "diagnosis/report/words.txt.j2"
 
@@ -48,168 +49,133 @@ TARGETS = {
     "tilt": "a tilt of the base",
 }
 """What may be such a function."""
+FAMILIES = {
+    "alignment of the axes": "a misalignment of the axes",
+    "attitude of the rig": "an error in the attitude of the rig",
+    "gross error": "a bumped position",
+    "linear scale": "an error of the linear scale",
+    "noise": "noise of another kind",
+    "temperature": "an effect of temperature",
+}
+"""What is missing, by family; other families get an article."""
+NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
+"""Words for names that stand for no effect."""
+
+WORTH = 0.1
+"""Posterior from which on something open is worth a word; the figure has all of it."""
+PLAIN = 0.5
+"""Posterior from which on it is worth a word where that which has a name lives."""
+MOST = 3
+"""Formulas that are worth a word; the page lists all."""
+
+HERE = sys.modules[__name__]
 
 
-def called(name: str, spec: str) -> str:
-    """Name what was found; a learned function by its coordinate."""
-    if name != LEARNED:
-        return words(name)
-    effect = get_effect(spec)
-    assert isinstance(effect, Learned)
-    return f"the function of {coordinate_of(effect.coordinate).words}"
-
-
-def too_few(diagnosis: Diagnosis) -> bool:
-    """Whether nothing was found since nothing could be tested."""
-    return diagnosis.verdict == "no_effect" and not diagnosis.screening.p_family
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """Say the verdict in one sentence."""
-    d, kind = diagnosis, diagnosis.verdict
-    if d.unrecorded or d.weak:
-        return sentence(d.reason.split("; ")[0])
-    if kind == "unknown":
-        return without_a_name(Statement(d.certain, d.open), _beside(d))
-    if kind == "narrowed":
-        names = missing(d.credible_set)
-    elif d.shape is not None:
-        named = [*(words(f.name) for f in d.found[1:]), "something that has no name here"]
-        names = f"{comma_list(named)}: {d.shape.ranking.subject}"
-    else:
-        # Effects beside a gross error are not its names.
-        found = [f for f in d.found if kind != "gross_error" or not _is_effect(f)]
-        names = comma_list([_title(f, {named.name for named in found}) for f in found])
-    if too_few(d):
-        kind = "too few"
-    elif may_be_an_effect(d):
-        kind = "noise or effect"
-    return lines(TEMPLATE, "headline", kind, names)[0]
-
-
-def badge(diagnosis: Diagnosis) -> str:
-    """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
-    if diagnosis.weak:
-        return ACCEPTED
-    return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
-
-
-def may_be_an_effect(diagnosis: Diagnosis) -> bool:
-    """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
-    return diagnosis.verdict == "noise_model" and _noise_only(diagnosis) < SURE
-
-
-def _noise_only(diagnosis: Diagnosis) -> float:
-    """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
-    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
-
-
-def _reasons(diagnosis: Diagnosis) -> list[str]:
-    """Clauses of the reason that the headline does not say."""
-    d = diagnosis
-    if d.unrecorded or d.weak:
-        return d.reason.split("; ")[1:]
-    return [d.reason] if d.reason else []
-
-
-def _title(named: Named, titled: set[str]) -> str:
-    """Name what was found, with all that would be the same, or with its position."""
-    if named.position is not None:
-        return f"{words(named.name)} {named.position}"
-    same = [words(name) for name in named.equivalence_class if name not in titled]
-    return " or ".join([called(named.name, named.spec), *same])
+def said(part: str, *content: object) -> list[str]:
+    """Say a part of the template, one sentence a line."""
+    return lines(TEMPLATE, part, *content, w=HERE)
 
 
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     """Say in a few sentences what was found; the first is the verdict."""
-    d = diagnosis
-    bumped = [named.position for named in d.found if named.position is not None]
-    told = {
-        "headline": headline(d),
-        "not_told_apart": not_told_apart(d.credible_set),
-        "explanation": explanation_words(d.credible_set[0]) if d.credible_set else "",
-        "reasons": [sentence(part) for part in _reasons(d)],
-        "noise_only": _noise_only(d) if may_be_an_effect(d) and not d.unrecorded else None,
-        "usual_cause": USUAL_CAUSE,
-        "residuals_over_noise": _residuals_over_noise(d),
-        "weights": _weights(d),
-        "suspects": {label: p for label, p in sorted(d.suspects) if label not in bumped},
-        "most_probable": most_probable(Statement(d.certain, d.open), d.credible_set),
-        "like": like(d),
-        "stands_for": stands_for(d),
-        "formulas": formulas(d),
-        "beyond": beyond(d),
-        "effects": [
-            (f, effect.equation, effect.is_course)
-            for f in d.found
-            if _is_effect(f) and f.name != LEARNED
-            for effect in [get_effect(f.spec)]
-        ],
-        "positions": bumped,
-        "changed": changed(d),
-        "keep_base": keep_base(d),
-        "confirmation": confirmation(d) if judged(d) else "",
-    }
-    return lines(TEMPLATE, "verdict", d, told)
+    return said("verdict", diagnosis)
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Say the verdict in one sentence."""
+    return said("headline", diagnosis)[0]
 
 
 def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what would show more, apart from further positions."""
-    d = diagnosis
-    hidden = [name for name in d.invisible if name != "gravity_error"]
-    may_repeat = not d.repeated and (d.verdict == "noise_model" or not d.sigma_known)
-    # What is slow and not told apart; where it is, the reason says what to record.
-    by_heat = d.coloured >= WORTH and not d.unrecorded and d.campaign.temperature is None
-    unseen = [] if d.approach.uses_angles else hidden
-    content = (unseen, "gravity_error" in d.invisible, may_repeat, by_heat, more_of_it(d))
-    return lines(TEMPLATE, "advice", *content)
+    return said("advice", diagnosis)
 
 
-def keep_base(diagnosis: Diagnosis) -> list[str]:
-    """Advise the base model for leveling where what was added makes the tilt error larger."""
-    if diagnosis.better_for_leveling != "base":
-        return []
-    return lines(TEMPLATE, "keep_base", changed(diagnosis))
+def warnings(diagnosis: Diagnosis, axes: Sequence[float]) -> list[str]:
+    """Say what a user of the calibration has to know; `axes` are their sigmas where they differ."""
+    return said("warnings", diagnosis, axes)
 
 
-def judged(diagnosis: Diagnosis) -> bool:
-    """Whether effects were added that held-out positions are asked about."""
-    return diagnosis.gap.held_out is not None or bool(diagnosis.gap.reason)
+def reason(diagnosis: Diagnosis) -> str:
+    """Say why the verdict is what it is; nothing where that needs no reason."""
+    return "; ".join(clauses(diagnosis))
 
 
-def confirmation(diagnosis: Diagnosis) -> str:
-    """Say which statement about the added effects held on positions that were not used."""
-    effects = [_title(named, {named.name}) for named in diagnosis.found if _is_effect(named)]
-    learned = diagnosis.verdict == LEARNED
-    return lines(TEMPLATE, "confirmation", diagnosis.gap, effects, learned)[0]
+def clauses(diagnosis: Diagnosis) -> list[str]:
+    """Clauses of the reason."""
+    return clauses_of(diagnosis.reason)
+
+
+def clauses_of(because: Reason | None) -> list[str]:
+    """Clauses of a reason; none where there is none."""
+    return [] if because is None else said("reason", because)
+
+
+def sentence(text: str) -> str:
+    """Make a sentence of a clause."""
+    return f"{text[:1].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
+
+
+def badge(diagnosis: Diagnosis) -> str:
+    """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
+    if diagnosis.code == "weak":
+        return ACCEPTED
+    return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
+
+
+def too_few(diagnosis: Diagnosis) -> bool:
+    """Whether nothing was found since nothing could be tested."""
+    return diagnosis.verdict == "no_effect" and not diagnosis.detection.p_family
+
+
+def noise_only(diagnosis: Diagnosis) -> float:
+    """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
+
+
+def may_be_an_effect(diagnosis: Diagnosis) -> bool:
+    """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
+    return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < RULES.sure
+
+
+def called(named: Named) -> str:
+    """Name what was found; a learned function by its coordinate."""
+    if named.name != LEARNED:
+        return words(named.name)
+    effect = effect_of(named)
+    assert isinstance(effect, Learned)
+    return f"the function of {coordinate_of(effect.coordinate).words}"
+
+
+def effect_of(named: Named) -> Effect:
+    """Effect that was found."""
+    return get_effect(named.spec)
+
+
+def title(named: Named, titled: set[str] | None = None) -> str:
+    """Name what was found, with all that would be the same and has no title, or its position."""
+    if named.position is not None:
+        return f"{words(named.name)} {named.position}"
+    same = [words(n) for n in named.equivalence_class if n not in (titled or {named.name})]
+    return " or ".join([called(named), *same])
+
+
+def titles(diagnosis: Diagnosis) -> str:
+    """Name all that the verdict is about: effects beside a gross error are not its names."""
+    gross = diagnosis.verdict == "gross_error"
+    found = [named for named in diagnosis.found if not (gross and named.parameters)]
+    return comma_list([title(named, {each.name for each in found}) for named in found])
 
 
 def changed(diagnosis: Diagnosis) -> str:
     """Say how the final fit differs: with what was added, and without what was left out."""
-    added = [called(f.name, f.spec) for f in diagnosis.found if _is_effect(f)]
+    added = [called(named) for named in diagnosis.found if named.parameters]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
-    changes = [f"with {comma_list(added)}"] if added else []
-    return comma_list([*changes, *([f"without position {comma_list(out)}"] if out else [])])
+    parts = {"with ": added, "without position ": out}
+    return comma_list([start + comma_list(names) for start, names in parts.items() if names])
 
 
-def _is_effect(named: Named) -> bool:
-    return bool(named.parameters)
-
-
-def _residuals_over_noise(d: Diagnosis) -> float | None:
-    """Residuals of the base fit over the stated noise, if refuted and not in the reason already."""
-    test = d.global_test
-    if test is None or test.accepted or (d.recognised is None and d.says_the_level):
-        return None
-    return math.sqrt(test.statistic / test.dof)
-
-
-def _weights(d: Diagnosis) -> list[float]:
-    """Variances of the axes over their mean; empty if they are weighted alike."""
-    if d.frame.solution is d.base:
-        return []
-    variances = d.frame.solution.variances[0, :3]
-    return (variances / variances.mean()).tolist()
+# --- a function without a name ------------------------------------------------------------------
 
 
 def like(diagnosis: Diagnosis) -> str:
@@ -217,17 +183,12 @@ def like(diagnosis: Diagnosis) -> str:
     worth = [one for one in diagnosis.like if one.posterior >= WORTH]
     if diagnosis.shape is not None and len(worth) == 1:
         return ""
-    named = diagnosis.verdict not in ("unknown", "learned")
+    named = diagnosis.verdict not in ("unknown", LEARNED)
     if named and worth and worth[0].posterior < PLAIN:
         return ""  # the figure has all of it
-    return _listed(
-        [
-            (f"{TARGETS[o.target]} that varies with {COORDINATES.get(o.coordinate, o.coordinate)}",
-             o.posterior)
-            for o in worth
-        ],
-        "or",
-    )  # fmt: skip
+    places = [(COORDINATES.get(one.coordinate, one.coordinate), one) for one in worth]
+    return _listed([(f"{TARGETS[o.target]} that varies with {c}", o.posterior) for c, o in places],
+                   "or")  # fmt: skip
 
 
 def formulas(diagnosis: Diagnosis) -> str:
@@ -235,7 +196,7 @@ def formulas(diagnosis: Diagnosis) -> str:
     if diagnosis.shape is None:
         return ""
     ranked = diagnosis.shape.ranking.formulas
-    if ranked[0].text == OTHER and ranked[0].posterior >= SURE:
+    if ranked[0].text == OTHER and ranked[0].posterior >= RULES.sure:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
     worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
     rest = " or otherwise" if len(worth) > MOST else ""
@@ -262,46 +223,7 @@ def more_of_it(diagnosis: Diagnosis) -> str:
     return f"Positions{session} where {of.words} is near {places}"
 
 
-def sentence(text: str) -> str:
-    """Make a sentence of a reason, with names of the catalogue as words."""
-    return f"{text[0].upper()}{words(text[1:])}" + ("" if text.endswith(".") else ".")
-
-
-def described(name: str) -> str:
-    """Return the first line of what the catalogue says of an effect; nothing for other names."""
-    if name not in effect_names():
-        return ""
-    return get_effect(name).summary
-
-
-def possible(spec: str) -> str:
-    """Say between which bounds the parameters of an effect are; nothing if it has no bounds."""
-    effect = get_effect(spec)
-    if not all(map(math.isfinite, effect.bounds)):
-        return ""
-    unit = effect.parameters[0].unit
-    low, high = (amount(bound, unit) for bound in effect.bounds)
-    return f"{low} … {high} {display_unit(unit)}"
-
-
-FAMILIES = {
-    "alignment of the axes": "a misalignment of the axes",
-    "attitude of the rig": "an error in the attitude of the rig",
-    "gross error": "a bumped position",
-    "linear scale": "an error of the linear scale",
-    "noise": "noise of another kind",
-    "temperature": "an effect of temperature",
-}
-"""What is missing, by family; other families get an article."""
-
-WORTH = 0.1
-"""Posterior from which on something open is worth a word; the figure has all of it."""
-PLAIN = 0.5
-"""Posterior from which on it is worth a word where that which has a name lives."""
-MOST = 3
-"""Formulas that are worth a word; the page lists all."""
-NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
-"""Words for names that stand for no effect."""
+# --- sets of explanations -----------------------------------------------------------------------
 
 
 def name_words(name: str) -> str:
@@ -315,9 +237,19 @@ def family_words(family: str) -> str:
     return FAMILIES.get(family, f"{article} {family}")
 
 
-def explanation_words(explanation: Explanation) -> str:
-    """Return an explanation as words: bias drift with quadratic scale."""
-    return " with ".join(grouped(explanation.names, name_words))
+def explained(names: Sequence[str]) -> str:
+    """Say the names of an explanation: bias drift with quadratic scale."""
+    return " with ".join(grouped(names, name_words))
+
+
+def together(names: Sequence[str]) -> str:
+    """List names, equal ones together: warm up and 2 outlier positions."""
+    return comma_list(grouped(names))
+
+
+def explain(names: Sequence[str]) -> str:
+    """List names with the verb that belongs to them."""
+    return f"{together(names)} explain{'s' if len(names) == 1 else ''}"
 
 
 def missing(credible_set: Sequence[Explanation]) -> str:
@@ -340,21 +272,13 @@ def without_a_name(set_says: Statement, beside: str = "something else") -> str:
         return "Something is missing from the model, and it has no name here."
     lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
     worth = [one for one in set_says.open if one.names and one.posterior >= WORTH]
-    more = sorted(worth, key=lambda one: not of_effects(one))
-    surely = len(effects) < len(set_says.certain) or _surely_more(set_says, CREDIBLE)
-    if any(map(of_effects, more)) and len(more) <= MANY:
+    more = sorted(worth, key=lambda one: not one.of_effects)
+    surely = len(effects) < len(set_says.certain) or _surely_more(set_says, RULES.credible)
+    if any(one.of_effects for one in more) and len(more) <= RULES.many:
         return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
     if surely:
         return f"{lacks}; what is missing beside it has no name here."
     return f"{lacks}; whether more is missing, and what, is open."
-
-
-def _beside(diagnosis: Diagnosis) -> str:
-    """Call what is open smaller, if what is certain takes most of the disagreement away."""
-    gap, noise = diagnosis.gap, float(diagnosis.sigma_known)
-    if gap.after is not None and gap.before - gap.after > 2 * (gap.after - noise):
-        return "something smaller"
-    return "something else"
 
 
 def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> str:
@@ -375,7 +299,7 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
 def stands_for(diagnosis: Diagnosis) -> list[str]:
     """Say of each certain family which of its members the model has."""
     d, said = diagnosis, []
-    for part in d.certain if d.verdict == "unknown" else ():
+    for part in d.finding.says.certain if d.verdict == "unknown" else ():
         added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
         if added and len(part.names) > 1:
             others = _names([n for n in part.names if n.name not in added])
@@ -398,7 +322,7 @@ def not_told_apart(credible_set: Sequence[Explanation]) -> str:
         if len(part.names) > 1
     ]
     beside = set_says.open if alike or not others else credible_set
-    more = [(explanation_words(o), o.posterior) for o in beside if o.names and o.posterior >= WORTH]
+    more = [(explained(o.names), o.posterior) for o in beside if o.names and o.posterior >= WORTH]
     perhaps = any(not one.names for one in beside)
     if len(more) > 1 and not perhaps:
         alike.append(more)
@@ -412,18 +336,6 @@ def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str
     return comma_list([f"{what} ({probability(p)})" for what, p in alternatives], last)
 
 
-def question(positions: Sequence[NextPosition]) -> str:
-    """Say what further positions would show, if any would."""
-    if not positions:
-        return ""
-    if LEARNED in positions[0].separates[0]:
-        return "what the learned function is like"
-    first, second = (" with ".join(grouped(names, name_words)) for names in positions[0].separates)
-    if first and second:
-        return f"whether {first} or {second} is missing"
-    return f"whether {first or second} is missing as well"
-
-
 def _missing(set_says: Statement) -> str:
     if not set_says.certain:
         return _or(set_says.open)
@@ -433,7 +345,7 @@ def _missing(set_says: Statement) -> str:
     parts = comma_list([_part(part) for part in set_says.certain])
     if not more:
         return parts
-    surely = _surely_more(set_says, CREDIBLE * sum(one.posterior for one in set_says.open))
+    surely = _surely_more(set_says, RULES.credible * sum(one.posterior for one in set_says.open))
     return f"{parts}, and {more}" if surely else f"{parts}, and perhaps {more}"
 
 
@@ -452,14 +364,14 @@ def _names(names: Sequence[Name]) -> str:
 
 
 def _or(explanations: Sequence[Explanation]) -> str:
-    alternatives = [explanation_words(one) for one in explanations]
+    alternatives = [explained(one.names) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
     return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
 
 
 def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
     """What is certain given that it is one of these explanations."""
-    return statement(effects, probability=CREDIBLE * sum(one.posterior for one in effects))
+    return statement(effects, probability=RULES.credible * sum(one.posterior for one in effects))
 
 
 def _surely_more(set_says: Statement, probability: float) -> bool:

@@ -1,0 +1,148 @@
+"""What the residuals say of the noise: whether a fit leaves more than that, what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special
+
+from accelstudy.adjustment.quality import Solution, pooled_variance
+from accelstudy.basics.levels import REFUTED
+from accelstudy.diagnosis.decision.posterior import Case
+from accelstudy.diagnosis.decision.problem import Problem, is_exact
+from accelstudy.diagnosis.evidence.noise_tests import (
+    AXES,
+    COLOUR,
+    LEVEL,
+    STEPS,
+    TAILS,
+    NoiseTest,
+    axis_test,
+    colour_test,
+    level_test,
+    resolution_test,
+    tail_test,
+    within_hold_test,
+)
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.hypotheses import Spaces
+from accelstudy.diagnosis.space.repeats import LackOfFit, clusters
+from accelstudy.diagnosis.space.residuals import Residuals
+
+SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
+"""What may be wrong with the noise, the most specific first."""
+
+
+class Misfit(NamedTuple):
+    """By how much the residuals of a fit are larger than the noise."""
+
+    ratio: float
+    of_repeats: bool
+    """Whether the noise is what repeated positions differ by, and not what is stated."""
+
+
+def misfit(problem: Problem, solution: Solution) -> Misfit | None:
+    """Return by how much the residuals are larger than the noise; None if they are not.
+
+    The noise is the given sigma. Where none is given, or where repeated positions refute it even
+    after the refit, it is the difference of repeated positions.
+    """
+    stated = problem.evidence.level.known
+    if stated and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
+        return None
+    ratio = float(np.sqrt(solution.omega / solution.redundancy))
+    than_stated = Misfit(ratio, of_repeats=False) if stated else None
+    left = Residuals.of(solution)
+    labels = clusters(problem.frame.forces)
+    if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
+        return than_stated
+    square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
+    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTED / 2):
+        return than_stated
+    if _of_fit(left, square, freedom) >= REFUTED:
+        return None
+    return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
+
+
+def lack_of_fit(problem: Problem) -> float:
+    """p-value of the test whether repeats agree better with each other than with the model."""
+    residuals, same = problem.residuals, problem.field.attitude
+    if same is None:
+        return 1.0
+    return _of_fit(residuals, *_of_repeats(residuals, same))
+
+
+def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
+    """F test of all but the differences of repeats against these differences."""
+    rest = residuals.redundancy - freedom
+    if not freedom or not rest:
+        return 1.0
+    ratio = (float(residuals.z @ residuals.z) - square) / rest / (square / freedom)
+    return float(special.fdtrc(rest, freedom, ratio))
+
+
+def _of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
+    """Square of the differences of repeated positions, and its degrees of freedom."""
+    square = float(residuals.z @ residuals.z) - float(same.parts(residuals.z)[0])
+    return max(square, 0.0), residuals.redundancy - int(same.dims[0])
+
+
+def tests_of_noise(case: Case, frame: Frame) -> tuple[NoiseTest, ...]:
+    """All tests of the noise that a campaign allows, on the residuals of the base or final fit."""
+    campaign, problem, chance = case.campaign, case.problem, case.chance
+    if is_exact(problem.base.solution):
+        return ()
+    residuals, base = frame.residuals, problem.residuals
+    sigma, sigma_base = (float(np.mean(one.sigmas[:, :3])) for one in (residuals, base))
+    # With a sigma far too large, the attitudes would look like steps.
+    least = sigma_base * min(1.0, float(np.sqrt(base.variance)))
+    tests = [level_test_of(problem, frame)] if problem.evidence.level.known else []
+    tests += [
+        axis_test(residuals, chance),
+        colour_test(residuals, chance),
+        tail_test(residuals, chance),
+        resolution_test(campaign.forces, least),
+    ]
+    if campaign.sd is not None and campaign.n_samples is not None:
+        tests.append(within_hold_test(residuals, sigma, campaign.sd, campaign.n_samples))
+    return tuple(tests)
+
+
+def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
+    """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
+    if frame is problem.frame:
+        base = problem.base.solution
+        return level_test(Residuals.of(base), base.sigma_dof)
+    return level_test(frame.residuals, frame.solution.sigma_dof)
+
+
+def sigma_holds(problem: Problem, frame: Frame) -> bool:
+    """Whether sigma is given, and the residuals of a fit do not refute it."""
+    stated = problem.evidence.level.known
+    return stated and level_test_of(problem, frame).p_value >= REFUTED
+
+
+def unit_variance(problem: Problem, frame: Frame) -> float:
+    """Variance of unit weight: of the given sigma where that holds, else a posteriori."""
+    residuals = frame.residuals
+    if not sigma_holds(problem, frame):
+        return residuals.variance
+    r = residuals.redundancy
+    return pooled_variance(r * residuals.variance, r, frame.solution.sigma_dof)
+
+
+def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
+    """Return what is wrong with the noise, the most specific finding first."""
+    level = next((t for t in tests if t.name == LEVEL), None)
+    counted = [
+        t
+        for t in tests
+        # A sigma that the residuals confirm knows of what varies from hold to hold.
+        if not (t.by_holds and level is not None and level.p_value >= REFUTED)
+    ]
+    others = RULES.level_noise / max(len(counted) - (level is not None), 1)
+    failed = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
+    return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)
