@@ -3,13 +3,8 @@
 # --8<-- [start:known]
 import ripple  # noqa: F401, to import it is to make it known
 
-from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words import verdict_lines
+import accelstudy as acs
 from accelstudy.effects import get_effect
-from accelstudy.sensors.models import get_model
 
 effect = get_effect("ripple(period=5)")
 low, high = effect.typical
@@ -18,20 +13,19 @@ print(f"{effect.spec}: {effect.equation}, usually {low:g} to {high:g} m/s²")
 
 # --8<-- [start:calibrate]
 hidden = "ripple(period=5): 0.006, -0.004, 0.005"
-campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-40", effects=(hidden,)))
+campaign = acs.simulate_campaign(scheme="fibonacci-40", effects=hidden)
 nine = "bias-scale-nonorthogonality"
 for name in (nine, f"{nine}+ripple(period=5)"):
-    model = get_model(name)
-    result = fit_campaign(campaign, model, get_approach("robot")).adjustment
-    print(f"{name}: variance of unit weight {result.variance_posteriori[0]:.2f}")
-for i, parameter in enumerate(model.parameters):
-    if parameter in effect.parameters:
-        value, sigma = 1e3 * result.parameters[0, i], 1e3 * result.sigma_priori[0, i]
-        print(f"{parameter.name} = {value:.2f} ± {sigma:.2f} mm/s²")
+    calibration = acs.calibrate(campaign, model=name)
+    variance = calibration.content["variance_of_unit_weight"]
+    print(f"{name}: variance of unit weight {variance:.2f}")
+for parameter in effect.parameters:
+    value, sigma = 1e3 * calibration.parameters.loc[parameter.name, ["value", "sigma"]]
+    print(f"{parameter.name} = {value:.2f} ± {sigma:.2f} mm/s²")
 # --8<-- [end:calibrate]
 
 # --8<-- [start:diagnose]
-diagnosis = diagnose(campaign, get_model(nine))
-print(*verdict_lines(diagnosis), sep="\n")
-print("its setting:", diagnosis.found[0].spec)
+diagnosis = acs.diagnose(campaign)
+print(diagnosis.verdict)
+print("its setting:", diagnosis.result.found[0].spec)
 # --8<-- [end:diagnose]
