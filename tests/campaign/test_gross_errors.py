@@ -13,7 +13,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
-from accelstudy.campaign.gross_errors.axis_error import SIGNED_PERMUTATIONS
+from accelstudy.campaign.gross_errors.errors import SIGNED_PERMUTATIONS
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
