@@ -18,17 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@contextmanager
-def parquet_file(path: str | Path, schema: pa.Schema, **options: Any) -> Iterator[pq.ParquetWriter]:
-    """Open a new file, which is written table by table; `options` are those of Arrow's writer."""
-    with pq.ParquetWriter(path, schema, write_page_checksum=True, **options) as writer:
-        yield writer
-
-
 def write_parquet(path: str | Path, table: pa.Table, **options: Any) -> None:
     """Write a whole table; `options` are those of Arrow's writer."""
-    with parquet_file(path, table.schema, **options) as writer:
-        writer.write_table(table)
+    pq.write_table(table, path, write_page_checksum=True, **options)
 
 
 def write_frame(path: str | Path, frame: pd.DataFrame) -> None:
@@ -37,16 +29,10 @@ def write_frame(path: str | Path, frame: pd.DataFrame) -> None:
         write_parquet(temporary, pa.Table.from_pandas(frame, preserve_index=False))
 
 
-def read_parquet(path: str | Path, remedy: str = "", **options: Any) -> pa.Table:
-    """Read a whole table; `remedy` and errors as in `whole_parquet`, `options` those of Arrow."""
-    with _whole(path, remedy):
-        return pq.read_table(path, partitioning=None, page_checksum_verification=True, **options)
-
-
 def read_frame(path: str | Path, remedy: str = "", **options: Any) -> pd.DataFrame:
-    """Read a whole table of pandas; see `read_parquet`."""
-    table = read_parquet(path, remedy, **options)
+    """Read a whole table of pandas; `remedy` and errors as in `whole_parquet`."""
     with _whole(path, remedy):  # its metadata may be odd
+        table = pq.read_table(path, partitioning=None, page_checksum_verification=True, **options)
         return table.to_pandas()
 
 

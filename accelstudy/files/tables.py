@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from accelstudy import __version__
 from accelstudy.basics import plugins
 from accelstudy.basics.errors import InputError
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.parquet import parquet_file, read_frame, whole_parquet, write_parquet
+from accelstudy.files.parquet import read_frame, whole_parquet, write_parquet
 
 if (
     TYPE_CHECKING
@@ -97,9 +98,10 @@ def parquet_writer(
     metadata = {METADATA_KEY: json.dumps(origin(provenance)).encode()}
     with (
         whole_file(path) as temporary,
-        parquet_file(
+        pq.ParquetWriter(
             temporary,
             schema.with_metadata(metadata),
+            write_page_checksum=True,
             compression="zstd",
             use_dictionary=[name for name in schema.names if name not in (*counting, *floats)],
             column_encoding=dict.fromkeys(counting, "DELTA_BINARY_PACKED"),

@@ -12,11 +12,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.files import reading
-from accelstudy.files.parquet import read_parquet
+from accelstudy.files.parquet import read_frame
 from accelstudy.files.reading import read_layer
 
 UNREADABLE = Path("/proc/self/mem")  # it opens, and its first byte cannot be read
-READERS = (read_layer, read_calibration, open_source, read_parquet)
+READERS = (read_layer, read_calibration, open_source, read_frame)
 
 
 @pytest.mark.parametrize("read", READERS)
