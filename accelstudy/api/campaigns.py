@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ from accelstudy.api.logs import Log, keys_of, log_of, names_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import natural
 from accelstudy.basics.units import UNITS
-from accelstudy.campaign.beside import Beside, ReferenceLog
 from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.campaign.importing.sources import LogFile
+from accelstudy.campaign.reference_log import ReferenceLog, open_reference
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings
 from accelstudy.campaign.simulated import simulate_campaign as simulate
@@ -39,12 +39,12 @@ class Import:
     ----------
     files : list of path, or the columns of a table in memory
     settings : ImportSettings
-    beside : Beside, optional, a calibrated sensor on the same plate
+    beside : ReferenceLog, optional, of a calibrated sensor on the same plate
     """
 
     files: list[LogFile]
     settings: ImportSettings
-    beside: Beside | None
+    beside: ReferenceLog | None
 
     @classmethod
     def of(
@@ -72,8 +72,7 @@ class Import:
             raise InputError(
                 "sensors: several sensors make several campaigns; give the columns of one"
             )
-        ((campaign, report),) = import_sensors(self.files, self.settings, self.beside).values()
-        return replace(campaign, notes=tuple(report.lines()))
+        return import_sensors(self.files, self.settings, self.beside)[""][0]
 
 
 def settings_of(
@@ -143,7 +142,7 @@ def _beside(
     calibration: Path | None,
     columns: dict[str, str] | None,
     offset: float | None,
-) -> Beside | None:
+) -> ReferenceLog | None:
     """Return the sensor beside that of the log, if there is one."""
     of_log, of_calibration = key("reference_log"), key("reference")
     if log is None and calibration is None:
@@ -155,7 +154,7 @@ def _beside(
         raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
     if log is None:
         raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
-    return Beside.of(ReferenceLog(log, calibration, columns or {}, offset))
+    return open_reference(log, calibration, columns, offset)
 
 
 # --- simulated ----------------------------------------------------------------------------------

@@ -18,23 +18,14 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, ROBOT_UNITS
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.checks import (
-    OPPOSITE,
-    Remedies,
-    better_angles,
-    check_column,
-    check_names,
-    check_norm,
-    check_outliers,
-    check_robot,
-    check_size,
-)
-from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, TABLES, Header
+from accelstudy.campaign.checks import OPPOSITE, Remedies, better_angles, check_norm
+from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MOST, TABLES, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
 from accelstudy.files.reading import overlay, read_layer, read_text
 from accelstudy.files.validation import checked
+from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[Any]]
@@ -48,6 +39,22 @@ REMEDIES = Remedies(
 """What to do about forces that are not as large as gravity."""
 MOST_NAMED = 5
 """Unknown columns of which each has a line."""
+FARTHEST = 1000
+"""Times gravity; a mean beyond it is no measurement."""
+_OF_HEADER = {
+    "name": "name",
+    "sensor": "sensor",
+    "date": "date",
+    "unit": "unit",
+    "gravity": "gravity.value_mps2",
+    "sigma_gravity": "gravity.sigma_mps2",
+    "sigma_force": "sensor_noise.sigma_mps2",
+    "sigma_dof": "sensor_noise.degrees_of_freedom",
+    "full_range": "range_mps2",
+    "reference": "reference",
+    "log": "log",
+}
+"""Attributes of a campaign that are keys of its header."""
 
 
 def read_campaign(
@@ -165,7 +172,7 @@ def columns_of(text: str, path: Path) -> Columns:
                 f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
                 "is the file whole?"
             )
-    check_names(names, path)
+    _check_names(names, path)
     return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
 
 
@@ -177,9 +184,15 @@ def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
     """Columns of Python values, and no warnings; unknown columns are not read."""
     with whole_parquet(path) as file:
         names = [str(name) for name in file.schema_arrow.names]
-        check_names(names, path)
+        _check_names(names, path)
         table = file.read(columns=[name for name in names if name in KNOWN])
         return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
+
+
+def _check_names(names: Sequence[str], path: Path) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: {name!r}: the column stands twice")
 
 
 def _ignored(path: Path, name: str) -> str:
@@ -253,19 +266,16 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
         if attribute == "positions":
             labels = [f"position {value:.15g}" for value in parts[0]]
         for name, part in zip(names, parts, strict=True):
-            check_column(attribute, name, part, labels, path)
+            _check_column(attribute, name, part, labels, path)
         given[attribute] = np.column_stack(parts) if len(parts) > 1 else parts[0]
-    check_robot(given, header, path)
+    _check_robot(given, header, path)
     values: dict[str, Any] = {}
     with np.errstate(all="ignore"):  # the checks below find what overflows
         for attribute, array in given.items():
             values[attribute] = header.conversion(attribute).to_si(array)
-        check_size(given["forces"], values["forces"], header, path)
-        if plausible:
-            _check_plausible(given, values["forces"], header, path)
-            check_outliers(values["forces"], labels, header.gravity.value_mps2, path)
-        if header.robot is not None:
-            values.setdefault("yaw", np.zeros(len(labels)))
+        _check_forces(given, values["forces"], header, path, labels, plausible)
+    if header.robot is not None:
+        values.setdefault("yaw", np.zeros(len(labels)))
     for attribute, array in values.items():
         if COLUMNS[attribute].whole:
             values[attribute] = array.astype(np.int64)
@@ -277,9 +287,69 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
         raise InputError(f"{path.with_name(HEADER)}: {error}") from None
 
 
-def _check_plausible(given: Mapping[str, Array], forces: Array, header: Header, path: Path) -> None:
-    """Check that the columns `given` fit gravity and each other in the units of the file."""
-    gravity, where = header.gravity.value_mps2, f"{path}: fx, fy, fz"
+def _check_column(
+    attribute: str, name: str, values: Array, labels: Sequence[str], path: Path
+) -> None:
+    """Check what must hold for a column in any unit."""
+
+    def complain_of(wrong: NDArray[np.bool_], text: str) -> None:
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise InputError(f"{path}: {name}: {labels[i]}: {values[i]:.15g} {text}")
+
+    column = COLUMNS[attribute]
+    if column.whole:
+        complain_of(values % 1 != 0, "is no whole number")
+    within = column.within
+    for i in np.flatnonzero((values < within.least) | (values > within.most))[:1]:
+        within.check_key(f"{path}: {name}: {labels[i]}", values[i])
+    behind = np.diff(values, prepend=-np.inf)
+    if attribute == "positions":
+        text = "follows no smaller number; number the holds 1, 2, 3 … in order of acquisition"
+        complain_of(behind <= 0, text)
+    if attribute == "time":
+        complain_of(behind < 0, "is before the hold above; rows must be in order of acquisition")
+    if attribute == "forces" and len(values) > 1 and np.ptp(values) == 0:
+        raise InputError(
+            f"{path}: {name}: {values[0]:.15g} in all positions; a channel that works changes"
+        )
+
+
+def _check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None:
+    """Check that angles and their sigma come together."""
+    roll, pitch = COLUMNS["angles"].names
+    key = f"{path.with_name(HEADER)}: robot.angle_sigma_mgon"
+    if "yaw" in given and "angles" not in given:
+        raise InputError(f"{path}: yaw_robot_gon: goes with {roll} and {pitch}, which are missing")
+    if header.reference is not None:
+        key = f"{path.with_name(HEADER)}: reference"
+    elif "angles" in given and header.robot is None:
+        raise InputError(f"{key}: missing, but {path.name} has {roll} and {pitch}")
+    if (header.robot or header.reference) is not None and "angles" not in given:
+        raise InputError(f"{key}: is given, but {path.name} has no {roll} and {pitch}")
+
+
+def _check_forces(
+    given: Mapping[str, Array],
+    forces: Array,
+    header: Header,
+    path: Path,
+    labels: Sequence[str],
+    plausible: bool,
+) -> None:
+    """Check that forces can be calculated with and, if asked, that they fit gravity and angles.
+
+    The columns `given` are in the units of the file, `forces` in m/s².
+    """
+    where, gravity = f"{path}: fx, fy, fz", header.gravity.value_mps2
+    norm = usual_norm(forces)
+    if not (norm > 1 / MOST and np.max(abs(forces)) < MOST):
+        raise InputError(
+            f"{where}: their norm is about {usual_norm(given['forces']):.3g} {header.unit}, which "
+            f"no unit makes gravity, {gravity:g} m/s^2; correct the columns"
+        )
+    if not plausible:
+        return
     check_norm(where, given["forces"], forces, header.unit, gravity, REMEDIES)
     better = None
     if "angles" in given:
@@ -289,30 +359,31 @@ def _check_plausible(given: Mapping[str, Array], forces: Array, header: Header, 
     if better is not None:
         names = ", ".join(COLUMNS["angles"].names)
         raise InputError(f"{path}: {names}: the angles look like {ROBOT_UNITS[better]}, not gon")
+    for i in np.flatnonzero(np.linalg.norm(forces, axis=1) > FARTHEST * gravity)[:1]:
+        raise InputError(
+            f"{where}: {labels[i]}: more than {FARTHEST} times gravity; correct the mean, or leave "
+            "out the hold"
+        )
 
 
 def campaign_of(header: Header, values: Mapping[str, Any]) -> Campaign:
     """Make a campaign of a header and of columns in SI, by attribute."""
-    noise, sigma_angle = header.sensor_noise, None
+    sigma_angle = None
     if header.robot is not None:
         sigma_angle = header.robot.angle_sigma_mgon * MGON
     elif header.reference is not None:
         sigma_angle = header.reference.sigma_mps2 / header.gravity.value_mps2
+    of_header: dict[str, Any] = {}
+    for attribute, key in _OF_HEADER.items():
+        value: Any = header
+        for part in key.split("."):
+            value = getattr(value, part, None)
+        of_header[attribute] = value
     return Campaign(
-        name=header.name,
-        sensor=header.sensor,
-        date=header.date,
-        unit=header.unit,
-        gravity=header.gravity.value_mps2,
-        sigma_gravity=header.gravity.sigma_mps2,
-        sigma_force=None if noise is None else noise.sigma_mps2,
-        sigma_dof=None if noise is None else noise.degrees_of_freedom,
+        **of_header,
         sigma_angle=sigma_angle,
-        reference=header.reference,
         nominal=None if header.nominal is None else header.conversion("forces"),
-        full_range=header.range_mps2,
         resolution=None if header.resolution_mps2 is None else np.array(header.resolution_mps2),
-        log=header.log,
         **values,
     )
 
@@ -347,33 +418,23 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
 
 
 def _content_of(campaign: Campaign) -> dict[str, Any]:
-    """Content of `campaign.yaml`."""
-    content: dict[str, Any] = {
-        "schema_version": 1,
-        "name": campaign.name,
-        "sensor": campaign.sensor,
-        "date": campaign.date,
-        "unit": campaign.unit,
-        "gravity": {"value_mps2": campaign.gravity, "sigma_mps2": campaign.sigma_gravity},
-    }
+    """Content of `campaign.yaml`; what it does not say is None, or empty."""
+    content: dict[str, Any] = {"schema_version": 1}
+    for attribute, key in _OF_HEADER.items():
+        value = getattr(campaign, attribute)
+        block, _, inner = key.rpartition(".")
+        if value is not None:
+            (content.setdefault(block, {}) if block else content)[inner] = value
+    if campaign.sigma_force is None:
+        content.pop("sensor_noise", None)
     if campaign.nominal is not None:
         nominal = {"scale": campaign.nominal.scale, "offset": campaign.nominal.offset}
         content["nominal"] = {k: np.asarray(v).tolist() for k, v in nominal.items()}
-    if campaign.sigma_force is not None:
-        content["sensor_noise"] = {"sigma_mps2": campaign.sigma_force}
-        if campaign.sigma_dof is not None:
-            content["sensor_noise"]["degrees_of_freedom"] = campaign.sigma_dof
-    if campaign.full_range is not None:
-        content["range_mps2"] = campaign.full_range
     if campaign.resolution is not None:
         content["resolution_mps2"] = np.asarray(campaign.resolution).tolist()
-    if campaign.reasons:
+    if campaign.left_out:
         content["excluded"] = campaign.exclusions
-    if campaign.log is not None:
-        content["log"] = campaign.log.model_dump(exclude_none=True)
-    if campaign.reference is not None:
-        content["reference"] = campaign.reference.model_dump()
-    elif campaign.sigma_angle is not None:
+    if campaign.reference is None and campaign.sigma_angle is not None:
         content["robot"] = {"angle_sigma_mgon": campaign.sigma_angle / MGON}
     return content
 

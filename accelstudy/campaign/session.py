@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 class Campaign:
     """One calibration session of one sensor, in SI; n static holds in order of acquisition.
 
-    Holds that are left out of every fit are in `excluded` only. So no calculation uses them by
+    Holds that are left out of every fit are in `left_out` only. So no calculation uses them by
     mistake, while `hold` and `whole` still know them.
 
     Attributes
@@ -50,8 +50,8 @@ class Campaign:
     resolution : (3,) array, m/s², optional, steps in which the axes are read, 0 for none; where
         rounding to them counts
     log : LogLayout, optional, layout of the log from which the campaign was made
-    excluded : Campaign, optional, the holds that were left out, with the same columns
-    reasons : mapping of int to str, why, by position
+    left_out : mapping, the same columns of the holds that were left out, and why, `reason`; empty
+        if there are none
     warnings : tuple of str, what was ignored when the campaign was read
     notes : tuple of str, what the import of its log found and assumed
     """
@@ -79,8 +79,7 @@ class Campaign:
     full_range: float | None = None
     resolution: Array | None = None
     log: LogLayout | None = None
-    excluded: Campaign | None = None
-    reasons: Mapping[int, str] = field(default_factory=dict)
+    left_out: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
     of_type: SensorType | None = None
@@ -133,19 +132,22 @@ class Campaign:
         )
 
     @property
+    def reasons(self) -> dict[int, str]:
+        """Why positions were left out, by their numbers."""
+        if not self.left_out:
+            return {}
+        pairs = (self.left_out[name].tolist() for name in ("positions", "reason"))
+        return dict(zip(*pairs, strict=True))
+
+    @property
     def exclusions(self) -> list[dict[str, Any]]:
         """Positions that were left out, each with its reason, as the header has them."""
-        return [
-            {"position": int(position), "reason": reason}
-            for position, reason in sorted(self.reasons.items())
-        ]
+        return [{"position": n, "reason": reason} for n, reason in self.reasons.items()]
 
     @property
     def whole(self) -> Campaign:
         """The campaign with all its holds, as its file has them."""
-        if self.excluded is None:
-            return self
-        return replace(self, **self._rows()[0], excluded=None, reasons={})
+        return replace(self, **self._rows()[0], left_out={}) if self.left_out else self
 
     def without(self, reasons: Mapping[int, str]) -> Campaign:
         """Leave out holds.
@@ -165,30 +167,22 @@ class Campaign:
         unknown = [position for position in reasons if position not in self.positions]
         if unknown:
             raise InputError(f"{self.name}: excluded: there is no position {unknown[0]}")
-        left_out = np.isin(self.positions, list(reasons))
-        if left_out.all():
+        if np.isin(self.positions, list(reasons)).all():
             raise InputError(f"{self.name}: excluded: no position is left")
-        whole, out = self.whole, np.isin(self.whole.positions, [*self.reasons, *reasons])
-        return replace(
-            self,
-            **whole._taken(~out),
-            excluded=replace(whole, **whole._taken(out)),
-            reasons={**self.reasons, **reasons},
-        )
-
-    def _taken(self, chosen: NDArray[np.bool_]) -> dict[str, Any]:
-        """Columns with some of the holds."""
-        return {
-            name: values[chosen] for name in COLUMNS if (values := getattr(self, name)) is not None
-        }
+        why, (rows, _) = {**self.reasons, **reasons}, self._rows()
+        out = np.isin(rows["positions"], list(why))
+        left_out = {name: values[out] for name, values in rows.items()}
+        left_out["reason"] = np.array([why[n] for n in left_out["positions"].tolist()])
+        used: dict[str, Any] = {name: values[~out] for name, values in rows.items()}
+        return replace(self, **used, left_out=left_out)
 
     def _rows(self) -> tuple[dict[str, Any], NDArray[np.bool_]]:
         """Columns with all the holds, and which of them are used."""
-        used_rows = self._taken(np.ones(self.n_positions, dtype=bool))
-        if self.excluded is None:
-            return used_rows, np.ones(self.n_positions, dtype=bool)
-        out = self.excluded._taken(np.ones(self.excluded.n_positions, dtype=bool))
-        order = np.argsort(np.concatenate([used_rows["positions"], out["positions"]]))
-        used = np.arange(len(order)) < self.n_positions
-        rows = {k: np.concatenate([used_rows[k], out[k]])[order] for k in used_rows if k in out}
-        return rows, used[order]
+        rows = {name: values for name in COLUMNS if (values := getattr(self, name)) is not None}
+        used = np.ones(self.n_positions, dtype=bool)
+        if not self.left_out:
+            return rows, used
+        out = self.left_out
+        order = np.argsort(np.concatenate([rows["positions"], out["positions"]]))
+        rows = {k: np.concatenate([rows[k], out[k]])[order] for k in rows if k in out}
+        return rows, (np.arange(len(order)) < self.n_positions)[order]

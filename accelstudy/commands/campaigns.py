@@ -19,7 +19,7 @@ from accelstudy.verbs import calibrations, campaigns, planning
 from accelstudy.verbs.kinds import File, Force, check, verb
 
 if TYPE_CHECKING:
-    from accelstudy.campaign.importing.making import ImportReport
+    from accelstudy.campaign.importing.detection import Holds
     from accelstudy.campaign.session import Campaign
 
 POLL = 1.0
@@ -62,13 +62,13 @@ def _sensor(text: str) -> tuple[str, list[str]]:
     return name.strip(), places
 
 
-def show_import(campaign: Campaign, report: ImportReport, out: Path, figure: bool = True) -> None:
+def show_import(campaign: Campaign, holds: Holds | None, out: Path, figure: bool = True) -> None:
     """Tell what was imported, with its warnings, and where to."""
-    for line in report.lines():
+    for line in campaign.notes:
         say(line)
-    for warning in report.warnings:
+    for warning in campaign.warnings:
         warn(warning)
-    if figure and report.holds is not None:
+    if figure and holds is not None:
         say(f"figure: {out / 'segmentation.png'}")
     click.echo(f"campaign: {out} ({counted(campaign.n_positions, 'position')})")
 

@@ -35,9 +35,9 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     InputError
         If the log cannot be read, has no static hold, or is too short for an Allan deviation.
     """
-    ((_, report),) = import_sensors([path], settings).values()
-    assert report.holds is not None
-    noise = report.holds.noise
+    ((_, holds),) = import_sensors([path], settings).values()
+    assert holds is not None
+    noise = holds.noise
     curve = noise.allan.channels(noise.of_sensor)
     return sheet_of_allan(curve, Path(path).stem, str(path))
 

@@ -166,7 +166,7 @@ def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:
 
 def _of_calibration(path: Path) -> ReferenceSensor:
     # Slow to import, and seldom needed.
-    from accelstudy.campaign.beside import reference_sensor, usable_reference
+    from accelstudy.campaign.reference_log import reference_sensor, usable_reference
 
     calibration = usable_reference(path)
     sigma = calibration.content["sigma_position_mps2"]

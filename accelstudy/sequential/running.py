@@ -171,4 +171,4 @@ def _first(campaign: Campaign, n: int) -> Campaign:
         return campaign
     later = {int(p): "later" for p in campaign.positions[n:]}
     part = campaign.without(later)
-    return replace(part, excluded=campaign.excluded, reasons=dict(campaign.reasons))
+    return replace(part, left_out=campaign.left_out)

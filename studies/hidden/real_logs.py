@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from accelstudy.basics.errors import InputError
+from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.making import ImportReport
-from accelstudy.campaign.importing.recording import read_log
+from accelstudy.campaign.importing.recording import Recording, read_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
@@ -69,11 +69,11 @@ class Donor:
         own: Sequence[str] = (),
     ) -> None:
         self.name, self.settings, self.own = name, settings, own
-        campaign, report = import_log(path, settings)
-        self.spans, self.forces = spans_of(campaign, report), campaign.forces
+        campaign, holds = import_log(path, settings)
+        self.spans, self.forces = spans_of(campaign, holds), campaign.forces
         self.timed = not settings.means and settings.block is None
         if not settings.means:
-            samples = read_log(path, settings, untimed=not self.timed).samples
+            samples = Recording([read_log(path, settings, untimed=not self.timed)])
             self.forces = samples.forces
         middles = np.arange(len(self.forces), dtype=float) + 0.5
         self.time = samples.time if self.timed else interval / (settings.block or 1) * middles
@@ -201,13 +201,12 @@ def means_of(values: Array, spans: Spans) -> Array:
     return np.stack([values[..., a:b, :].mean(axis=-2) for a, b in spans], axis=-2)
 
 
-def spans_of(campaign: Campaign, report: ImportReport) -> Spans:
+def spans_of(campaign: Campaign, holds: Holds | None) -> Spans:
     """Samples of each hold that is used."""
-    if report.holds is None:
+    if holds is None:
         first = np.arange(campaign.n_positions)
         return np.column_stack([first, first + 1])
-    used = [report.holds.segments[int(number)] for number in campaign.positions]
-    return np.array([[segment.start, segment.end] for segment in used])
+    return holds.table.loc[campaign.positions, ["start", "end"]].to_numpy()
 
 
 def residuals(atlas: Atlas, forces: Array) -> Array:

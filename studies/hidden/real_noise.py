@@ -148,8 +148,8 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tupl
         columns["time"] = log.time
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"{log.name}.parquet"
-        campaign, report = import_log(path, log.write(path, causes, course, columns))
-    spans = spans_of(campaign, report)
+        campaign, holds = import_log(path, log.write(path, causes, course, columns))
+    spans = spans_of(campaign, holds)
     truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
     if not causes:
         return campaign, truth

@@ -7,17 +7,20 @@ from log_helpers import open_log
 from places import SHARED
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.logs import find_joint_holds
-from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing import detection
 from accelstudy.campaign.importing.settings import parse_settings
-from accelstudy.campaign.importing.windows import Windows
 
 RATE = 100.0
 G = 9.81
 
 
 def find_holds(log, **options):
-    return find_joint_holds([Recording([log])], parse_settings(options))[0]
+    return detection.find_holds([log], parse_settings(options))[0]
+
+
+def spans(holds):
+    """First samples of holds, and those after the last."""
+    return holds.table[["start", "end"]].to_numpy().T
 
 
 def shared(name):
@@ -54,9 +57,7 @@ def write(folder, forces, time=None):
 
 
 def assert_same(holds, others, rtol=1e-5):
-    for attribute in ("start", "end", "t0", "t1", "n", "mean", "sd"):
-        one, other = (each.of_each(attribute) for each in (holds, others))
-        np.testing.assert_allclose(one, other, rtol=rtol, atol=1e-8)
+    pd.testing.assert_frame_equal(holds.table, others.table, rtol=rtol, atol=1e-8)
 
 
 def opened(folder, forces, time=None, **options):
@@ -69,25 +70,26 @@ def opened(folder, forces, time=None, **options):
 def test_known_holds(tmp_path, seed, sigma):
     forces, edges = session(seed, sigma=sigma)
     holds = find_holds(opened(tmp_path, forces))
-    assert len(holds) == len(edges)
-    inside = (holds.of_each("start") >= edges[:, 0]) & (holds.of_each("end") <= edges[:, 1])
-    assert inside.all()
+    assert len(holds.table) == len(edges)
+    start, end = spans(holds)
+    assert np.all((start >= edges[:, 0]) & (end <= edges[:, 1]))
     # Half a window and the trim are lost on both sides, and little else.
-    np.testing.assert_allclose(holds.of_each("start") - edges[:, 0], 70, atol=15)
-    np.testing.assert_allclose(edges[:, 1] - holds.of_each("end"), 70, atol=15)
-    np.testing.assert_array_equal(holds.n_samples, holds.of_each("end") - holds.of_each("start"))
-    np.testing.assert_allclose(holds.t0, holds.of_each("start") / RATE)
-    np.testing.assert_allclose(holds.t1, (holds.of_each("end") - 1) / RATE)
-    for i in range(len(holds)):
-        own = forces[holds.of_each("start")[i] : holds.of_each("end")[i]]
-        np.testing.assert_allclose(holds.mean[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(holds.of_each("sd")[i], own.std(axis=0, ddof=1), rtol=1e-9)
+    np.testing.assert_allclose(start - edges[:, 0], 70, atol=15)
+    np.testing.assert_allclose(edges[:, 1] - end, 70, atol=15)
+    np.testing.assert_array_equal(holds.table["n"], end - start)
+    np.testing.assert_allclose(holds.table["t0"], start / RATE)
+    np.testing.assert_allclose(holds.table["t1"], (end - 1) / RATE)
+    sds = holds.table[["sd_fx", "sd_fy", "sd_fz"]].to_numpy()
+    for i in range(len(start)):
+        own = forces[start[i] : end[i]]
+        np.testing.assert_allclose(holds.means[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(sds[i], own.std(axis=0, ddof=1), rtol=1e-9)
     assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
 
 
 def test_windows_are_those_of_numpy(tmp_path):
     forces, _ = session(holds=2)
-    found = Windows(opened(tmp_path, forces), 101)
+    found = detection.Windows(opened(tmp_path, forces), 101)
     sliding = np.lib.stride_tricks.sliding_window_view(forces, 101, axis=0)
     expected = np.linalg.norm(sliding.var(axis=2), axis=1)
     np.testing.assert_allclose(found.variance[50:-50], expected, rtol=1e-9)
@@ -103,8 +105,10 @@ def test_no_hold_spans_a_gap(tmp_path):
     log = opened(tmp_path, forces, time)
     holds = find_holds(log, shortest_s=0.5)
     assert "1 gap in time; no hold spans one" in holds.warnings
-    assert len(holds) == len(edges) + 1
-    assert not np.any((holds.of_each("start") < middle) & (holds.of_each("end") > middle))
+    assert len(holds.table) == len(edges) + 1
+    assert not np.any(
+        (holds.table["start"].to_numpy() < middle) & (holds.table["end"].to_numpy() > middle)
+    )
 
 
 def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
@@ -115,7 +119,7 @@ def test_a_frozen_channel_does_not_lower_the_floor(tmp_path):
     frozen[edges[6, 0] : edges[6, 1], 1] = frozen[edges[6, 0], 1]
     holds = find_holds(opened(tmp_path, frozen))
     assert holds.threshold.sd == pytest.approx(sound.threshold.sd, rel=0.05)
-    np.testing.assert_array_equal(holds.of_each("start"), sound.of_each("start")[[0, 1, 7]])
+    np.testing.assert_array_equal(spans(holds)[0], spans(sound)[0][[0, 1, 7]])
     assert any("does not change over a window in" in text for text in holds.warnings)
 
 
@@ -133,10 +137,9 @@ def test_saturated_holds_are_left_out(tmp_path):
     clipped[:, 0] = sign * np.minimum(sign * forces[:, 0], abs(level))
     beyond = [i for i, (a, b) in enumerate(edges) if sign * forces[a:b, 0].mean() > abs(level)]
     holds = find_holds(opened(tmp_path, clipped))
-    assert len(holds) == len(edges) - 1 - len(beyond)
-    assert not np.any(
-        (holds.of_each("start") >= edges[4, 0]) & (holds.of_each("end") <= edges[4, 1])
-    )
+    assert len(holds.table) == len(edges) - 1 - len(beyond)
+    start, end = spans(holds)
+    assert not np.any((start >= edges[4, 0]) & (end <= edges[4, 1]))
     assert any("saturated" in text for text in holds.warnings)
 
 
@@ -145,7 +148,7 @@ def test_a_coarse_sensor_is_not_saturated(tmp_path):
     forces = np.repeat(np.diag([G] * 3), 400, axis=0) + 0.02 * rng.standard_normal((1200, 3))
     coarse = np.round(forces / 0.03) * 0.03
     holds = find_holds(opened(tmp_path, coarse))
-    assert len(holds) == 3
+    assert len(holds.table) == 3
     assert not any("saturated" in text for text in holds.warnings)
 
 
@@ -156,10 +159,9 @@ def test_override_and_limits(tmp_path):
     given = find_holds(log, threshold_mps2=chosen.threshold.sd)
     assert given.threshold.reason == "as given"
     assert_same(given, chosen)
-    assert len(find_holds(log, threshold_mps2=100.0)) == 1
+    assert len(find_holds(log, threshold_mps2=100.0).table) == 1
     longer = find_holds(log, trim_s=0.5)
-    np.testing.assert_array_equal(longer.of_each("start"), chosen.of_each("start") + 30)
-    np.testing.assert_array_equal(longer.of_each("end"), chosen.of_each("end") - 30)
+    np.testing.assert_array_equal(spans(longer).T, spans(chosen).T + np.array([30, -30]))
     for options, message in [
         ({"shortest_s": 5.0}, "no static hold of 5 s or more .* 8 rests of 4.0 s are no hold: "),
         ({"threshold_mps2": 1e-6}, "no static hold"),
@@ -170,18 +172,18 @@ def test_override_and_limits(tmp_path):
     ]:
         with pytest.raises(InputError, match=message):
             find_holds(log, **options)
-    assert len(edges) == len(chosen)
+    assert len(edges) == len(chosen.table)
 
 
 def test_a_log_at_rest_is_one_hold(tmp_path):
     forces = [0, 0, G] + 0.02 * np.random.default_rng(1).standard_normal((5000, 3))
     holds = find_holds(opened(tmp_path, forces))
-    assert holds.n_samples.tolist() == [5000 - 2 * 70]
+    assert holds.table["n"].tolist() == [5000 - 2 * 70]
 
 
 def test_few_holds_in_much_motion(tmp_path):
     forces, edges = session(holds=4, still=400, moving=2500)
-    assert len(find_holds(opened(tmp_path, forces))) == len(edges)
+    assert len(find_holds(opened(tmp_path, forces)).table) == len(edges)
 
 
 # --- Public data ---------------------------------------------------------------------------------
@@ -190,13 +192,13 @@ def test_few_holds_in_much_motion(tmp_path):
 def near(holds, reference, scale=1.0):
     """Largest difference of the means, in sd of a sample, of the holds that both know."""
     worst, common = 0.0, 0
-    start, end = holds.of_each("start"), holds.of_each("end")
+    start, end = spans(holds)
     for row in reference.itertuples():
         overlap = np.minimum(end, row.i1) - np.maximum(start, row.i0)
         i = int(np.argmax(overlap))
         if overlap[i] > 0.5 * row.n:
             common += 1
-            step = (holds.mean[i] / scale - [row.ax, row.ay, row.az]) / [row.sx, row.sy, row.sz]
+            step = (holds.means[i] / scale - [row.ax, row.ay, row.az]) / [row.sx, row.sy, row.sz]
             worst = max(worst, np.abs(step).max())
     return worst, common
 
@@ -207,8 +209,8 @@ def test_xsens():
         unit="counts", scale=1 / 415,
     )  # fmt: skip
     holds = find_holds(log)
-    assert 38 <= len(holds) <= 42
-    assert holds.t1[0] - holds.t0[0] == pytest.approx(51, abs=0.5)
+    assert 38 <= len(holds.table) <= 42
+    assert holds.table["t1"].iloc[0] - holds.table["t0"].iloc[0] == pytest.approx(51, abs=0.5)
     reference = pd.read_csv(shared("imu_tk_xsens/derived_static_means.csv"))
     worst, common = near(holds, reference, 1 / 415)
     assert common == len(reference)
@@ -220,7 +222,7 @@ def test_mpu9150(i):
     columns = {"fx": 0, "fy": 1, "fz": 2}
     holds = find_holds(open_log(shared(f"mpu9150/imu{i}.log"), columns=columns, rate_hz=100))
     reference = pd.read_csv(shared(f"mpu9150/derived_static_means_imu{i}.csv"))
-    assert len(holds) == len(reference) == 23
+    assert len(holds.table) == len(reference) == 23
     worst, common = near(holds, reference)
     assert common == 23
     assert worst < 0.1
@@ -234,5 +236,6 @@ def test_holds_that_are_noisier_than_the_others(tmp_path, sigma, factor):
     for start, end in edges[[2, 5, 9]]:
         forces[start:end] += factor * sigma * rng.standard_normal((end - start, 3))
     holds = find_holds(opened(tmp_path, forces))
-    assert len(holds) == len(edges)
-    assert np.all((holds.of_each("start") >= edges[:, 0]) & (holds.of_each("end") <= edges[:, 1]))
+    assert len(holds.table) == len(edges)
+    start, end = spans(holds)
+    assert np.all((start >= edges[:, 0]) & (end <= edges[:, 1]))

@@ -16,8 +16,7 @@ from scipy.io import loadmat, savemat
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing import sources
-from accelstudy.campaign.importing.logs import find_joint_holds
-from accelstudy.campaign.importing.recording import Recording
+from accelstudy.campaign.importing.detection import find_holds
 from accelstudy.campaign.importing.settings import ImportSettings
 
 N = 50
@@ -27,7 +26,7 @@ TABLE = np.column_stack([TIME, FORCES])
 
 
 def everything(log):
-    return log.samples.time, log.samples.forces
+    return log.time, log.forces
 
 
 def lines(separator=",", decimal=".", before=()):
@@ -374,4 +373,4 @@ def test_whatever_the_text(tmp_path, rows, separator, timing, columns):
         time, forces = everything(log)
         assert len(time) == len(forces)
         assert np.isfinite(forces).all()
-        find_joint_holds([Recording([log])], ImportSettings(shortest_s=0.1, window_s=0.5))
+        find_holds([log], ImportSettings(shortest_s=0.1, window_s=0.5))

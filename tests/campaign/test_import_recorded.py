@@ -68,11 +68,11 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("name", ["one.bag", "two", "two/two.mcap"])
 def test_a_bag_has_forces_in_flu_and_temperatures(folder, name):
-    campaign, report = import_log(folder / name)
+    campaign, _ = import_log(folder / name)
     assert_found(campaign, TRUTH * FLU_TO_FRD)
     np.testing.assert_allclose(campaign.temperature, 20 + campaign.time / 10, atol=0.05)
     assert campaign.log.frame == "flu"
-    assert any("axes: flu" in note for note in report.notes)
+    assert any("axes: flu" in note for note in campaign.notes)
 
 
 def test_a_frame_that_is_given_is_that_of_the_bag(folder):
@@ -236,9 +236,9 @@ def test_dates_with_times_are_a_column_of_time(tmp_path, dates, kind):
     else:
         table.to_parquet(path, index=False)
     log = open_log(path)
-    times = log.samples.time
+    times = log.time
     np.testing.assert_allclose(times, TIME, atol=1e-9)
-    assert log.start == pytest.approx(EPOCH, abs=1e-3)
+    assert log.starts[0] == pytest.approx(EPOCH, abs=1e-3)
 
 
 def test_a_bad_date_and_a_unit_of_dates_are_refused_in_a_line(tmp_path):

@@ -8,9 +8,8 @@ from test_import_holds import find_holds, opened, write
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.blocks import segment_blocks
-from accelstudy.campaign.importing.recording import Recording
-from accelstudy.campaign.importing.resolution import (
+from accelstudy.campaign.importing.detection import find_blocks
+from accelstudy.campaign.importing.noise import (
     noise_before_rounding,
     rounding_of_mean,
     step_of,
@@ -45,10 +44,10 @@ def test_all_holds_of_coarse_readings_are_found_and_their_sigma_is_right(tmp_pat
     """The error of the means, known here, is within what their sigma says."""
     exact, read = log_in_steps(0.0, noise=0.0), log_in_steps(step, noise)
     holds = find_holds(opened(tmp_path, read))
-    assert len(holds) == 26
+    assert len(holds.table) == 26
     assert not holds.warnings or "does not change" not in "".join(holds.warnings)
-    np.testing.assert_allclose(holds.resolution, step, rtol=1e-5)
-    error = holds.mean - exact[truth()].mean(axis=1)
+    np.testing.assert_allclose(holds.windows.steps, step, rtol=1e-5)
+    error = holds.means - exact[truth()].mean(axis=1)
     # 78 errors: their rms is known to 8 %, the noise before rounding not much better.
     assert np.sqrt(np.mean(error**2)) == pytest.approx(holds.noise.sigma, rel=0.4)
 
@@ -121,7 +120,7 @@ def test_a_pile_at_the_extreme_that_the_steps_explain_is_no_saturation(tmp_path,
 
 def find_holds_of_blocks(folder, read, full_range=None):
     settings = ImportSettings(block=40, threshold_mps2=10.0, range_mps2=full_range)
-    return segment_blocks(Recording([opened(folder, read)]), settings)
+    return find_blocks(opened(folder, read), settings)
 
 
 def test_with_a_range_only_the_range_counts(tmp_path):

@@ -127,13 +127,15 @@ def test_an_absurd_reading_is_a_missing_one(tmp_path, value):
 
 def test_a_large_reading_costs_no_digits():
     """A reading of 900 g in a chunk of a sensor with noise of 1 µm/s²."""
-    from accelstudy.campaign.importing.windows import _spread
+    from accelstudy.campaign.importing.detection import window_variance
 
     rng = np.random.default_rng(2)
     forces = rng.normal(0, 1e-6, (60_000, 3)) + np.array([0, 0, G])
-    expected, _ = _spread(forces[-2000:], 101)
+    expected, _ = window_variance(forces[-2000:], 101)
     forces[100, 0] = 9000.0
-    np.testing.assert_allclose(_spread(forces, 101)[0][-len(expected) :], expected, rtol=1e-3)
+    np.testing.assert_allclose(
+        window_variance(forces, 101)[0][-len(expected) :], expected, rtol=1e-3
+    )
 
 
 def test_rows_without_a_number_are_gaps(tmp_path):

@@ -108,7 +108,7 @@ def test_how_firmly_the_blocks_were_held():
     assert f"an sd of {number(sd.min())} to {number(sd.max())} m/s²" in FLAT
     assert f"correlated by {number(correlated[order[-20:]].mean())}, in" in FLAT
     assert f"the 20 quietest by {number(correlated[order[:20]].mean())}" in FLAT
-    accuracy = import_log(path, import_settings("ck-explorer"))[1].accuracy
+    accuracy = import_log(path, import_settings("ck-explorer"))[1].noise.accuracy
     assert f"Allan deviation, {number(accuracy.ratio)} times" in FLAT
 
 

@@ -18,7 +18,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import words
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.header import COLUMNS
-from accelstudy.campaign.importing.holds import fit_sphere
+from accelstudy.campaign.importing.noise import fit_sphere
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.schemes import Scheme

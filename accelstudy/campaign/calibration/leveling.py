@@ -145,9 +145,10 @@ def readings_of(
                 f"give it by {OPTIONS[condition]}"
             )
     table = opened.table  # before its numbers, so that the file is read once
-    forces, time = opened.rows.forces, opened.rows.time
-    temperature = opened.rows.conditions.get("temperature")
-    time = None if time is None else start + time
+    rows = opened.rows
+    known = {name: rows[name].to_numpy() for name in ("time", *CONDITIONS) if name in rows}
+    forces, temperature = rows[[*AXES]].to_numpy(), known.get("temperature")
+    time = start + known["time"] if "time" in known else None
     course = None
     if time is not None and temperature is not None:
         course = course_of_log(time, temperature)
@@ -156,7 +157,7 @@ def readings_of(
     hold = HoldConditions(
         time=time,
         temperature=temperature,
-        vibration=opened.rows.conditions.get("vibration"),
+        vibration=known.get("vibration"),
         step_x=still,
         step_y=still,
         step_z=still,
@@ -430,10 +431,9 @@ def _beyond_ranges(
 
 def _reason(calibration: SensorCalibration, readings: Readings, row: int) -> str:
     """Say why a row is empty, and where it is."""
-    log, rows = readings.log, readings.log.rows
-    needed = {condition for _, condition in calibration.needs}
-    lost = [key for key, missing in rows.lost.items() if missing[row]]
-    lost += [k for k, values in rows.conditions.items() if k in needed and np.isnan(values[row])]
+    log = readings.log
+    needed = {*AXES, "time", *(condition for _, condition in calibration.needs)}
+    lost = [key for key in log.lacking(row) if key in needed]
     if lost:
         return log.describe(row, lost[0])
     where, _ = log.source.look_up(row, log.places["fx"])

@@ -14,7 +14,7 @@ from accelstudy.basics.units import GON, display_unit
 from accelstudy.basics.wording import estimate
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.importing.resolution import steps_text
+from accelstudy.campaign.importing.noise import steps_text
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE

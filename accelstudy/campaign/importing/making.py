@@ -1,10 +1,9 @@
-"""What every import makes: a campaign and a report."""
+"""From the holds of a log to a campaign, with all that a user should know of the import."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,19 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout, Place
-from accelstudy.campaign.importing.allan import MeanAccuracy
-from accelstudy.campaign.importing.holds import DetectedHolds
+from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.names import thermometers
-from accelstudy.campaign.importing.recording import AXES, Log, Recording
-from accelstudy.campaign.importing.resolution import steps_text
+from accelstudy.campaign.importing.noise import shown, steps_text
+from accelstudy.campaign.importing.recording import AXES, SDS, Log, Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.reference_log import ReferenceLog
 
 Array = NDArray[np.float64]
 
@@ -42,91 +43,40 @@ REMEDIES = Remedies(
 """What to do about forces that are not as large as gravity."""
 
 
-@dataclass(frozen=True)
-class ImportReport:
-    """The report of an import.
+def campaign_of_holds(
+    log: Recording, holds: Holds, beside: ReferenceLog | None = None
+) -> tuple[Campaign, Holds]:
+    """Make the campaign of the holds of one sensor.
 
-    Attributes
+    Its notes say how the log was read and what was found in it.
+
+    Parameters
     ----------
-    n_holds : int
-    accuracy : MeanAccuracy, of the mean of a typical hold; None from a table of means
-    sigma_white : float, m/s², sd of a mean if the noise were white; None if unknown
-    holds : DetectedHolds, None from a table of means
-    notes : tuple of str, assumptions of the import
-    warnings : tuple of str
+    log : Recording
+    holds : Holds
+    beside : ReferenceLog, optional, of a sensor on the same plate, whose angles the campaign gets
+
+    Returns
+    -------
+    campaign : Campaign
+    holds : Holds, without those that the reference does not cover
     """
-
-    n_holds: int
-    accuracy: MeanAccuracy | None
-    sigma_white: float | None
-    holds: DetectedHolds | None
-    notes: tuple[str, ...]
-    warnings: tuple[str, ...]
-
-    def lines(self) -> list[str]:
-        """Return the report as lines of text."""
-        if self.holds is None or self.accuracy is None:
-            sigma = "unknown" if self.sigma_white is None else shown(self.sigma_white)
-            return [f"{self.n_holds} positions; sigma of a mean: {sigma}", *self.notes]
-        holds, accuracy = self.holds, self.accuracy
-        lengths, edges = holds.n_samples * holds.step, holds.envelope.edges
-        mean = f"{accuracy.duration:.1f} s"
-        log = f"log: {edges[-1] - edges[0]:.1f} s at {1 / holds.step:.6g} per second"
-        found = f"holds: {len(holds)}, of {lengths.min():.1f} to {lengths.max():.1f} s"
-        if holds.size is not None:
-            counts = holds.n_samples
-            mean = f"{accuracy.duration / holds.step:.0f} samples"
-            each = mean if counts.min() == counts.max() else f"{counts.min()} to {counts.max()}"
-            log = f"log: {counts.sum()} samples"
-            found = f"blocks: {len(holds)}, of {each}, each a position"
-        lines = [
-            log,
-            *self.notes,
-            f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}",
-            found,
-        ]
-        if holds.left_out:
-            each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
-            kind = "hold" if holds.size is None else "block"
-            lines.append(f"left out: {counted(len(holds.left_out), kind)}: {each}")
-        lines.append(
-            f"sigma of a mean over {mean}: {shown(accuracy.allan)} (Allan), "
-            f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}"
-        )
-        if _rounds(holds):
-            lines.append(
-                f"quantisation: readings in steps of {steps_text(holds.resolution)}; rounding "
-                f"leaves {shown(holds.noise.rounding)} in a mean, however long the hold; together "
-                f"{shown(holds.noise.sigma)}"
-            )
-        return lines
-
-
-def _rounds(holds: DetectedHolds) -> bool:
-    """Whether rounding to the steps of the readings counts beside the noise of a mean."""
-    return holds.noise.rounding > COUNTS * holds.noise.accuracy.allan
-
-
-def shown(sigma: float) -> str:
-    """Standard deviation of a force, m/s², for people."""
-    return f"{1e3 * sigma:.3g} mm/s²"
-
-
-def campaign_of_holds(log: Recording, holds: DetectedHolds) -> tuple[Campaign, ImportReport]:
-    """Make the campaign of the holds of one sensor, and its report."""
     first, settings = log.first, log.first.layout
     assert isinstance(settings, ImportSettings)
-    warnings = [*holds.warnings, *_doubts(holds, settings.gravity.value_mps2)]
-    notes = [*_recognised(first)]
+    gravity = settings.gravity.value_mps2
+    if beside is not None:
+        holds, records = beside.average(log, holds, gravity)
+    left_out = dict(holds.left_out)
+    warnings = [*holds.warnings, *_doubts(holds, gravity)]
+    notes = [*_recognised(log)]
     if settings.frame != "frd":
         notes.append(
             f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
         )
-    forces = holds.mean
-    if settings.unit == "counts" and settings.offset is None:
-        settings, offset, note = _with_offset(settings, holds)
-        forces, holds = forces - offset, replace(holds, envelope=holds.envelope.less(offset))
-        notes += note
+    settings, offset = _with_offset(settings, holds)
+    if offset.any():
+        given = ", ".join(f"{x:.0f}" for x in settings.offset or ())
+        notes.append(f"offset: {given} counts, from the positions, as none was given")
     several = len(log.parts) > 1
     if several:
         of_each = "each as a whole one position"
@@ -138,45 +88,92 @@ def campaign_of_holds(log: Recording, holds: DetectedHolds) -> tuple[Campaign, I
         untold = "" if log.timed else "; the times of the files do not tell that of a position"
         notes.append(f"files: {len(log.parts)}, {of_each}{untold}")
         for i, part in enumerate(log.parts, 1):
-            if i not in holds.segments:
+            if i not in holds.parts:
                 warnings.append(f"{part.path}: no static hold; position {i} is missing")
-    warnings += [warning for part in log.parts for warning in part.warnings()]
+    warnings += log.warnings()
+    table, forces = holds.table, holds.means - offset
     columns: dict[str, Any] = {}
     if (holds.size is None or "time" in first.places) and (not several or log.timed):
-        columns["time"] = (holds.t0 + holds.t1) / 2
-    for name, values in holds.conditions.items():
-        if np.isfinite(values).all():
-            columns[name] = values
+        columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
+    for name in log.conditions:
+        if table[name].notna().all():
+            columns[name] = table[name].to_numpy()
         else:
-            hold = holds.number[np.argmin(np.isfinite(values))]
+            hold = table.index[table[name].isna()][0]
             warnings.append(f"hold {hold} has no {name}; the column is left out")
     warnings += far_from_gravity(settings, forces)
+    if beside is not None:
+        used = ~table.index.isin([*left_out])
+        of_reference, poles, note = beside.angles(log, forces, records, used, gravity)
+        columns |= of_reference
+        why = "the x axis of the reference is too near to the vertical for a roll"
+        warnings += [f"hold {n} left out: {why}" for n in table.index[poles]]
+        warnings += beside.unused(first)
+        left_out = {**dict.fromkeys(table.index[poles].tolist(), why), **left_out}
+        notes.append(note)
     campaign = imported_campaign(
         log.path,
         settings,
         forces,
-        positions=holds.number,
+        positions=table.index.to_numpy(),
         sigma_force=holds.noise.sigma,
         sigma_dof=float(round(holds.noise.dof)),
-        resolution=holds.resolution if _rounds(holds) else None,
-        n_samples=holds.n_samples,
-        sd=holds.of_each("sd"),
+        resolution=holds.windows.steps if _rounds(holds) else None,
+        n_samples=table["n"].to_numpy(),
+        sd=np.column_stack([table[name] for name in SDS]),
         log=_layout_of(settings, first),
+        notes=tuple(_lines(holds, notes)),
         warnings=tuple(warnings),
         **columns,
-    ).without(holds.left_out)
-    accuracy = holds.noise.accuracy
-    report = ImportReport(
-        len(holds), accuracy, float(accuracy.white), holds, tuple(notes), tuple(warnings)
     )
-    return campaign, report
+    return campaign.without(left_out), holds
 
 
-def _recognised(log: Log) -> Iterator[str]:
+def _lines(holds: Holds, notes: list[str]) -> Iterator[str]:
+    """What was found in a log, in lines; `notes` say how it was read."""
+    accuracy, noise, step = holds.noise.accuracy, holds.noise, holds.log.step
+    counts = holds.table["n"]
+    mean, lengths = f"{accuracy.duration:.1f} s", counts * step
+    time = holds.log.time[holds.windows.centred]
+    log = f"log: {time[-1] - time[0]:.1f} s at {1 / step:.6g} per second"
+    found = f"holds: {len(counts)}, of {lengths.min():.1f} to {lengths.max():.1f} s"
+    if holds.size is not None:
+        mean = f"{accuracy.duration / step:.0f} samples"
+        each = mean if counts.min() == counts.max() else f"{counts.min()} to {counts.max()}"
+        log = f"log: {counts.sum()} samples"
+        found = f"blocks: {len(counts)}, of {each}, each a position"
+    yield log
+    yield from notes
+    yield f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}"
+    yield found
+    if holds.left_out:
+        each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
+        kind = "hold" if holds.size is None else "block"
+        yield f"left out: {counted(len(holds.left_out), kind)}: {each}"
+    yield (
+        f"sigma of a mean over {mean}: {shown(accuracy.allan)} (Allan), "
+        f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}"
+    )
+    if _rounds(holds):
+        yield (
+            f"quantisation: readings in steps of {steps_text(holds.windows.steps)}; rounding "
+            f"leaves {shown(noise.rounding)} in a mean, however long the hold; together "
+            f"{shown(noise.sigma)}"
+        )
+
+
+def _rounds(holds: Holds) -> bool:
+    """Whether rounding to the steps of the readings counts beside the noise of a mean."""
+    return holds.noise.rounding > COUNTS * holds.noise.accuracy.allan
+
+
+def _recognised(recording: Recording) -> Iterator[str]:
     """How the columns of a log were taken."""
+    log = recording.first
     names = [name if log.source.named else f"column {name}" for name in log.source.names]
     used = {key: names[place] for key, place in log.places.items()}
-    taken = {*log.places.values(), *log.beside.values()}
+    sensors = (recording.parts, *recording.others)
+    taken = {place for logs in sensors for place in logs[0].places.values()}
     unused = [name for place, name in enumerate(names) if place not in taken]
     forces = ", ".join(used[axis] for axis in AXES)
     time = f"time from {used['time']}, " if "time" in used else ""
@@ -193,7 +190,7 @@ def _recognised(log: Log) -> Iterator[str]:
     yield from log.source.notes
 
 
-def _doubts(holds: DetectedHolds, gravity: float) -> Iterator[str]:
+def _doubts(holds: Holds, gravity: float) -> Iterator[str]:
     """What the user should know about the accuracy of the mean over a typical hold."""
     noise, accuracy = holds.noise, holds.noise.accuracy
     if not noise.directed:
@@ -210,35 +207,29 @@ def _doubts(holds: DetectedHolds, gravity: float) -> Iterator[str]:
     if accuracy.slope is not None:
         known, whole = f"{accuracy.tau:.2g} s", f"{accuracy.duration:.2g} s of a hold"
         if holds.size is not None:
-            known, whole = f"{accuracy.tau / holds.step:.0f} samples", f"{holds.size} of a block"
+            known = f"{accuracy.tau / holds.log.step:.0f} samples"
+            whole = f"{holds.size} of a block"
         yield (
             f"the Allan deviation is known up to {known}, and extrapolated from there to the "
             f"{whole} with slope {accuracy.slope:.2f}"
         )
 
 
-def _with_offset(
-    settings: ImportSettings, holds: DetectedHolds
-) -> tuple[ImportSettings, Array, list[str]]:
+def _with_offset(settings: ImportSettings, holds: Holds) -> tuple[ImportSettings, Array]:
     """Offset of counts, from the positions, unless it is zero apart from the sensor's bias.
 
     Returns
     -------
     settings : ImportSettings, with the offset
     offset : (3,) array, m/s², in forward, right, down; zero if the settings stay
-    notes : list of str
     """
-    noise, frame = holds.noise, settings.axes
-    if not (noise.directed and np.linalg.norm(noise.center) > holds.radius / 2):
-        return settings, np.zeros(3), []
+    center, wanted = holds.noise.center, settings.unit == "counts" and settings.offset is None
+    if not (wanted and holds.noise.directed and np.linalg.norm(center) > holds.radius / 2):
+        return settings, np.zeros(3)
     scale = conversion_of("counts", settings.scale).scale
-    offset = np.round(frame.from_frd(noise.center) / scale)
-    note = (
-        f"offset: {', '.join(f'{x:.0f}' for x in offset)} counts, from the positions, as none was "
-        "given"
-    )
+    offset = np.round(settings.axes.from_frd(center) / scale)
     settings = settings.model_copy(update={"offset": offset.tolist()})
-    return settings, frame.to_frd(offset * scale), [note]
+    return settings, settings.axes.to_frd(offset * scale)
 
 
 def imported_campaign(

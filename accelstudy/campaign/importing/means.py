@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
 from accelstudy.campaign.checks import OPPOSITE, better_angles
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.making import (
-    ImportReport,
-    far_from_gravity,
-    imported_campaign,
-)
-from accelstudy.campaign.importing.recording import Log, read_log
+from accelstudy.campaign.importing.making import far_from_gravity, imported_campaign
+from accelstudy.campaign.importing.noise import shown
+from accelstudy.campaign.importing.recording import SDS, Log, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
 
-Array = NDArray[np.float64]
-
-SDS = ("sd_fx", "sd_fy", "sd_fz")
 ANGLES = ("roll", "pitch")
 MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
 """Columns that a table of means may have, besides its forces and its time."""
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 
 
-def import_means(
-    path: LogFile, settings: ImportSettings | None = None
-) -> tuple[Campaign, ImportReport]:
+def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campaign:
     """Make a campaign of a table of means, one row for each position.
 
     Parameters
@@ -50,7 +41,6 @@ def import_means(
     Campaign
         It has a `sigma_force` if the table has numbers of samples and their standard deviations:
         that of white noise, since a table of means does not say more.
-    ImportReport
 
     Raises
     ------
@@ -61,69 +51,58 @@ def import_means(
     wanted = [*(["time"] if settings.time is not None else []), *MEANS]
     log = read_log(path, settings, conditions=wanted, untimed=True)
     settings, frame = cast(ImportSettings, log.layout), log.layout.axes
-    values, warnings = _values(log, settings)
-    forces, scale = log.rows.forces, abs(log.conversion.scale)
+    rows, warnings = _rows(log, settings)
+    forces = rows[["fx", "fy", "fz"]].to_numpy()
 
-    n_samples = None
-    if "n_samples" in values:
-        n_samples = np.round(values["n_samples"]).astype(int)
+    columns: dict[str, Any] = {}
+    if "n_samples" in rows:
+        columns["n_samples"] = n_samples = rows["n_samples"].round().to_numpy(dtype=int)
         if np.any(n_samples < 1):
             raise InputError(f"{path}: column n_samples: must be positive")
-    sd = None
-    if all(key in values for key in SDS):
-        sd = frame.rearranged(np.column_stack([values[key] for key in SDS]) * scale)
+    if {*SDS} <= {*rows}:
+        sd = frame.rearranged(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
+        columns["sd"] = sd
         if np.any(sd < 0):
             raise InputError(f"{path}: columns sd_fx, sd_fy, sd_fz: must not be negative")
-    sigma: float | None = None
-    if sd is not None and n_samples is not None and np.any(sd > 0):
-        sigma = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
-        warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
+        if "n_samples" in columns and np.any(sd > 0):
+            columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
+            warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
+    columns |= {k: rows[k].to_numpy() for k in ("time", "temperature", "vibration") if k in rows}
     warnings += far_from_gravity(settings, forces)
+    if settings.robot is not None:
+        given, signs = settings.robot.unit, frame.signs
+        unit = UNITS["rad"][given]
+        angles = np.column_stack([rows[key] for key in ANGLES]) * signs[:2]
+        columns |= {"angles": angles * unit, "sigma_angle": settings.robot.angle_sigma_mgon * MGON}
+        if "yaw" in rows:
+            columns["yaw"] = rows["yaw"].to_numpy() * unit * signs[2]
+    # Logs of the sensor have the unit and the axes of the table, but not its columns.
+    layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
+    sigma = columns.get("sigma_force")
+    said = f"sigma of a mean: {'unknown' if sigma is None else shown(sigma)}"
     campaign = imported_campaign(
         path,
         settings,
         forces,
-        sigma_force=sigma,
-        n_samples=n_samples,
-        sd=sd,
-        time=values.get("time"),
-        temperature=values.get("temperature"),
-        vibration=values.get("vibration"),
-        log=_layout(settings),
+        log=LogLayout.model_validate(layout),
+        notes=(f"{len(forces)} positions; {said}",),
         warnings=tuple(warnings),
+        **columns,
     )
-    if settings.robot is not None:
-        given, signs = settings.robot.unit, frame.signs
-        unit = UNITS["rad"][given]
-        angles = np.column_stack([values[key] for key in ANGLES]) * signs[:2]
-        if better := better_angles(angles, given, campaign.forces, campaign.gravity):
-            right = "another `frame`" if better == OPPOSITE else f"`robot_unit` {better}"
-            raise InputError(
-                f"{path}: the robot's angles do not fit the forces in {given}; {right} would be "
-                "right"
-            )
-        yaw = values.get("yaw")
-        campaign = replace(
-            campaign,
-            angles=angles * unit,
-            yaw=None if yaw is None else yaw * unit * signs[2],
-            sigma_angle=settings.robot.angle_sigma_mgon * MGON,
+    if settings.robot is not None and (
+        better := better_angles(angles, given, forces, campaign.gravity)
+    ):
+        right = "another `frame`" if better == OPPOSITE else f"`robot_unit` {better}"
+        raise InputError(
+            f"{path}: the robot's angles do not fit the forces in {given}; {right} would be right"
         )
-    return campaign, ImportReport(len(forces), None, sigma, None, (), tuple(warnings))
+    return campaign
 
 
-def _layout(settings: ImportSettings) -> LogLayout:
-    """Layout of logs of the same sensor: unit and axes of the table, but not its columns."""
-    return LogLayout.model_validate(
-        settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
-    )
-
-
-def _values(log: Log, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
-    """Columns besides the forces by their keys, and warnings about columns that are not used."""
+def _rows(log: Log, settings: ImportSettings) -> tuple[pd.DataFrame, list[str]]:
+    """Rows without the columns that are not used, and warnings about these."""
     rows, warnings = log.rows, []
-    values = dict(rows.conditions)
-    angles = [key for key in (*ANGLES, "yaw") if key in values]
+    angles = [key for key in (*ANGLES, "yaw") if key in rows]
     if settings.robot is not None:
         for missing in (key for key in ANGLES if key not in angles):
             raise InputError(
@@ -139,13 +118,12 @@ def _values(log: Log, settings: ImportSettings) -> tuple[dict[str, Array], list[
         warnings.append(
             f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"
         )
-        values = {key: column for key, column in values.items() if key not in angles}
-    if not len(rows.forces):
+        rows = rows.drop(columns=angles)
+    if not len(rows):
         raise InputError(f"{log.path}: no row of numbers")
-    for key, bad in {**rows.lost, **{k: np.isnan(v) for k, v in values.items()}}.items():
-        if bad.any():
-            what = log.describe(int(np.argmax(bad)), key)
-            raise InputError(f"{log.path}: {what}, not a usable number")
-    if "time" in log.places and rows.time is not None:
-        values["time"] = rows.time + (rows.start if abs(rows.start) < _YEARS else 0.0)
-    return values, warnings
+    for row in np.flatnonzero(rows.isna().any(axis=1)):
+        key = next(key for key in log.lacking(int(row)) if key in rows)
+        raise InputError(f"{log.path}: {log.describe(int(row), key)}, not a usable number")
+    if "time" in log.places and abs(log.start) < _YEARS:
+        rows = rows.assign(time=rows["time"] + log.start)
+    return rows, warnings

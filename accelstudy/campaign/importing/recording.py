@@ -1,31 +1,28 @@
-"""Raw accelerometer logs.
+"""Raw accelerometer logs: a table as it is in its file, and what its columns are in SI.
 
 A log is text (comma, semicolon, tab or blanks between numbers, with or without header and comment
-lines), a MATLAB file or a Parquet file. It gives times in s since its first sample, and specific
-forces in m/s². An error is one line with its place in the file.
+lines), a MATLAB file, a Parquet file or a recording of a robot. It gives times in s since its first
+sample, and specific forces in m/s². An error is one line with its place in the file.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
 from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.header import LogLayout, Place
-from accelstudy.campaign.importing.names import (
-    places_by_name,
-    unit_in,
-    without_unit,
-)
+from accelstudy.campaign.importing.names import places_by_name, unit_in, without_unit
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.files.reading import overlay
@@ -37,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AXES = ("fx", "fy", "fz")
-
+SDS = ("sd_fx", "sd_fy", "sd_fz")
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
 ABSURD = 1e4
@@ -61,23 +58,7 @@ _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
 
-class Samples(NamedTuple):
-    """Samples of a log, n of them, in their order; rows without a usable reading are left out.
-
-    Attributes
-    ----------
-    time : (n,) array, s
-    forces : (n, 3) array, m/s², in forward, right, down
-    conditions : (n, c) array, °C or m/s², NaN where nothing is known
-    row : (n,) int array, row of the table that each sample comes from
-    recording : (n,) int array, which of several recordings it belongs to
-    """
-
-    time: Array
-    forces: Array
-    conditions: Array
-    row: NDArray[np.int_]
-    recording: NDArray[np.int_]
+# --- Which column is which -----------------------------------------------------------------------
 
 
 def read_log(
@@ -115,11 +96,10 @@ def read_log(
     kind = LogLayout if layout is None else type(layout)
     chosen = _laid_over(like, given, kind)
     source = open_source(path, chosen.variable, chosen.delimiter)
-    if like is None or like.columns.get("fx") not in source.names:
-        own = {**told_by_names(source, chosen.columns, chosen.time)}
-        if "rate_hz" in given:
-            own.pop("time", None)
-        chosen = _laid_over(like, overlay(own, given), kind)
+    told: dict[str, Any] = {}
+    if another := like is None or like.columns.get("fx") not in source.names:
+        told = {k: v for k, v in source.layout.items() if k != "time" or "rate_hz" not in given}
+        chosen = _laid_over(like, overlay(told, given), kind)
     try:
         places = _places(source, chosen, given, conditions, untimed)
     except InputError as error:
@@ -129,13 +109,11 @@ def read_log(
             f"{error}; the columns are those of the log of the campaign, `columns` and `time` "
             "change them"
         ) from None
-    return Log(
-        source,
-        chosen,
-        places,
-        time_factor_of(source, places, chosen.time_unit),
-        conversion_of(chosen.unit, chosen.scale, chosen.offset),
-    )
+    if another:
+        told = {**_units(source, places), **told}
+        chosen = _laid_over(like, overlay(told, given), kind)
+    conversion = conversion_of(chosen.unit, chosen.scale, chosen.offset)
+    return Log(source, chosen, places, _time_factor(source, places, chosen), conversion)
 
 
 def _laid_over(
@@ -164,20 +142,31 @@ def _places(
     untimed: bool,
 ) -> dict[str, int]:
     """Places of the columns of a log; those of another log of the sensor may be missing."""
-    columns = dict(layout.columns)
-    for key in columns:
-        if key not in (known := dict.fromkeys((*AXES, *CONDITIONS, *conditions))):
+    known = dict.fromkeys((*AXES, *CONDITIONS, *conditions))
+    for key in layout.columns:
+        if key not in known:
             raise UnknownNameError("column", key, [each for each in known if each != "time"])
-    places = locate(source, {k: v for k, v in columns.items() if k in AXES}, AXES)
-    if layout.time is not None:
-        columns["time"] = layout.time
+    columns = layout.columns | ({} if layout.time is None else {"time": layout.time})
+    found = ((key, place_of(source, key, columns.get(key))) for key in AXES)
+    places = {key: place for key, place in found if place is not None}
+    if not places and len(source.names) == 3:
+        places = dict(zip(AXES, range(3), strict=True))
+    for key in (key for key in AXES if key not in places):
+        if _has_two_axes(source):
+            raise InputError(
+                f"{source.path}: two axes, as of an inclinometer, cannot be calibrated: the length "
+                "of the force is compared with gravity, and that takes all three axes"
+            )
+        raise _not_found(source, key)
+    _check_different(source, places)
     for key in conditions:
         if key == "time" and layout.rate_hz is not None:
             continue
-        wanted = {key: columns[key]} if key in columns else {}
         needed = key == "time" and not untimed
         try:
-            place = locate(source, wanted, (key,), needed)
+            place = place_of(source, key, columns.get(key))
+            if place is None and needed:
+                raise _not_found(source, key)
         except InputError as error:
             if key in given.keys() | given.get("columns", {}).keys():
                 raise
@@ -187,53 +176,64 @@ def _places(
                     "log without the moves between positions, the samples of each (`block`)"
                 ) from None
             continue
-        if key in ("time", *wanted) or not {*place.values()} & {*places.values()}:
-            places |= place
-    if len({*places.values()}) < len(places):
-        raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
-    return places | nanoseconds_beside(source, places)
+        if place is not None and (key in columns or key == "time" or place not in places.values()):
+            places[key] = place
+    _check_different(source, places)
+    if "time" in places and (rest := _nanoseconds(source, places["time"])) is not None:
+        places["nanoseconds"] = rest
+    return places
 
 
-def locate(
-    source: Source, given: Mapping[str, Place], wanted: Sequence[str], needed: bool = True
-) -> dict[str, int]:
-    """Places of the wanted columns: as given, by their usual names, or the only three columns.
+def place_of(source: Source, key: str, column: Place | None = None) -> int | None:
+    """Place of the column of a key: as given, or by its usual names; None if no name tells it.
+
+    Digits are a place, unless a column has them as its name.
 
     Raises
     ------
     InputError
-        If a column does not exist, is named twice, or (where `needed`) cannot be found.
+        If the column that is given does not exist, or has dates instead of numbers.
     """
-    for key in given:
-        if key not in wanted:
-            raise UnknownNameError("column", key, wanted)
-    places = {key: _place(source, key, column) for key, column in given.items()}
-    for key in wanted:
-        matches = places_by_name(source.names, key) or (
-            [*source.dates] if key == "time" else []  # whatever its name
-        )
-        if len(matches) == 1:
-            places.setdefault(key, matches[0])
-    if not places and tuple(wanted[:3]) == AXES and len(source.names) == 3:
-        places = dict(zip(AXES, range(3), strict=True))
-    for key, place in places.items():
-        if place in source.dates and key != "time":
-            name = source.names[place]
-            raise InputError(f"{source.path}: column {name} is timestamps, not numbers ({key})")
-    missing = [key for key in wanted if key not in places]
-    if needed and set(missing) & set(AXES) and _has_two_axes(source):
-        raise InputError(
-            f"{source.path}: two axes, as of an inclinometer, cannot be calibrated: the length of "
-            "the force is compared with gravity, and that takes all three axes"
-        )
-    if needed and missing:
-        raise InputError(
-            f"{source.path}: which column is {missing[0]}? "
-            f"The columns are {short_list(source.names)}, counted from 0"
-        )
-    if len(set(places.values())) < len(places):
+    names = source.names
+    if column is None:
+        found = places_by_name(names, key) or ([*source.dates] if key == "time" else [])
+    elif source.named and isinstance(column, str) and column in names:
+        if names.count(column) > 1:
+            raise InputError(f"{source.path}: {key}: there are several columns {column!r}")
+        found = [names.index(column)]
+    else:
+        # A unit in brackets belongs to the column, and may be in one of the names only.
+        plain = without_unit(str(column))
+        found = [i for i, name in enumerate(names) if without_unit(name) == plain]
+        if not (source.named and isinstance(column, str) and len(found) == 1):
+            if not re.fullmatch(r"[0-9]{1,9}", str(column)):
+                raise InputError(
+                    f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}"
+                )
+            if int(column) >= len(names):
+                raise InputError(
+                    f"{source.path}: {key}: no column {column}; there are {len(names)}, counted "
+                    "from 0"
+                )
+            found = [int(column)]
+    if len(found) != 1:
+        return None
+    if found[0] in source.dates and key != "time":
+        name = names[found[0]]
+        raise InputError(f"{source.path}: column {name} is timestamps, not numbers ({key})")
+    return found[0]
+
+
+def _not_found(source: Source, key: str) -> InputError:
+    return InputError(
+        f"{source.path}: which column is {key}? "
+        f"The columns are {short_list(source.names)}, counted from 0"
+    )
+
+
+def _check_different(source: Source, places: Mapping[str, int]) -> None:
+    if len({*places.values()}) < len(places):
         raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
-    return places
 
 
 def _has_two_axes(source: Source) -> bool:
@@ -244,37 +244,26 @@ def _has_two_axes(source: Source) -> bool:
     return sum(not _TIME_OR_CONDITION.fullmatch(name) for name in names) == 2
 
 
-def nanoseconds_beside(source: Source, places: Mapping[str, int]) -> dict[str, int]:
+def _nanoseconds(source: Source, time: int) -> int | None:
     """Column of the ns that belong to a time in whole seconds: "stamp.nsecs" to "stamp.secs"."""
-    if "time" not in places:
-        return {}
-    seconds = source.names[places["time"]]
     parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(source.names))
-    found = [i for i, part in parts if part and part[1] + part[3] == seconds]
-    return {"nanoseconds": found[0]} if len(found) == 1 else {}
+    found = [i for i, part in parts if part and part[1] + part[3] == source.names[time]]
+    return found[0] if len(found) == 1 else None
 
 
-def told_by_names(
-    source: Source, columns: Mapping[str, Place], time: Place | None
-) -> Mapping[str, Any]:
-    """Keys of `LogLayout` that the names of the columns tell: the units of forces and of time."""
-    own: dict[str, Any] = dict(source.layout)
-    forces = {key: column for key, column in columns.items() if key in AXES}
-    try:
-        axes = locate(source, {**forces, **own.get("columns", {})}, AXES, needed=False)
-        clock = locate(source, {} if time is None else {"time": time}, ("time",), needed=False)
-    except InputError:  # who opens the log says it
-        return own
-    units = {unit_in(source.names[axes[axis]], axis) for axis in AXES if axis in axes}
-    if len(units) == 1 and units & set(SENSOR_UNITS):
-        own.setdefault("unit", units.pop())
-    dated = clock.get("time") in source.dates or nanoseconds_beside(source, clock)
-    if clock and not dated and (unit := unit_in(source.names[clock["time"]], "time")):
-        own.setdefault("time_unit", unit)
-    return own
+def _units(source: Source, places: Mapping[str, int]) -> dict[str, str]:
+    """Units of the forces and of the time, as far as the names of their columns tell them."""
+    units: dict[str, str] = {}
+    of_axes = {unit_in(source.names[places[axis]], axis) for axis in AXES}
+    if len(of_axes) == 1 and (unit := of_axes.pop()) in SENSOR_UNITS:
+        units["unit"] = unit
+    dated = "nanoseconds" in places or places.get("time") in source.dates
+    if "time" in places and not dated and (unit := unit_in(source.names[places["time"]], "time")):
+        units["time_unit"] = unit
+    return units
 
 
-def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) -> float:
+def _time_factor(source: Source, places: Mapping[str, int], layout: LogLayout) -> float:
     """Seconds per unit of the column of time.
 
     Raises
@@ -283,69 +272,13 @@ def time_factor_of(source: Source, places: Mapping[str, int], time_unit: str) ->
         If a column of dates, or of seconds beside ns, gets a unit.
     """
     dated = places.get("time") in source.dates
-    known = dated or "nanoseconds" in nanoseconds_beside(source, places)
-    if "time" in places and time_unit != "s" and known:
+    if "time" in places and layout.time_unit != "s" and (dated or "nanoseconds" in places):
         name = source.names[places["time"]]
         raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
-    return 1e-9 if dated else UNITS["s"][time_unit]
+    return 1e-9 if dated else UNITS["s"][layout.time_unit]
 
 
-def _place(source: Source, key: str, column: Place) -> int:
-    """Place of a column; digits are a place, unless a column has them as its name."""
-    names = source.names
-    if source.named and isinstance(column, str) and column in names:
-        if names.count(column) > 1:
-            raise InputError(f"{source.path}: {key}: there are several columns {column!r}")
-        return names.index(column)
-    # A unit in brackets belongs to the column, and may be in one of the names only.
-    plain = [i for i, name in enumerate(names) if without_unit(name) == without_unit(str(column))]
-    if source.named and isinstance(column, str) and len(plain) == 1:
-        return plain[0]
-    if isinstance(column, str) and re.fullmatch(r"[0-9]{1,9}", column):
-        column = int(column)
-    if isinstance(column, int):
-        if 0 <= column < len(names):
-            return column
-        raise InputError(
-            f"{source.path}: {key}: no column {column}; there are {len(names)}, counted from 0"
-        )
-    raise InputError(f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}")
-
-
-def absurd(raw: Array, forces: Array, limit: float) -> NDArray[np.bool_]:
-    """Which readings are none that a sensor gives; raw and in m/s², `limit` as below."""
-    return (np.abs(forces) > limit) | np.isin(raw, SENTINELS)
-
-
-def absurd_from(raw: Array, conversion: Conversion) -> float:
-    """Size, m/s², from which on a reading is absurd: `ABSURD`, and a thousand times the usual one.
-
-    The latter since the unit, which may be wrong, is checked by the means of the holds. `raw` are
-    the readings of a log, (n, 3).
-    """
-    raw = raw[:TYPICAL]
-    raw = raw[(np.abs(raw) <= LARGEST).all(axis=1) & ~np.isin(raw, SENTINELS).any(axis=1)]
-    usual = np.median(np.linalg.norm(conversion.to_si(raw), axis=1)) if len(raw) else 0.0
-    return max(ABSURD, 1000 * float(usual))
-
-
-class Rows(NamedTuple):
-    """All rows of a log, n of them; what is no number, or absurd, is NaN.
-
-    Attributes
-    ----------
-    time : (n,) array, s since the first row that has one; None where nothing tells it
-    forces : (n, 3) array, m/s², in forward, right, down
-    conditions : mapping of `CONDITIONS`, as far as the log has them, to (n,) arrays, °C or m/s²
-    lost : mapping of "time", "fx", … to (n,) bool arrays, where a reading is missing or absurd
-    start : float, s, where the times begin in the file; NaN without a column of time
-    """
-
-    time: Array | None
-    forces: Array
-    conditions: dict[str, Array]
-    lost: dict[str, NDArray[np.bool_]]
-    start: float
+# --- Its numbers ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -360,9 +293,6 @@ class Log:
         in whole seconds) and `CONDITIONS` to columns
     time_factor : float, s per unit of the column of time, of whose dates these are ns
     conversion : Conversion, of forces to m/s², in the axes of the log
-    lively : bool, whether each channel must change; in a single position, one of a coarse sensor
-        may be constant
-    beside : mapping of names to columns of other sensors, which lose the same rows
     """
 
     source: Source
@@ -370,8 +300,6 @@ class Log:
     places: Mapping[str, int]
     time_factor: float
     conversion: Conversion
-    lively: bool = True
-    beside: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def path(self) -> Path:
@@ -391,150 +319,82 @@ class Log:
         names = unique_names(self.source)
         return pa.table(self.source.columns(range(len(names))), names=names)
 
-    @cached_property
-    def rows(self) -> Rows:
-        """All rows; of those of `table`, if that was asked for before."""
-        columns = {**self.places, **self.beside}
-        places = [*columns.values()]
-        cells = [self.table.column(p) for p in places] if "table" in vars(self) else None
-        values = dict(zip(columns, self.source.numbers(places, cells), strict=True))
-        count, start, time = len(values["fx"]), np.nan, None
-        if "time" in self.places:
-            values["time"], start = counted_from_first(values["time"])
-        lost = {key: ~(np.abs(column) <= LARGEST) for key, column in values.items()}
-        if "time" in self.places:
-            time = values.pop("time") * self.time_factor + 1e-9 * values.pop("nanoseconds", 0)
-            if "nanoseconds" in lost:
-                lost["time"] |= lost.pop("nanoseconds")
-            known = np.flatnonzero(~lost["time"])
-            first = time[known[0]] if len(known) else 0.0
-            time, start = time - first, start * self.time_factor + first
-        elif self.layout.rate_hz is not None:
-            time = np.arange(count) / self.layout.rate_hz
-        conversion, frame = self.conversion, self.layout.axes
-        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
-        limit = absurd_from(usual, conversion)
-        # Each axis in one piece, as sums along it are faster.
-        forces = np.empty((3, count))
-        to = np.argsort(frame.order)
-        for i, key in enumerate((*AXES, *self.beside)):
-            reading = values.pop(key)
-            converted = conversion.of_axis(i % 3).to_si(reading)
-            lost[key] |= absurd(reading, converted, limit)
-            if key in AXES:
-                forces[to[i]] = np.where(lost[key], np.nan, frame.signs[to[i]] * converted)
-        conditions = {k: np.where(lost.pop(k), np.nan, values[k]) for k in self.conditions}
-        return Rows(time, forces.T, conditions, lost, start)
+    @property
+    def rows(self) -> pd.DataFrame:
+        """All rows in SI; what is no number, or absurd, is NaN.
 
-    @cached_property
-    def samples(self) -> Samples:
-        """Samples from the beginning to the end; times count from the first one.
-
-        Raises
-        ------
-        InputError
-            If time does not increase, a channel is constant, the log is empty, or many rows lack a
-            reading.
+        Columns are time, s since the first row that has one, if anything tells it; fx, fy, fz,
+        m/s², in forward, right, down; and the conditions, °C or m/s². The rows are those of
+        `table`, if that was asked for before.
         """
-        time, forces, known, lost, _ = self.rows
-        if time is None:
-            time = np.arange(float(len(forces)))
-        row = np.flatnonzero(~np.any([*lost.values()], axis=0))
-        conditions = np.array([*known.values()]).reshape(len(known), len(forces))
-        if len(row) < len(forces):
-            time, forces, conditions = time[row], forces.T[:, row].T, conditions[:, row]
-        if "time" in self.places and len(row):
-            time = time - time[0]
-        samples = Samples(time, forces, conditions.T, row, np.zeros(len(row), dtype=int))
-        self._check(samples)
-        return samples
-
-    @cached_property
-    def step(self) -> float:
-        """Usual time between two samples, s: the mean, without gaps.
-
-        Steps may jitter or be multiples of a clock's tick. So the median may be far from the mean,
-        and only the mean fits the number of samples.
-        """
-        if "time" not in self.places:
-            return 1.0 / (self.layout.rate_hz or 1.0)
-        if len(self.samples.time) < 2:
-            raise InputError(f"{self.path}: too few samples")
-        return usual_step(np.diff(self.samples.time))
+        return self._numbers[0]
 
     @property
     def start(self) -> float:
-        """Time of the first sample as written in the file, s; NaN without a column of time."""
-        time = self.rows.time
-        return self.rows.start + (0.0 if time is None else float(time[self.samples.row[0]]))
+        """Where the times of `rows` begin in the file, s; NaN without a column of time."""
+        return self._numbers[1]
 
-    def likely_unit(self) -> str:
-        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
-        if "time" not in self.places:
-            return ""
-        step = self.step / self.time_factor
-        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
-        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
-        if UNITS["s"][unit] == self.time_factor:
-            return ""
-        return (
-            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
-            f"`time_unit` {unit}"
-        )
+    @cached_property
+    def _numbers(self) -> tuple[pd.DataFrame, float]:
+        places = [*self.places.values()]
+        cells = [self.table.column(p) for p in places] if "table" in vars(self) else None
+        values = dict(zip(self.places, self.source.numbers(places, cells), strict=True))
+        columns, start = {}, np.nan
+        if "time" in values:
+            time, start = counted_from_first(values["time"])
+            time = np.where(_usable(time), time * self.time_factor, np.nan)
+            if "nanoseconds" in values:
+                rest = values["nanoseconds"]
+                time += np.where(_usable(rest), 1e-9 * rest, np.nan)
+            first = next(iter(time[np.isfinite(time)]), 0.0)
+            columns["time"], start = time - first, start * self.time_factor + first
+        elif self.layout.rate_hz is not None:
+            columns["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
+        frame, conversion = self.layout.axes, self.conversion
+        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
+        limit = max(ABSURD, absurd_from(usual, conversion))
+        for axis, sign, i in zip(AXES, frame.signs, frame.order, strict=True):
+            raw = values[AXES[i]]
+            force = conversion.of_axis(i).to_si(raw)
+            absurd = ~_usable(raw) | (np.abs(force) > limit) | np.isin(raw, SENTINELS)
+            columns[axis] = np.where(absurd, np.nan, sign * force)
+        for key in self.conditions:
+            columns[key] = np.where(_usable(values[key]), values[key], np.nan)
+        return pd.DataFrame(columns, copy=False), start
 
-    def _check(self, samples: Samples) -> None:
-        rows, frame = len(self.rows.forces), self.layout.axes
-        backward = np.diff(samples.time) <= 0
-        if "time" in self.places and backward.any():
-            row = int(samples.row[1 + np.argmax(backward)])
-            where, cell = self.source.look_up(row, self.places["time"])
-            raise InputError(
-                f"{self.path}: {where}, column {self.source.names[self.places['time']]} (time): "
-                f"time does not increase ({cell}); give the rate if it does not count"
-            )
-        count = rows - len(samples.row)
-        if count > MANY * rows:
-            key = self._lost_in(first := int(self._unusable[0]))
-            hint = "; give the rate (`rate`) instead" if key == "time" else ""
-            raise InputError(
-                f"{self.path}: {self.describe(first, key)}, not a usable number{hint}; "
-                f"{count} of {counted(rows, 'row')} lack one, which are too many"
-            )
-        if rows < 2:
-            raise InputError(f"{self.path}: too few samples ({rows})")
-        constant = (samples.forces == samples.forces[:1]).all(axis=0)[np.argsort(frame.order)]
-        if self.lively and constant.any():
-            axis = AXES[int(np.argmax(constant))]
-            name = self.source.names[self.places[axis]]
-            raise InputError(f"{self.path}: column {name} ({axis}) is constant")
+    @cached_property
+    def lost(self) -> NDArray[np.bool_]:
+        """Which rows lack a force, or the time that they should have, (n,)."""
+        needed = [*AXES, *(("time",) if "time" in self.places else ())]
+        return np.any([np.isnan(self.rows[key].to_numpy()) for key in needed], axis=0)
 
-    def warnings(self) -> list[str]:
-        """What could not be read."""
-        unusable = self._unusable
-        if not len(unusable):
-            return [*self.source.warnings]
-        named = [int(row) for row in unusable[:NAMED]]
-        each = "; ".join(self.describe(row, self._lost_in(row)) for row in named)
-        more = "; …" if len(unusable) > len(named) else ""
-        return [
-            *self.source.warnings,
-            f"{len(unusable)} of {counted(len(self.rows.forces), 'row')} left out, as a reading is "
-            f"missing or absurd: {each}{more}",
-        ]
-
-    @property
-    def _unusable(self) -> NDArray[np.int_]:
-        return np.flatnonzero(np.any([*self.rows.lost.values()], axis=0))
-
-    def _lost_in(self, row: int) -> str:
-        """What is missing in an unusable row."""
-        return next(key for key, lost in self.rows.lost.items() if lost[row])
+    def lacking(self, row: int) -> list[str]:
+        """Keys of the readings that a row lacks; axes are those of the log."""
+        missing = self.rows.iloc[row].isna()
+        of_frame = dict(zip(self.layout.axes.order, AXES, strict=True))
+        named = {key: of_frame[i] for i, key in enumerate(AXES)}
+        return [key for key in self.places if missing.get(named.get(key, key))]
 
     def describe(self, row: int, key: str) -> str:
         """Say what stands in a row for "time", "fx", …; this reads the file again to find it."""
-        place = {**self.places, **self.beside}[key]
+        place = self.places[key]
         where, cell = self.source.look_up(row, place)
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
+
+
+def _usable(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which numbers can be calculated with."""
+    return np.asarray(np.abs(values) <= LARGEST)
+
+
+def absurd_from(raw: Array, conversion: Conversion) -> float:
+    """Size, m/s², a thousand times the usual one, from which on a reading is absurd.
+
+    The unit may be wrong: it is checked by the means of the holds. `raw` are the first readings of
+    a log, (n, 3).
+    """
+    raw = raw[_usable(raw).all(axis=1) & ~np.isin(raw, SENTINELS).any(axis=1)]
+    return 1000 * float(np.median(np.linalg.norm(conversion.to_si(raw), axis=1))) if len(raw) else 0
 
 
 def unique_names(source: Source) -> list[str]:
@@ -545,36 +405,106 @@ def unique_names(source: Source) -> list[str]:
     return [f"{name}.{n}" if n else name for name, n in zip(source.names, before, strict=True)]
 
 
-@dataclass(frozen=True)
 class Recording:
     """The logs of one sensor, often only one, in their order.
 
+    Parameters
+    ----------
+    parts : sequence of Log
+    others : sequence of sequences of Log, of the sensors in the same files; a row that lacks a
+        reading of one sensor is no row of any
+
     Attributes
     ----------
-    parts : tuple of Log
+    parts, others
+    first : Log, which has the layout of all
+    path : Path, first of the files
+    conditions : tuple of str, those of `CONDITIONS` that all parts have
+    step : float, s, usual time between two samples: the mean, without gaps. Steps may jitter or be
+        multiples of a clock's tick. So the median may be far from the mean, and only the mean fits
+        the number of samples
+    starts : (k,) array, s, time of the first sample of each part as written in its file; NaN
+        without any
+    timed : bool, whether the times of the parts count from one zero, so that they follow each other
+    samples : DataFrame, of all parts, of rows that lack no reading. Its columns are those of
+        `Log.rows`, with the time since the first sample, and part, the number of the part from 0;
+        its index is the row of the part. If the times of the parts do not tell, each begins where
+        the last one ends
+    time : (n,) array, s
+    forces : (n, 3) array, m/s², in forward, right, down; each axis in one piece
+
+    Raises
+    ------
+    InputError
+        If time does not increase, a channel is constant, a log is empty, or many rows lack a
+        reading.
     """
 
-    parts: Sequence[Log]
+    def __init__(self, parts: Sequence[Log], others: Sequence[Sequence[Log]] = ()) -> None:
+        self.parts, self.others, self.first = parts, others, parts[0]
+        self.path = self.first.path
+        self.conditions = tuple(k for k in CONDITIONS if all(k in log.places for log in parts))
+        sensors = [parts, *others]
+        self._lost = [
+            np.any([log.lost for log in logs], axis=0) for logs in zip(*sensors, strict=True)
+        ]
+        each = [self._samples_of(i) for i in range(len(parts))]
+        self.step = self._usual_step(each)
+        firsts = [samples["time"].iloc[0] for samples in each]
+        self.starts = np.array([part.start for part in parts]) + firsts
+        self.timed = bool(np.all(np.diff(self.starts) > 0))
+        end, whole = 0.0, []
+        for i, (part, samples) in enumerate(zip(parts, each, strict=True)):
+            time = samples["time"] - (firsts[i] if "time" in part.places else 0.0)
+            start = self.starts[i] - self.starts[0] if i and self.timed else end
+            if i and start < end - self.step / 2:  # a clock rounds
+                raise InputError(f"{part.path}: begins before the recording before it ends")
+            whole.append(samples[[*AXES, *self.conditions]].assign(time=time + start, part=i))
+            end = whole[-1]["time"].iloc[-1] + self.step
+        self.samples = whole[0] if len(whole) == 1 else pd.concat(whole)
+        self.time = self.samples["time"].to_numpy()
+        self.forces = np.array([self.samples[axis] for axis in AXES]).T
 
-    @property
-    def first(self) -> Log:
-        """The first of the logs, which has the layout of all."""
-        return self.parts[0]
+    def _samples_of(self, i: int) -> pd.DataFrame:
+        """Rows of a part that lack nothing, with their times in the part; they are checked."""
+        part, lost = self.parts[i], self._lost[i]
+        rows, place = part.rows, part.places.get("time")
+        if "time" not in rows:
+            rows = rows.assign(time=np.arange(float(len(rows))))
+        samples = rows[~lost] if lost.any() else rows
+        backward = np.diff(samples["time"]) <= 0
+        if place is not None and backward.any():
+            row = samples.index[1 + int(np.argmax(backward))]
+            where, cell = part.source.look_up(row, place)
+            raise InputError(
+                f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
+                f"increase ({cell}); give the rate if it does not count"
+            )
+        if lost.sum() > MANY * len(rows):
+            said, key = self._describe(i, int(np.argmax(lost)))
+            hint = "; give the rate (`rate`) instead" if key == "time" else ""
+            raise InputError(
+                f"{part.path}: {said}, not a usable number{hint}; {lost.sum()} of "
+                f"{counted(len(rows), 'row')} lack one, which are too many"
+            )
+        if len(rows) < 2 or (place is not None and len(samples) < 2):
+            raise InputError(f"{part.path}: too few samples ({len(samples)})")
+        # In a single position, a channel of a coarse sensor may be constant.
+        constant = [bool((samples[axis] == samples[axis].iloc[0]).all()) for axis in AXES]
+        if len(self.parts) == 1 and any(constant):
+            place = min(part.layout.axes.order[np.array(constant)])
+            name = part.source.names[part.places[AXES[place]]]
+            raise InputError(f"{part.path}: column {name} ({AXES[place]}) is constant")
+        return samples
 
-    @property
-    def path(self) -> Path:
-        """First of the files."""
-        return self.first.path
-
-    @property
-    def conditions(self) -> tuple[str, ...]:
-        """Conditions that all parts have."""
-        return tuple(k for k in CONDITIONS if all(k in part.places for part in self.parts))
-
-    @cached_property
-    def step(self) -> float:
-        """Usual time between two samples, s."""
-        steps = [part.step for part in self.parts]
+    def _usual_step(self, parts: Sequence[pd.DataFrame]) -> float:
+        """Usual time between two samples, s, which is that of all parts."""
+        steps = [
+            usual_step(np.diff(samples["time"]))
+            if "time" in part.places
+            else 1.0 / (part.layout.rate_hz or 1.0)
+            for part, samples in zip(self.parts, parts, strict=True)
+        ]
         odd = [i for i, step in enumerate(steps) if not 0.9 < step / steps[0] < 1.1]
         if odd:
             raise InputError(
@@ -583,36 +513,40 @@ class Recording:
             )
         return float(np.mean(steps))
 
-    @cached_property
-    def timed(self) -> bool:
-        """Whether the times of the parts count from one zero, so that they follow each other."""
-        return bool(np.all(np.diff([part.start for part in self.parts]) > 0))
+    def _describe(self, part: int, row: int) -> tuple[str, str]:
+        """What stands in a row for the first reading that it lacks, and the key of that."""
+        log = next(logs[part] for logs in (self.parts, *self.others) if logs[part].lost[row])
+        key = log.lacking(row)[0]
+        return log.describe(row, key), key
 
-    def likely_unit(self) -> str:
-        """See `Log`."""
-        return self.first.likely_unit()
-
-    @cached_property
-    def samples(self) -> Samples:
-        """Samples of all parts; if their times do not tell, each begins where the last one ends."""
-        if len(self.parts) == 1:
-            return self.first.samples
-        end, parts = 0.0, []
-        for i, part in enumerate(self.parts):
-            start = part.start - self.first.start if self.timed else end
-            if start < end - self.step / 2:  # a clock rounds
-                raise InputError(f"{part.path}: begins before the recording before it ends")
-            columns = [part.conditions.index(key) for key in self.conditions]
-            own = part.samples
-            parts.append(
-                own._replace(
-                    time=own.time + start,
-                    conditions=own.conditions[:, columns],
-                    recording=own.recording + i,
+    def warnings(self) -> list[str]:
+        """What could not be read."""
+        said: list[str] = []
+        for i, (part, lost) in enumerate(zip(self.parts, self._lost, strict=True)):
+            said += part.source.warnings
+            if lost.any():
+                rows = np.flatnonzero(lost)
+                each = "; ".join(self._describe(i, int(row))[0] for row in rows[:NAMED])
+                more = "; …" if len(rows) > NAMED else ""
+                said.append(
+                    f"{len(rows)} of {counted(len(lost), 'row')} left out, as a reading is missing "
+                    f"or absurd: {each}{more}"
                 )
-            )
-            end = start + own.time[-1] + self.step
-        return Samples(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        return said
+
+    def unit_hint(self) -> str:
+        """Hint at the unit of time that would give a usual rate; empty if the rate is usual."""
+        if "time" not in self.first.places:
+            return ""
+        step = self.step / self.first.time_factor
+        rates = {unit: 1 / (step * UNITS["s"][unit]) for unit in CLOCK_UNITS}
+        unit = min(rates, key=lambda unit: abs(np.log(rates[unit] / _USUAL_RATE)))
+        if UNITS["s"][unit] == self.first.time_factor:
+            return ""
+        return (
+            f"; if its times are in {unit}, there are {rates[unit]:.4g} samples per second: give "
+            f"`time_unit` {unit}"
+        )
 
 
 def usual_step(steps: Array) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import failure
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.importing.holds import DetectedHolds
+from accelstudy.campaign.importing.detection import Holds, Windows
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 
@@ -26,17 +27,23 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
 _SHADE = "#DCE6F0"
 _LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
+_SPANS = 1200
+"""Spans of time in which a log is drawn, about as many as a page can show."""
 _DIGITS = 130
 """Digits that fit beside each other; if there are more, only every second, third … number is
 shown."""
 
 
-def draw_segmentation(holds: DetectedHolds) -> Figure:
-    """Draw specific forces and the standard deviation of the windows over time.
+def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
+    """Draw specific forces less an offset, (3,), and the sd of the windows over time.
 
     Holds are shaded and numbered, those that are left out hatched.
     """
-    edges, low, high = holds.envelope.edges, holds.envelope.low, holds.envelope.high
+    edges, low, high = _envelope(holds.windows)
+    low[:, :3] -= offset
+    high[:, :3] -= offset
+    used = ~holds.table.index.isin([*holds.left_out])
+    spans = np.column_stack([holds.table["t0"], holds.table["t1"] - holds.table["t0"]])
     middle = (edges[:-1] + edges[1:]) / 2
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = new_figure(FULL, 90)
@@ -48,15 +55,13 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
             label = f"threshold {holds.threshold.sd:.2g} m/s²"
             below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
         kind = "static hold" if holds.size is None else "block"
-        kept, lost = counted(int(holds.used.sum()), kind), f"{len(holds.left_out)} left out"
-        looks = [(holds.used, kept, {"color": _SHADE}), (~holds.used, lost, _LEFT_OUT)]
+        kept, lost = counted(int(used.sum()), kind), f"{len(holds.left_out)} left out"
+        looks = [(used, kept, {"color": _SHADE}), (~used, lost, _LEFT_OUT)]
         for shaded, label, look in looks[: 2 if holds.left_out else 1]:
-            spans = np.column_stack([holds.t0, holds.t1 - holds.t0])[shaded]
             for ax, shown in ((above, label), (below, None)):
                 whole = ax.get_xaxis_transform()
-                ax.broken_barh(
-                    spans, (0, 1), transform=whole, linewidth=0, zorder=0.5, label=shown, **look
-                )
+                common = {"transform": whole, "linewidth": 0, "zorder": 0.5, "label": shown}
+                ax.broken_barh(spans[shaded], (0, 1), **common, **look)
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         what = "time / s" if holds.size is None else "sample"
@@ -68,29 +73,50 @@ def draw_segmentation(holds: DetectedHolds) -> Figure:
     return figure
 
 
-def render_segmentation(holds: DetectedHolds, svg_path: str | Path, png_path: str | Path) -> None:
-    """Draw the segmentation and write it as SVG and PNG.
+def render_segmentation(holds: Holds, folder: Path, offset: Array | float = 0.0) -> None:
+    """Draw the segmentation and write it as segmentation.svg and .png.
 
     If the figure fails, the import goes on: a warning on stderr says why there is no figure.
     """
+    svg, png = folder / "segmentation.svg", folder / "segmentation.png"
     try:
-        save(draw_segmentation(holds), svg_path, png_path, "Static holds", DPI)
+        save(draw_segmentation(holds, offset), svg, png, "Static holds", DPI)
     except (OSError, InputError):  # such as a full disk, which is not the figure's fault
         raise
     except Exception as error:
-        for path in (svg_path, png_path):  # of an import before
-            Path(path).unlink(missing_ok=True)
+        for path in (svg, png):  # of an import before
+            path.unlink(missing_ok=True)
         failure("The figure 'segmentation' could not be drawn", error)
 
 
-def _number(ax: Axes, holds: DetectedHolds) -> None:
+def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
+    """Least and largest values of the windows of a log in spans of time.
+
+    Returns
+    -------
+    edges : (k + 1,) array, s, of the spans
+    low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
+        NaN in a gap
+    """
+    values = np.column_stack([windows.log.time, windows.log.forces, np.sqrt(windows.variance)])
+    time, *channels = values[windows.centred].T
+    count = max(1, min(_SPANS, len(time) // 4))
+    edges = np.linspace(time[0], time[-1], count + 1)
+    span = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, count - 1)
+    each = pd.DataFrame(np.transpose(channels)).groupby(span)
+    low, high = (of.reindex(range(count)).to_numpy(copy=True) for of in (each.min(), each.max()))
+    return edges, low, high
+
+
+def _number(ax: Axes, holds: Holds) -> None:
     """Write the numbers of the holds above them."""
-    every = 1 + len(holds) * len(str(holds.number[-1])) // _DIGITS
-    for i, (number, used) in enumerate(zip(holds.number, holds.used, strict=True)):
+    every = 1 + len(holds.table) * len(str(holds.table.index[-1])) // _DIGITS
+    for i, (number, t0, t1) in enumerate(holds.table[["t0", "t1"]].itertuples()):
+        used = number not in holds.left_out
         if i % every == 0 or not used:
             ax.annotate(
                 f"{number}",
-                ((holds.t0[i] + holds.t1[i]) / 2, 1),
+                ((t0 + t1) / 2, 1),
                 xycoords=("data", "axes fraction"),
                 xytext=(0, 1),
                 textcoords="offset points",

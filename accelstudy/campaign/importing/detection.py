@@ -1,0 +1,714 @@
+"""Static holds of a log: where a sliding window is at rest, or blocks of which each is a position.
+
+The detector is that of Tedaldi, Pretto and Menegatti (ICRA 2014): it compares the norm of the
+variances of the three axes in a window with a threshold, which comes from the data. A hold is a run
+of samples about which the windows of all sensors are at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import special
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.importing.allan import RELIABLE
+from accelstudy.campaign.importing.noise import (
+    HoldNoise,
+    hold_noise,
+    noise_before_rounding,
+    step_in,
+)
+from accelstudy.campaign.importing.recording import AXES, GAP, SDS, Recording
+from accelstudy.campaign.importing.settings import ImportSettings, Span, Which
+from accelstudy.leveling.angles import usual_norm
+
+Array = NDArray[np.float64]
+Parts: TypeAlias = tuple[slice, ...]
+"""Samples of a hold: slices of a log, each uninterrupted."""
+
+FEWEST, MOST = 8, 10**6
+"""Samples of a window, at least and at most."""
+FACTOR = 3.0
+"""Threshold over noise floor; it leaves room for noise that differs between attitudes."""
+QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
+"""The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
+RESTLESS = 0.02
+"""Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
+COARSE = 1.75
+"""Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
+same number all the time: that of noise of 0.4 steps."""
+SATURATED = 0.05
+"""A hold is useless if more than this share of its samples is at the end of the scale."""
+BEYOND, SURE = 5.0, 3.0
+"""Samples that rounding alone would hardly leave out beyond the largest one (e⁻⁵), and standard
+deviations by which those at the largest one may exceed what it then explains."""
+SHORTEST = 8
+"""Samples left of a rest from which on it is told; a sensor that turns back is still for fewer."""
+WANDERING = 2.0
+"""A hold whose standard deviation is more than this many thresholds of a window is none."""
+SLOW, QUICK = 2.0, 0.2
+"""Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
+that of a hand; seconds, below which motions are vibrations, which do not harm a mean."""
+PARTS = 4
+"""Parts of a block whose means are compared; the noise within them averages out."""
+TREMBLES = 10.0
+"""Scatter of the parts of a block, as a multiple of that of a typical one, from which on the sensor
+moves: a hand that trembles makes some five of it, a turn by a few degrees dozens."""
+
+_TOGETHER = 2**16
+"""Windows of which the sums are taken together: what a processor keeps at hand is small."""
+_BINS = np.linspace(-40.0, 40.0, 4001)  # decades of variance
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What separates rest from motion.
+
+    Attributes
+    ----------
+    sd : float, m/s²; a window with at most this standard deviation (the root of the norm of the
+        variances of its axes) is at rest
+    floor : float, m/s², standard deviation of the noise by the same measure; NaN if not needed
+    reason : str, how the threshold was chosen
+    """
+
+    sd: float
+    floor: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Holds:
+    """Static holds of a log, n of them, in order of time.
+
+    Attributes
+    ----------
+    windows : Windows, of the log
+    threshold : Threshold
+    parts : mapping of int to slices of the samples, by the numbers that figures and options use
+    table : DataFrame, a row for each hold by its number; see `hold_table`
+    left_out : mapping of int to str, numbers of holds that are left out, with the reason
+    noise : HoldNoise, of the holds that are not left out
+    warnings : tuple of str
+    size : int, samples of each block, or of the shortest, if the log consists of blocks
+    """
+
+    windows: Windows
+    threshold: Threshold
+    parts: Mapping[int, Parts]
+    table: pd.DataFrame
+    left_out: Mapping[int, str]
+    noise: HoldNoise
+    warnings: tuple[str, ...]
+    size: int | None = None
+
+    @property
+    def log(self) -> Recording:
+        """The log."""
+        return self.windows.log
+
+    @property
+    def means(self) -> Array:
+        """Mean specific forces, (n, 3), m/s²."""
+        return np.column_stack([self.table[axis] for axis in AXES])
+
+    @property
+    def radius(self) -> float:
+        """Usual distance of the means from the zero point of the specific forces, m/s²."""
+        return usual_norm(self.means - self.noise.center)
+
+    def without(self, reasons: Mapping[int, str]) -> Holds:
+        """Return the others, as if these had not been found, with warnings that say why."""
+        return replace(
+            self,
+            parts={n: parts for n, parts in self.parts.items() if n not in reasons},
+            table=self.table.drop(index=[*reasons]),
+            left_out={n: why for n, why in self.left_out.items() if n not in reasons},
+            warnings=(*self.warnings, *(f"hold {n} left out: {why}" for n, why in reasons.items())),
+        )
+
+
+def hold_table(log: Recording, parts: Mapping[int, Parts]) -> pd.DataFrame:
+    """Table of holds by their numbers.
+
+    Its columns are start and end (first sample, and the one after the last), t0 and t1 (times of
+    the first and of the last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard
+    deviations of the samples), and, as far as the log has them, the mean temperature, °C, and the
+    rms vibration, m/s²; NaN where nothing was measured.
+    """
+    rows = []
+    for slices in parts.values():
+        forces = np.concatenate([log.forces[part] for part in slices])
+        start, end = slices[0].start, slices[-1].stop
+        row = {"start": start, "end": end, "t0": log.time[start], "t1": log.time[end - 1]}
+        row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
+        row |= dict(zip(SDS, np.sqrt(np.diag(np.cov(forces, rowvar=False))), strict=True))
+        for name in log.conditions:
+            values = np.concatenate([log.samples[name].to_numpy()[part] for part in slices])
+            power = 2 if name == "vibration" else 1
+            known = values[np.isfinite(values)] ** power
+            row[name] = known.mean() ** (1 / power) if len(known) else np.nan
+        rows.append(row)
+    return pd.DataFrame(rows, index=[*parts])
+
+
+# --- Windows -------------------------------------------------------------------------------------
+
+
+class Windows:
+    """Windows that slide over the samples of a log by one sample; none spans a gap.
+
+    Attributes
+    ----------
+    log : Recording
+    width : int, samples of a window; odd
+    gaps : int, gaps in time within a recording
+    variance : (n,) array, (m/s²)², norm of the variances of the axes in the window about each
+        sample; NaN about those too near to a gap or an end for a window
+    frozen : (n,) bool array, whether an axis does not change in the window
+    centred : (n,) bool array, where there is a window
+
+    Raises
+    ------
+    InputError
+        If the log cannot be read, or is too short for a window.
+    """
+
+    def __init__(self, log: Recording, width: int) -> None:
+        self.log, self.width = log, width
+        time, forces = log.time, log.forces
+        another = np.diff(log.samples["part"]) > 0
+        jumps = (np.diff(time) > GAP * log.step) & ~another
+        self.gaps = int(jumps.sum())
+        self.variance = np.full(len(time), np.nan)
+        self.frozen = np.zeros(len(time), dtype=bool)
+        half = width // 2
+        pieces = [0, *(1 + np.flatnonzero(jumps | another)).tolist(), len(time)]
+        for start, end in pairwise(pieces):
+            for first in range(start, end - width + 1, _TOGETHER):
+                beyond = min(first + _TOGETHER + width - 1, end)
+                middle = slice(first + half, beyond - half)
+                spread = window_variance(forces[first:beyond], width)
+                self.variance[middle], self.frozen[middle] = spread
+        self.centred = np.isfinite(self.variance)
+        if not self.centred.any():
+            raise InputError(
+                f"{log.path}: too few samples for a window of {width}, or gaps all over"
+                f"{log.unit_hint()}"
+            )
+
+    @classmethod
+    def lasting(cls, log: Recording, seconds: float | None = None) -> Windows:
+        """Windows of a length in s, by default the usual one.
+
+        Raises
+        ------
+        InputError
+            If their samples are too few for a variance, or so many that the rate must be wrong.
+        """
+        window = usual_window(log) if seconds is None else seconds
+        samples = window / log.step
+        if not FEWEST <= samples <= MOST:
+            raise InputError(
+                f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
+                f"{1 / log.step:.6g} per second"
+                f"{log.unit_hint() or '; is the rate (`rate`) right?'}"
+            )
+        return cls(log, round(samples) | 1)
+
+    @cached_property
+    def extremes(self) -> Array:
+        """Of the lowest and of the highest readings the outermost and the next, (2, 2, 3)."""
+        ends = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
+        for axis, force in enumerate(self.log.forces.T):
+            centred = force[self.centred]
+            for end, pick, rest in ((0, np.min, np.greater), (1, np.max, np.less)):
+                ends[end, 0, axis] = pick(centred)
+                others = centred[rest(centred, ends[end, 0, axis])]
+                if len(others):
+                    ends[end, 1, axis] = pick(others)
+        return ends
+
+    @cached_property
+    def steps(self) -> Array:
+        """Steps in which the axes are read, (3,), m/s²; 0 where there are none."""
+        return np.array([step_in(force[self.centred]) for force in self.log.forces.T])
+
+    @property
+    def rounding(self) -> float:
+        """Noise of a window by rounding alone, m/s²."""
+        return float(np.sqrt(np.linalg.norm(self.steps**2 / 12)))
+
+    @cached_property
+    def coarse(self) -> bool:
+        """Whether the steps explain that a channel at rest does not change over a window.
+
+        If all windows that change are motion, nothing else explains it either.
+        """
+        if not self.rounding > 0:
+            return False
+        noise = _noise_floor(_histogram(self.variance))
+        return bool(noise <= COARSE * self.rounding or noise > RESTLESS * STANDARD_GRAVITY)
+
+    @cached_property
+    def counts(self) -> NDArray[np.int_]:
+        """Histogram of the variances of windows in which no channel is frozen."""
+        return _histogram(self.variance[~self.frozen])
+
+    def at_rest(self, sd: float) -> NDArray[np.bool_]:
+        """Whether the window about each sample is at rest, (n,), up to a standard deviation."""
+        return (self.variance <= sd**2) & (self.coarse | ~self.frozen)
+
+    def warnings(self) -> list[str]:
+        """What a user should know of the log."""
+        said = []
+        if self.gaps:
+            said.append(f"{counted(self.gaps, 'gap')} in time; no hold spans one")
+        if self.frozen.any() and not self.coarse:
+            share = 100 * self.frozen.sum() / self.centred.sum()
+            said.append(
+                f"a channel does not change over a window in {share:.2g} % of the log; left out"
+            )
+        return said
+
+    def quietest(self) -> float:
+        """Standard deviation that a hundredth of the windows does not exceed, m/s²."""
+        rank = np.searchsorted(np.cumsum(self.counts), 0.01 * self.counts.sum())
+        return float(10.0 ** (_BINS[min(rank, len(_BINS) - 2) + 1] / 2))
+
+    def threshold(self, given: float | None = None) -> Threshold:
+        """Threshold that a person chose, m/s², or a multiple of the noise floor.
+
+        Otsu's method finds the valley between rest and motion in the histogram of the logarithmic
+        variances. At rest they crowd around one value, the noise floor; in motion they spread over
+        decades. A channel that does not change is frozen, unless its steps explain it; no window
+        has less noise than that of rounding.
+
+        The multiple is 3, since noise differs between attitudes. It is up to 10 as long as the
+        threshold is below 0.003 g: a quiet sensor feels footsteps and pumps, and whatever moves
+        less than that in a second is not being turned.
+        """
+        if given is not None:
+            return Threshold(given, np.nan, "as given")
+        counts = self.counts
+        if self.coarse:
+            counts = _histogram(self.variance)
+            least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
+            counts[least] += counts[:least].sum() + np.sum(self.variance == 0)
+            counts[:least] = 0
+        if not counts.any():
+            raise InputError(
+                f"{self.log.path}: a channel does not change in any window; is it frozen?"
+            )
+        noise = _noise_floor(counts)
+        sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
+        reason = f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
+        return Threshold(sd, noise, reason + "around which windows at rest crowd")
+
+
+def usual_window(log: Recording) -> float:
+    """Length of a window, s: 1 s, or 9 samples of a slow log if its unit of time is plausible."""
+    return 1.0 if log.unit_hint() else max(1.0, (FEWEST + 1) * log.step)
+
+
+def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Norm of the variances of the axes in each window, and whether an axis does not change."""
+    squares = np.zeros(len(forces) - width + 1)
+    frozen = np.zeros(len(squares), dtype=bool)
+    for force in forces.T:
+        # Squares of large numbers lose digits.
+        offsets = force - force.mean()
+        mean = _window_sums(offsets, width) / width
+        variance = _window_sums(offsets**2, width) / width - mean**2
+        squares += np.maximum(variance, 0.0) ** 2
+        # Rounding may hide a variance of zero, so changes are counted.
+        changed = force[1:] != force[:-1]
+        if not changed.all():
+            frozen |= _window_sums(changed, width - 1) == 0
+    return np.sqrt(squares), frozen
+
+
+def _window_sums(values: NDArray[Any], width: int) -> Array:
+    """Sums of `width` neighbours, each of its own values: a large one costs others no digits.
+
+    A window is the end of one part of so many values and the beginning of the next part.
+    """
+    parts = np.zeros((-(-len(values) // width), width))
+    parts.ravel()[: len(values)] = values
+    ends = np.cumsum(parts[:, ::-1], axis=1)[:, ::-1].ravel()
+    result: Array = np.cumsum(parts, axis=1).ravel()[width - 1 : len(values)]
+    beyond = np.arange(len(result)) % width > 0
+    result[beyond] += ends[: len(result)][beyond]
+    return result
+
+
+def _histogram(variance: Array) -> NDArray[np.int_]:
+    """Numbers of windows by the logarithms of their variances."""
+    counts: NDArray[np.int_] = np.histogram(np.log10(variance[variance > 0]), _BINS)[0]
+    return counts
+
+
+def _noise_floor(counts: NDArray[np.int_]) -> float:
+    """Noise around which windows at rest crowd, m/s²; infinite without a window."""
+    if not counts.any():
+        return np.inf
+    middle = (_BINS[:-1] + _BINS[1:]) / 2
+    quiet = np.where(middle <= _otsu(counts, middle), counts, 0)
+    # Smoothed over a tenth of a decade, so that a short log with few windows has a peak, too.
+    mode = middle[np.argmax(np.convolve(quiet, np.ones(5), "same"))]
+    crowd = np.where(np.abs(middle - mode) <= np.log10(2), counts, 0)
+    floor = 10.0 ** middle[np.searchsorted(np.cumsum(crowd), crowd.sum() / 2)]
+    return float(np.sqrt(floor))
+
+
+def _otsu(counts: NDArray[np.int_], middle: Array) -> float:
+    """Value that divides a histogram into two classes with the largest variance between them."""
+    below = np.cumsum(counts)[:-1].astype(float)
+    above = counts.sum() - below
+    moment = np.cumsum(counts * middle)
+    # An empty class has no mean, and no weight.
+    low = moment[:-1] / np.maximum(below, 1)
+    high = (moment[-1] - moment[:-1]) / np.maximum(above, 1)
+    between = below * above * (high - low) ** 2
+    if not between.max() > 0:
+        return float(middle[np.argmax(counts)])
+    best = np.flatnonzero(between >= between.max() * (1 - 1e-9))
+    return float(middle[best[len(best) // 2]])
+
+
+# --- Runs at rest, and blocks --------------------------------------------------------------------
+
+
+def find_holds(
+    logs: Sequence[Recording], settings: ImportSettings, one_each: bool = False
+) -> list[Holds]:
+    """Find the static holds of sensors that were turned together.
+
+    The sensors are on one body. So a hold is where all of them rest, and has the same number for
+    all. It begins and ends half a window inside the samples at rest.
+
+    Parameters
+    ----------
+    logs : sequence of Recording, one for each sensor, of simultaneous samples
+    settings : ImportSettings, of which those of the holds count
+    one_each : bool, whether the logs have several recordings with one position each: the longest
+        hold, which gets the number of the recording
+
+    Returns
+    -------
+    list of Holds
+        For each sensor; a hold in which one sensor is saturated is missing for that one only.
+
+    Raises
+    ------
+    InputError
+        If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
+        was never still.
+    """
+    step, seconds = logs[0].step, settings.window_s or usual_window(logs[0])
+    windows = [Windows.lasting(log, seconds) for log in logs]
+    thresholds = [each.threshold(settings.threshold_mps2) for each in windows]
+    still = np.all([w.at_rest(t.sd) for w, t in zip(windows, thresholds, strict=True)], axis=0)
+    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
+    cut, least = round(settings.trim_s / step), max(2, round(settings.shortest_s / step))
+    rests = edges + np.array([cut, -cut])
+    lengths = np.diff(rests)[:, 0]
+    runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
+    lost = 2 * cut + windows[0].width
+    short = (lengths[(lengths >= SHORTEST) & (lengths < least)] + lost) * step
+    said = _too_short(short.tolist(), seconds + 2 * settings.trim_s, settings.shortest_s)
+    full = np.array([find_saturated(each, runs, settings.full_range) for each in windows], bool)
+    # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
+    # force changes over the run by more than within each of them.
+    sds = np.array([[scatter(log.forces[run]) for run in runs] for log in logs])
+    turns = ~full & (sds > WANDERING * np.array([[threshold.sd] for threshold in thresholds]))
+    good = ~full & ~turns
+    numbers = dict(enumerate(np.flatnonzero(good.any(axis=0)).tolist(), 1))
+    if one_each:
+        recording = logs[0].samples["part"].to_numpy()
+        by_length = sorted(numbers.values(), key=lambda i: runs[i].stop - runs[i].start)
+        numbers = dict(sorted({int(recording[runs[i].start]) + 1: i for i in by_length}.items()))
+    result = []
+    for k, (each, threshold) in enumerate(zip(windows, thresholds, strict=True)):
+        warnings = each.warnings()
+        parts: dict[int, Parts] = {n: (runs[i],) for n, i in numbers.items() if good[k, i]}
+        saturated, wandering = int(full[k].sum()), int(turns[k].sum())
+        if saturated:
+            warnings.append(f"{counted(saturated, 'hold')} left out: the sensor is saturated there")
+        if wandering:
+            warnings.append(
+                f"{counted(wandering, 'hold')} left out: the force changes there by more than its "
+                "noise, since the sensor turns slowly"
+            )
+        warnings += said
+        if not parts and wandering:
+            raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
+        if not parts:
+            raise InputError(
+                f"{each.log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
+                f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
+            )
+        result.append(_chosen(each, threshold, parts, warnings, settings))
+    return result
+
+
+def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
+    """Make each block of a log a position; those in which the sensor moves are left out.
+
+    The blocks have as many samples as the settings say, or are the files of the log. Nothing has to
+    be found in them.
+
+    Raises
+    ------
+    InputError
+        If the log does not end with a block, or the sensor is saturated or moves in all of them.
+    """
+    named = [*(which for which, _ in settings.left_out), *settings.joined]
+    if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
+        raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
+    block = log.samples["part"].to_numpy()
+    if (size := settings.block) is not None:
+        total, row = len(log.first.rows), log.samples.index.to_numpy()
+        fewer = total // size * size
+        if len(row) and row[-1] >= fewer:  # a note at the end is no sample
+            raise InputError(
+                f"{log.path}: {total} samples are no multiple of the {size} of a block (`block`): "
+                f"{fewer} or {fewer + size} would be {fewer // size} or {fewer // size + 1} "
+                "positions"
+            )
+        block = row // size  # a row that is left out counts as well
+    edges = [*np.flatnonzero(np.diff(block, prepend=-1)).tolist(), len(block)]
+    all_blocks = {int(block[i]) + 1: slice(i, end) for i, end in pairwise(edges)}
+    least = size or min(each.stop - each.start for each in all_blocks.values())
+    if least < PARTS:
+        raise InputError(f"{log.path}: {least} samples; a position has at least {PARTS}")
+    # Blocks of which most is left out are no positions, which the report says.
+    blocks = {n: each for n, each in all_blocks.items() if each.stop - each.start >= PARTS}
+    windows = Windows(log, (least // 2) | 1)
+    full = find_saturated(windows, [*blocks.values()], settings.full_range)
+    left_out = {n: "the sensor is saturated" for n, f in zip(blocks, full, strict=True) if f}
+    scatters = {
+        n: scatter(np.array([p.mean(axis=0) for p in np.array_split(log.forces[each], PARTS)]))
+        for n, each in blocks.items()
+        if n not in left_out
+    }
+    if not scatters:
+        raise InputError(f"{log.path}: the sensor is saturated in all blocks of {least} samples")
+    threshold = windows.threshold(settings.threshold_mps2) if settings.threshold_mps2 else None
+    if threshold is None:
+        # Rounding hides the scatter of a coarse sensor.
+        usual = max(float(np.median([*scatters.values()])), FACTOR / TREMBLES * windows.rounding)
+        reason = f"{TREMBLES:g} times the scatter of the {PARTS} parts of a typical block"
+        threshold = Threshold(TREMBLES * usual, usual, reason)
+    for number, each in scatters.items():
+        if each > threshold.sd:
+            left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
+    parts: dict[int, Parts] = {n: (each,) for n, each in blocks.items()}
+    return _chosen(windows, threshold, parts, windows.warnings(), settings, left_out, least)
+
+
+def scatter(forces: Array) -> float:
+    """Root of the norm of the variances of the axes, m/s², which is the measure of the detector."""
+    return float(np.sqrt(np.linalg.norm(forces.var(axis=0, ddof=1))))
+
+
+def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) -> list[bool]:
+    """Tell whether samples of holds lie at the sensor's range or, if it is unknown, at the extreme.
+
+    In a hold of n samples of which none lies beyond the last step, the mean may be so high that
+    `BEYOND` of them were expected there. Those above the last edge but one are as many as the
+    step, and the noise before rounding, explain.
+
+    Parameters
+    ----------
+    windows : Windows
+    holds : sequence of slices of the samples of the log
+    full_range : float, m/s², the sensor measures ± this; infinite if unknown
+    """
+    forces = [windows.log.forces[hold] for hold in holds]
+    if np.isfinite(full_range) or not forces:
+        # The largest reading of a converter is a step less than its range.
+        return [at_range(each, full_range - windows.steps.max()) for each in forces]
+    step, extremes = windows.steps, windows.extremes[:, :, None, :]
+    noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.where(step > 0, step / noise, 0.0)
+    steps[noise == 0] = np.inf  # every reading is the same in most holds
+    result = []
+    for each in forces:
+        n = len(each)
+        end, beside = np.sum(each == extremes, axis=2).transpose(1, 0, 2)
+        share = special.ndtr(steps + special.ndtri(min(BEYOND / n, 0.5)))
+        explained = n * share + SURE * np.sqrt(n * share * (1 - share))
+        piled = (end > np.maximum(SATURATED * n, explained)) & (end > beside)
+        result.append(bool(np.any(piled)))
+    return result
+
+
+def at_range(forces: Array, full_range: float) -> bool:
+    """Whether samples (n, 3) of a hold, m/s², lie at the sensor's range ±`full_range`."""
+    # Conversion from counts or g rounds.
+    beyond = np.abs(forces) >= full_range * (1 - 1e-9)
+    return bool(np.any(beyond.sum(axis=0) > SATURATED * len(forces)))
+
+
+def _too_short(rests: Sequence[float], lost: float, shortest: float) -> list[str]:
+    """Say which rests, of so many seconds, are no holds, and the option that takes them."""
+    if not rests:
+        return []
+    several = len(rests) > 1
+    spans = sorted({f"{min(rests):.1f}", f"{max(rests):.1f}"}, key=float)
+    left = (min(rests) - lost) * (1 + 1e-9)
+    digit = 10.0 ** np.floor(np.log10(left))
+    takes = digit * np.floor(left / digit)
+    return [
+        f"{counted(len(rests), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} no "
+        f"hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not count; "
+        f"`shortest` {takes:g} (now {shortest:g}) takes {'them' if several else 'it'}"
+    ]
+
+
+# --- What a person says of them ------------------------------------------------------------------
+
+
+def _chosen(
+    windows: Windows,
+    threshold: Threshold,
+    parts: dict[int, Parts],
+    warnings: list[str],
+    settings: ImportSettings,
+    left_out: Mapping[int, str] | None = None,
+    size: int | None = None,
+) -> Holds:
+    """Holds as a person joins them and leaves them out, if the sensor was still in them.
+
+    Raises
+    ------
+    InputError
+        If a person leaves all of them out, or the sensor was never still.
+    """
+    log = windows.log
+    for which in settings.joined:
+        _join(parts, hold_table(log, parts), which, threshold.sd)
+    table = hold_table(log, parts)
+    left_out = {**(left_out or {}), **_left_out(table, settings.left_out)}
+    used = [slices for number, slices in parts.items() if number not in left_out]
+    if not used:
+        why = f"exclude: no {'hold' if size is None else 'block'} is left"
+        raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
+    records = [[log.forces[part] for part in slices] for slices in used]
+    noise = hold_noise(records, log.step, windows.steps)
+    holds = Holds(windows, threshold, parts, table, left_out, noise, tuple(warnings), size)
+    if _moves(holds):
+        why = (
+            f"what looks like rest varies by {threshold.floor:.3g} m/s², slowly like a hand, not "
+            "like the noise of a sensor"
+        )
+        raise _never_still(windows, why, settings.window_s or usual_window(log), size)
+    return holds
+
+
+def _join(parts: dict[int, Parts], table: pd.DataFrame, which: Which, alike: float) -> None:
+    """Join holds, which keep the number of the first; their means differ by `alike` at most.
+
+    Raises
+    ------
+    InputError
+        If there is no such hold, a span of time has fewer than two, others lie between, or
+        their attitudes differ.
+    """
+    group = _numbers(table, which, "join")
+    if len(group) < 2:
+        raise InputError(f"join: {which}: fewer than two holds lie there")
+    first, *others = group
+    between = [n for n in parts if first < n < group[-1] and n not in group]
+    if between:
+        raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
+    means = table[[*AXES]]
+    for number in others:
+        step = float(np.linalg.norm(means.loc[number] - means.loc[first]))
+        if step > alike:
+            raise InputError(
+                f"join: holds {first} and {number} differ by {step:.2g} m/s²: the sensor was "
+                "turned between them"
+            )
+        parts[first] += parts.pop(number)
+
+
+def _left_out(table: pd.DataFrame, left_out: Sequence[tuple[Which, str]]) -> dict[int, str]:
+    """Holds that are left out, with the reason; one by its number counts before one by its time.
+
+    Raises
+    ------
+    InputError
+        If there is no such hold, or none in a span of time.
+    """
+    reasons: dict[int, str] = {}
+    for which, why in sorted(left_out, key=lambda each: not isinstance(each[0], Span)):
+        numbers = _numbers(table, which, "exclude")
+        if not numbers:
+            raise InputError(f"exclude: {which}: no hold lies there")
+        reasons |= dict.fromkeys(numbers, why)
+    return reasons
+
+
+def _numbers(table: pd.DataFrame, which: Which, key: str) -> list[int]:
+    """Numbers of holds: those given, or those that lie in a span of time, if only in part."""
+    if isinstance(which, Span):
+        return table.index[(table["t0"] <= which.end) & (table["t1"] >= which.start)].tolist()
+    for number in which:
+        if number not in table.index:
+            raise InputError(f"{key}: there is no hold {number}; they are {_names(table.index)}")
+    return [*which]
+
+
+def _names(numbers: Iterable[int]) -> str:
+    """Numbers in one line, runs of them by their ends."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
+
+
+def _moves(holds: Holds) -> bool:
+    """Whether the windows "at rest" show motion: large compared with gravity, and slow.
+
+    The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
+    may be larger, but it is quick and averages out like white noise. A human body moves slowly.
+    """
+    if not holds.threshold.floor > RESTLESS * min(holds.radius, STANDARD_GRAVITY):
+        return False
+    curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
+    if sd == 0:  # all samples of a coarse sensor are rounded alike
+        return False
+    reliable = (curve.differences >= RELIABLE) & (curve.tau >= QUICK)
+    if not reliable.any():
+        return True
+    white = sd * np.sqrt(holds.log.step / curve.tau[reliable])
+    return bool(np.max(curve.pooled[reliable] / white) > SLOW)
+
+
+def _never_still(windows: Windows, why: str, seconds: float, size: int | None = None) -> InputError:
+    if size is not None:
+        return InputError(
+            f"{windows.log.path}: blocks of {size} samples are no positions: {why}; is the number "
+            "of samples (`block`) right, or does a file hold a move?"
+        )
+    return InputError(
+        f"{windows.log.path}: the sensor was never still: {why}; the quietest hundredth of its "
+        f"windows of {seconds:g} s varies by {windows.quietest():.3g} m/s². Lay it down for some "
+        "seconds in each of ten or more attitudes, on a table or in a fixture"
+    )

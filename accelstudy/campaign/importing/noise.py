@@ -1,0 +1,238 @@
+"""Noise of the samples within holds, and what it and rounding leave in the mean of a hold.
+
+A reading is the force with its noise, rounded to the next step. Noise of half a step and more
+averages the rounding out, as a dither does. With less noise all samples of a hold are rounded
+alike, and however long the hold, its mean is off by up to half a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.wording import comma_list
+from accelstudy.campaign.importing.allan import (
+    AllanDeviation,
+    MeanAccuracy,
+    accuracy_of_mean,
+    pooled_deviation,
+)
+
+Array = NDArray[np.float64]
+
+ALIKE = 1.5
+"""Largest over smallest norm of the means of one sensor in gravity."""
+SPREAD = 0.25
+"""Rms of the means along their thinnest direction, over gravity; of a sphere 0.58."""
+LONGEST_RECORD = 2**20
+"""Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
+MOST = 2**15
+"""Different readings of an axis beyond which its steps are too fine to matter."""
+OFTEN = 4
+"""Times that a reading occurs on average, at least, where an axis is read in steps."""
+COARSEST = 0.1 * STANDARD_GRAVITY
+"""Largest step of a usable sensor, m/s²."""
+_OFF = 0.1
+"""Rms of readings about a regular grid, in steps: a file rounds them, too."""
+
+_RATIO = np.linspace(0.0, 2.0, 401)
+"""Noise before rounding over the step."""
+_ORDERS = np.arange(1, 501)[:, None]
+_LEFT = np.sum(np.exp(-((2 * np.pi * _ORDERS * _RATIO) ** 2)) / (2 * np.pi**2 * _ORDERS**2), axis=0)
+"""Variance that rounding leaves in the mean of a hold, in squares of the step, over `_RATIO`.
+
+The mean of rounded readings is off by Σ (−1)ᵏ q/(π k) exp(−2 π² k² σ²/q²) sin(2π k f/q) (Widrow and
+Kollár 2008, chapter 4). Its square is averaged over forces f: from q²/12 without noise to nothing.
+"""
+_WITHIN = _RATIO**2 + 1 / 12 - _LEFT
+"""Variance of the readings within a hold in the same unit: of all, less what the mean has of it."""
+
+
+@dataclass(frozen=True)
+class HoldNoise:
+    """Noise of the samples within all holds of a log together, in three channels.
+
+    The first channel is along the mean specific force of a hold, the other two are across it.
+
+    Attributes
+    ----------
+    allan : AllanDeviation, of the channels
+    sd : (3,) array, m/s², root mean square sd of the samples within holds in the channels
+    center : (3,) array, m/s², zero point of the specific forces; zero if the holds determine none
+    directed : bool, whether the means are close enough to forces for "along" to have a meaning
+    of_sensor : slice, channels with the noise of the sensor: those without what moves it, if there
+        are any
+    accuracy : MeanAccuracy, of the mean over a typical hold in the channels of the sensor
+    across : float, m/s², standard deviation of such a mean across gravity
+    rounding : float, m/s², what rounding to the steps of the readings leaves in any mean
+    count : int, holds
+    """
+
+    allan: AllanDeviation
+    sd: Array
+    center: Array
+    directed: bool
+    of_sensor: slice
+    accuracy: MeanAccuracy
+    across: float
+    rounding: float
+    count: int
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the mean over a typical hold, m/s²."""
+        return float(np.hypot(self.accuracy.allan, self.rounding))
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of the square of `sigma` (Welch and Satterthwaite).
+
+        Those of the part of rounding are the means of the axes that it comes from.
+        """
+        allan, rounding = self.accuracy.allan**2, self.rounding**2
+        parts = allan**2 / self.accuracy.dof + rounding**2 / (3 * self.count)
+        return (allan + rounding) ** 2 / parts if parts > 0 else self.accuracy.dof
+
+
+def hold_noise(
+    records: Sequence[Sequence[Array]], step: float, resolution: ArrayLike = 0.0
+) -> HoldNoise:
+    """Sum the samples of each hold in its channels.
+
+    Parameters
+    ----------
+    records : for each hold the forces (n, 3), m/s², of each of its uninterrupted parts
+    step : float, s, usual time between samples
+    resolution : (3,) array, m/s², steps in which the axes are read; 0 where there are none
+    """
+    forces = [np.concatenate(parts) for parts in records]
+    means = np.array([each.mean(axis=0) for each in forces])
+    center, directed = _center(means)
+    frames = [_frame(mean - center) for mean in means]
+    covariances = [np.cov(each, rowvar=False) for each in forces]
+    variances = [
+        np.diag(frame.T @ covariance @ frame)
+        for covariance, frame in zip(covariances, frames, strict=True)
+    ]
+    sd = np.sqrt(np.mean(variances, axis=0))
+    each = [(part, frame) for parts, frame in zip(records, frames, strict=True) for part in parts]
+    allan = pooled_deviation([r[:LONGEST_RECORD] for r, _ in each], step, [f for _, f in each])
+    typical = int(np.median([len(each) for each in forces]))
+    of_sensor = slice(0, 1 if directed else 3)
+    accuracy, across = (
+        accuracy_of_mean(allan.channels(channels), typical * step, sd[channels], typical)
+        for channels in (of_sensor, slice(1, 3))
+    )
+    of_axes = np.sqrt(np.mean([np.diag(covariance) for covariance in covariances], axis=0))
+    rounding = float(np.sqrt(np.mean(rounding_of_mean(resolution, of_axes) ** 2)))
+    return HoldNoise(
+        allan, sd, center, directed, of_sensor, accuracy, across.allan, rounding, len(records)
+    )
+
+
+def _center(means: Array) -> tuple[Array, bool]:
+    """Point from which all means of holds are equally far, and whether there is one.
+
+    The offset of counts may be unknown; with a large one no mean points along gravity. If the
+    attitudes differ enough, the sphere through the means shows it.
+    """
+    centers = [np.zeros(3)]
+    if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
+        center, radius = sphere
+        thinnest = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)[-1]
+        if thinnest > SPREAD * radius * np.sqrt(len(means)):
+            centers.insert(0, center)
+    for center in centers:
+        norms = np.linalg.norm(means - center, axis=1)
+        if norms.max() <= ALIKE * norms.min():
+            return center, True
+    return np.zeros(3), False
+
+
+def _frame(force: Array) -> Array:
+    """Orthonormal columns, the first of them along `force`.
+
+    A sensor that settles or is nudged turns a little. That moves the force across its mean, and
+    along it in the second order only. So the scatter along the mean is the sensor's own noise.
+    """
+    size = float(np.linalg.norm(force))
+    if size == 0:
+        return np.eye(3)
+    return np.linalg.svd(force[:, None] / size)[0]
+
+
+def fit_sphere(forces: Array) -> tuple[Array, float] | None:
+    """Centre (3,) and radius of the sphere that fits points (n, 3) best; None if there is none.
+
+    |f − c|² = r² is linear in c and in r² − |c|².
+    """
+    # Relative to their mean, so that a large offset costs no digits.
+    middle = forces.mean(axis=0)
+    points = forces - middle
+    design = np.column_stack([2 * points, np.ones(len(points))])
+    solution, _, rank, _ = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=1e-6)
+    square = solution[3] + solution[:3] @ solution[:3]
+    if rank < 4 or square <= 0:
+        return None
+    return middle + solution[:3], float(np.sqrt(square))
+
+
+def step_in(readings: Array) -> float:
+    """Step of the readings (n,) of an axis, m/s²; 0 if there is none."""
+    different = np.empty(0)
+    for first in range(0, len(readings), MOST):  # most axes of fine steps show it at once
+        different = np.union1d(different, readings[first : first + MOST])
+        if len(different) > MOST:
+            return 0.0
+    often = len(readings) >= OFTEN * len(different)
+    return float(f"{step_of(different):.6g}") if often else 0.0
+
+
+def step_of(different: Array) -> float:
+    """Step of a regular grid of which these readings, in order, are points; 0 if there is none."""
+    gaps = np.diff(different)
+    if len(gaps) < 2:
+        return 0.0
+    step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
+    place = np.concatenate([[0.0], np.cumsum(np.round(gaps / step))])
+    slope, start = np.polyfit(place, different, 1)
+    off = np.sqrt(np.mean((different - start - slope * place) ** 2))
+    return float(slope) if off <= _OFF * slope and slope <= COARSEST else 0.0
+
+
+def noise_before_rounding(step: ArrayLike, sd: ArrayLike) -> Array:
+    """Noise of samples before they were rounded, of the same shape as their steps and sds, m/s²."""
+    step, sd = np.asarray(step, dtype=float), np.asarray(sd, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.interp((sd / step) ** 2, _WITHIN, _RATIO, right=np.nan)
+    fine = np.sqrt(np.maximum(sd**2 - step**2 / 12, 0.0))
+    return np.where(np.isnan(ratio), fine, ratio * step)
+
+
+def rounding_of_mean(step: ArrayLike, sd: ArrayLike) -> Array:
+    """Standard deviation that rounding leaves in the mean of a hold, m/s², whatever its length.
+
+    Parameters
+    ----------
+    step : array, m/s², 0 where there is none
+    sd : array, m/s², root mean square sd of the samples within holds, as they were read
+    """
+    step = np.asarray(step, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = noise_before_rounding(step, sd) / step
+    return np.where(step > 0, step * np.sqrt(np.interp(ratio, _RATIO, _LEFT)), 0.0)
+
+
+def steps_text(steps: ArrayLike) -> str:
+    """Steps of the axes, m/s², for people; one number if they are alike."""
+    different = dict.fromkeys(f"{step:.3g}" for step in np.ravel(steps) if step > 0)
+    return f"{comma_list([*different])} m/s²"
+
+
+def shown(sigma: float) -> str:
+    """Standard deviation of a force, m/s², for people."""
+    return f"{1e3 * sigma:.3g} mm/s²"

@@ -1,0 +1,282 @@
+"""The log of a calibrated sensor on the same plate: it tells roll and pitch of each hold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import GON
+from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
+from accelstudy.campaign.checks import Remedies, check_norm
+from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.detection import WANDERING, Holds, Windows, at_range, scatter
+from accelstudy.campaign.importing.noise import hold_noise, shown
+from accelstudy.campaign.importing.recording import AXES, Log, Recording, place_of, read_log
+from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.files.validation import checked
+from accelstudy.leveling.angles import angles_of, near_pole
+from accelstudy.sensors.frames import FRD, Frame
+
+Array = NDArray[np.float64]
+
+COVERED = 0.5
+"""Share of a hold, below which the reference has not enough samples of it."""
+FEWEST = 4
+"""Samples of the reference in a hold, at least."""
+APART = 0.03
+"""Misfit of the turns of both sensors, in parts of gravity, that no pair on one plate has."""
+TURNED = 20 * GON
+"""Rotation between the sensors, beside quarter turns, up to which it is small."""
+QUARTER_TURNS = tuple(
+    frame
+    for letters in permutations(("fb", "rl", "du"))
+    for name in product(*letters)
+    if (frame := Frame("".join(name))) and np.linalg.det(frame.matrix) > 0
+)
+LEAST = 8
+"""Holds from which on it is checked that both sensors turn together."""
+
+REMEDIES = Remedies(*["it is read in the unit of the log of which `reference` was made"] * 3)
+
+
+def open_reference(
+    path: Path,
+    calibration: Path,
+    columns: Mapping[str, str] | None = None,
+    offset: float | None = None,
+) -> ReferenceLog:
+    """Open the log of a reference, which is read like that of its calibration.
+
+    Parameters
+    ----------
+    path : its raw log
+    calibration : its calibration.json
+    columns : mapping of fx, fy, fz and time to columns, where the log is not like that of its
+        calibration
+    offset : float, s, to add to its times; None where both logs have one clock, or begin together
+
+    Raises
+    ------
+    InputError
+        If its log cannot be read, or its calibration tells no angles with their sigmas.
+    """
+    sensor, columns = usable_reference(calibration), dict(columns or {})
+    if unknown := [key for key in columns if key not in (*AXES, "time")]:
+        raise InputError(
+            f"`reference_columns`: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
+        )
+    time = {"time": columns.pop("time")} if "time" in columns else {}
+    layout = checked(LogLayout, {**time, "columns": columns}, "`reference_columns`")
+    try:
+        log = read_log(path, layout, like=sensor.usual_layout, conditions=("time",))
+    except InputError as error:
+        said = re.split("; give the column of time|; the columns are those", str(error))[0]
+        raise InputError(
+            f"`reference_log` {said}; it is read like the log of `reference`, and "
+            "`reference_columns` fx=…,fy=…,fz=…,time=… names other columns"
+        ) from None
+    return ReferenceLog(path, sensor, Recording([log]), offset)
+
+
+@dataclass(frozen=True)
+class ReferenceLog:
+    """The open log of a reference, and its calibration; see `open_reference`."""
+
+    path: Path
+    calibration: SensorCalibration
+    log: Recording
+    offset: float | None
+
+    def average(self, log: Recording, holds: Holds, gravity: float) -> tuple[Holds, list[Array]]:
+        """Take the samples of the reference in the holds of a log.
+
+        Returns
+        -------
+        holds : Holds, without those that the reference does not cover
+        records : list of (m, 3) arrays, m/s², one for each of them
+
+        Raises
+        ------
+        InputError
+            If it covers none of them, moves in most, or its forces are not as large as gravity.
+        """
+        read, full_range = self.log, self.calibration.content.get("range_mps2") or np.inf
+        # Both begin together unless they have one clock.
+        apart = float(np.nan_to_num(read.starts[0] - log.starts[0])) + (self.offset or 0.0)
+        time, forces = read.time + apart, read.forces @ self.calibration.mending.T
+        records: dict[int, Array] = {}
+        lost: dict[int, str] = {}
+        for n, t0, t1 in holds.table[["t0", "t1"]].itertuples():
+            inside = slice(*np.searchsorted(time, [t0, t1 + log.step / 2]).tolist())
+            count = inside.stop - inside.start
+            if count * read.step < COVERED * (t1 - t0) or count < FEWEST:
+                lost[n] = "the reference log does not cover it"
+            elif at_range(forces[inside], full_range):
+                lost[n] = "the reference is saturated"
+            else:
+                records[n] = forces[inside]
+        if not records:
+            table = holds.table
+            raise InputError(
+                f"`reference_log` {self.path}: runs from {time[0]:.6g} s to {time[-1]:.6g} s of "
+                f"the time of {log.path}, whose holds lie from {table['t0'].iloc[0]:.6g} s to "
+                f"{table['t1'].iloc[-1]:.6g} s: all are left out, the first because "
+                f"{next(iter(lost.values()))}; `reference_offset` gives the seconds to add to the "
+                "times of the reference"
+            )
+        means = np.array([record.mean(axis=0) for record in records.values()])
+        raw, unit = means / read.first.conversion.scale[0], read.first.layout.unit
+        check_norm(f"`reference_log` {self.path}", raw, means, unit, gravity, REMEDIES)
+        limit = WANDERING * Windows.lasting(read).threshold().sd
+        sds = {n: scatter(record) for n, record in records.items()}
+        moving = {n: sd for n, sd in sds.items() if sd > limit}
+        if len(moving) > len(records) / 2:
+            raise InputError(
+                f"`reference_log` {self.path}: the reference moves in {len(moving)} of "
+                f"{len(records)} holds; is it on one plate with the sensor, and are its times "
+                "right (`reference_offset`)?"
+            )
+        lost |= {n: f"the reference moves: its sd is {sd:.2g} m/s²" for n, sd in moving.items()}
+        return holds.without(lost), [r for n, r in records.items() if n not in moving]
+
+    def angles(
+        self,
+        log: Recording,
+        forces: Array,
+        records: Sequence[Array],
+        used: NDArray[np.bool_],
+        gravity: float,
+    ) -> tuple[dict[str, Any], NDArray[np.bool_], str]:
+        """Roll and pitch of the holds of a log by the means of the reference.
+
+        Parameters
+        ----------
+        log : Recording
+        forces : (n, 3) array, m/s², means of the sensor
+        records : sequence of n arrays, see `average`
+        used : (n,) bool array, which holds are not left out
+        gravity : float, m/s²
+
+        Returns
+        -------
+        columns : dict, what the campaign gets
+        poles : (n,) bool array, which holds are too near to the pole for a roll
+        note : str, how the reference was used
+
+        Raises
+        ------
+        InputError
+            If the two do not turn together, or one is mounted askew to the other.
+        """
+        own = self.calibration.correct(np.array([record.mean(axis=0) for record in records]))
+        frame = self._frame(forces[used], own[used])
+        angles = angles_of(frame.to_frd(own))
+        resting = [[record] for record, use in zip(records, used, strict=True) if use]
+        noise = hold_noise(resting, self.log.step).accuracy.allan
+        reference = reference_sensor(self.calibration, noise, frame)
+        sigma, common = reference.errors(angles, gravity)
+        poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
+        by_clock = np.isfinite(self.log.starts[0] - log.starts[0])
+        clock = "of the same clock" if by_clock else "begun together with the log"
+        clock += "" if self.offset is None else f", {self.offset:+g} s"
+        note = (
+            f"reference: {self.path}, {clock}; its axes x, y, z point "
+            f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
+            f"{shown(noise)}"
+        )
+        columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
+        return columns, poles, note
+
+    @staticmethod
+    def unused(log: Log) -> Iterator[str]:
+        """Say that roll and pitch in the log of the sensor itself are not used."""
+        there = [key for key in ("roll", "pitch") if place_of(log.source, key) is not None]
+        if there:
+            yield (
+                f"{log.path}: columns {', '.join(there)} are left out: roll and pitch are those of "
+                "`reference_log`"
+            )
+
+    def _frame(self, forces: Array, own: Array) -> Frame:
+        """Quarter turns from the axes of the reference to those of a sensor.
+
+        Parameters
+        ----------
+        forces, own : (n, 3) arrays, m/s², of the sensor and of the reference, in the same holds
+
+        Raises
+        ------
+        InputError
+            If a rotation does not explain them, or it is not small beside the quarter turns.
+        """
+        log = f"`reference_log` {self.path}"
+        if len(own) >= LEAST:
+            design = np.column_stack([own, np.ones(len(own))])
+            left = forces - design @ np.linalg.lstsq(design, forces, rcond=None)[0]
+            misfit = np.sqrt(np.mean(np.sum(left**2, axis=1))) / self.calibration.gravity
+            if misfit > APART:
+                raise InputError(
+                    f"{log}: the two sensors do not turn together: their forces differ by "
+                    f"{misfit:.2g} g, whatever the rotation between them; are they on one plate, "
+                    "and are the times of the reference right (`reference_offset`)?"
+                )
+        left_side, _, right_side = np.linalg.svd(forces.T @ own)
+        turn = left_side @ np.diag([1, 1, np.linalg.det(left_side @ right_side)]) @ right_side
+        traces = {frame: np.trace(frame.matrix.T @ turn) for frame in QUARTER_TURNS}
+        best = max(traces, key=lambda frame: traces[frame])
+        rest = float(np.arccos(np.clip((traces[best] - 1) / 2, -1, 1)))
+        if rest > TURNED:
+            raise InputError(
+                f"{log}: besides quarter turns, the reference is turned by {rest / GON:.0f} gon "
+                f"against the sensor; mount it within {TURNED / GON:.0f} gon, as only a small "
+                "rotation is estimated"
+            )
+        return best
+
+
+def reference_sensor(
+    calibration: SensorCalibration, sigma: float, frame: Frame = FRD
+) -> ReferenceSensor:
+    """Reference with a calibration, a noise of its means, m/s², and its axes."""
+    return ReferenceSensor(
+        calibration=calibration.content["campaign"],
+        frame=frame.name,
+        sigma_mps2=sigma,
+        effects=[effect.spec for effect in calibration.model.effects],
+        parameters=calibration.parameters.tolist(),
+        covariance=calibration.covariance.tolist(),
+    )
+
+
+def usable_reference(path: Path) -> SensorCalibration:
+    """Read the calibration of a reference.
+
+    Raises
+    ------
+    InputError
+        If it tells no angles with their sigmas.
+    """
+    calibration, where = read_calibration(path), f"`reference` {path}"
+    quality = calibration.content["quality"]
+    if not quality["plausible"]:
+        why = "; ".join(quality["warnings"])
+        raise InputError(f"{where}: do not use this calibration: {why}")
+    if not np.isfinite(calibration.covariance).all():
+        raise InputError(
+            f"{where}: it has no covariance matrix, so nothing tells how far its angles can be "
+            "trusted; calibrate it in more positions than its model has parameters"
+        )
+    for effect, condition in calibration.needs:
+        raise InputError(
+            f"{where}: its effect {effect} needs the {condition} of each hold; give a "
+            "calibration with a model that needs the forces only (calibrate --model)"
+        )
+    return calibration
