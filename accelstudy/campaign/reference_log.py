@@ -17,9 +17,10 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
 from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.detection import WANDERING, Holds, Windows, at_range, scatter
+from accelstudy.campaign.importing.detection import WANDERING, Holds, at_range, scatter
 from accelstudy.campaign.importing.noise import hold_noise, shown
 from accelstudy.campaign.importing.recording import AXES, Log, Recording, place_of, read_log
+from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import checked
 from accelstudy.leveling.angles import angles_of, near_pole

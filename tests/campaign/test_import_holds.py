@@ -7,7 +7,7 @@ from log_helpers import open_log
 from places import SHARED
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing import detection
+from accelstudy.campaign.importing import detection, windows
 from accelstudy.campaign.importing.settings import parse_settings
 
 RATE = 100.0
@@ -89,7 +89,7 @@ def test_known_holds(tmp_path, seed, sigma):
 
 def test_windows_are_those_of_numpy(tmp_path):
     forces, _ = session(holds=2)
-    found = detection.Windows(opened(tmp_path, forces), 101)
+    found = windows.Windows(opened(tmp_path, forces), 101)
     sliding = np.lib.stride_tricks.sliding_window_view(forces, 101, axis=0)
     expected = np.linalg.norm(sliding.var(axis=2), axis=1)
     np.testing.assert_allclose(found.variance[50:-50], expected, rtol=1e-9)

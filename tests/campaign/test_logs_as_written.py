@@ -127,7 +127,7 @@ def test_an_absurd_reading_is_a_missing_one(tmp_path, value):
 
 def test_a_large_reading_costs_no_digits():
     """A reading of 900 g in a chunk of a sensor with noise of 1 µm/s²."""
-    from accelstudy.campaign.importing.detection import window_variance
+    from accelstudy.campaign.importing.windows import window_variance
 
     rng = np.random.default_rng(2)
     forces = rng.normal(0, 1e-6, (60_000, 3)) + np.array([0, 0, G])

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds, usual_window
+from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds
 from accelstudy.campaign.importing.making import campaign_of_holds
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.recording import AXES, Recording, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile
+from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
 
 if TYPE_CHECKING:

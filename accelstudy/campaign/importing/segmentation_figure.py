@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import failure
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.importing.detection import Holds, Windows
+from accelstudy.campaign.importing.detection import Holds
+from accelstudy.campaign.importing.windows import Windows
 from accelstudy.drawing.saving import save
 from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
 
