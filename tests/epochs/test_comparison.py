@@ -26,7 +26,7 @@ def calibrated(seed, **options):
 
 def test_a_robot_and_gravity_have_the_same_sensor_in_common():
     """Without noise a calibration by gravity is that by the robot, with the rotation taken out."""
-    options = {"effects": (*SENSOR, CROSS), "sigma": 1e-9, "sigma_angle": 2e-11}
+    options = {"effects": (*SENSOR, CROSS), "sigma": 1e-9, "robot_sigma": 2e-11}
     by_gravity = calibrated(1, **options)
     by_robot = calibrated(2, model=f"{NINE}-crossaxis", approach="robot", **options)
     for c in (compare(by_gravity, by_robot), compare(by_robot, by_gravity)):

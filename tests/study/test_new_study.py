@@ -101,7 +101,7 @@ def test_a_campaign_brings_noise_gravity_positions_and_what_its_calibration_find
     effects = ("bias: 0.12, -0.07, 0.2", "scale: 0.003, -0.002, 0.001")
     settings = CampaignSettings(
         name="box", scheme="fibonacci-30", effects=effects, sigma=1e-5, gravity=9.81,
-        sigma_angle=MGON,
+        robot_sigma=MGON,
     )  # fmt: skip
     folder = tmp_path / "a box: 1"
     write_campaign(simulate_campaign(settings)[0], folder)
