@@ -18,7 +18,6 @@ from places import DATA, ROOT, needs_data
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
 from test_import_holds import session, write
 
-import accelstudy
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.batch.config import Task, parse_batch
 from accelstudy.campaign.batch.overview import (
@@ -291,18 +290,20 @@ def test_the_campaigns_of_a_type_are_evaluated_together(tmp_path):
 
 @pytest.fixture
 def registry(tmp_path, monkeypatch):
-    """The registry of a copy of the package, which is the one of the jobs and here."""
-    package = Path(shutil.copytree(accelstudy.__path__[0], tmp_path / "package" / "accelstudy"))
-    path = package / "campaign" / "importing" / "public_data.yaml"
+    """A registry of public data that is the one of the jobs and here."""
+    path = tmp_path / "public_data.yaml"
     monkeypatch.setattr(public, "REGISTRY", path)
+    prepare = "from pathlib import Path\nfrom accelstudy.campaign.importing import public\n"
+    monkeypatch.setitem(
+        ENVIRONMENT, "PREPARE_JOB", f"{prepare}public.REGISTRY = Path({str(path)!r})"
+    )
     public_data.cache_clear()
     yield path
     public_data.cache_clear()
 
 
 def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_path):
-    environment = {**ENVIRONMENT, "PYTHONPATH": str(registry.parents[3])}
-    environment["ACCELSTUDY_ANGLE_UNIT"] = "deg"
+    environment = {**ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT": "deg"}
     log = write_log(tmp_path / "source")
     digest = hashlib.sha256(log.read_bytes()).hexdigest()
     url = f"http://127.0.0.1:1/{log.name}"  # where nobody answers
