@@ -53,11 +53,11 @@ FIRST = 3
 
 @dataclass(frozen=True)
 class Explanation:
-    """One thing that could be the case, or two together, or three with two bumped positions.
+    """One thing that could be the case, or several together.
 
     Attributes
     ----------
-    names : tuple of str, one to three: effects, or a noise effect, "outlier_position" or "unknown"
+    names : tuple of str: effects, or a noise effect, "outlier_position" or "unknown"
     classes : tuple of tuple of str, the names that mean the same in this campaign, for each name
     log_weight : float, log of density times prior weight
     best : tuple of Hypothesis, shapes that explain most; empty for noise and for the unknown

@@ -282,7 +282,7 @@ def _is_large(problem: Problem, top: Explanation) -> bool:
 def _judged_by_refits(
     problem: Problem, weighing: Weighing, single: Explanation, count: int
 ) -> Posterior:
-    """Posterior by refits: an effect alone, with more in what its refit leaves, pairs and triples.
+    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of pairs.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
 
@@ -291,12 +291,10 @@ def _judged_by_refits(
     problem : Problem
     weighing : Weighing
     single : Explanation, the effect
-    count : int, pairs that are refitted, the most probable to first order, and half as many triples
+    count : int, pairs of candidates that are refitted, the most probable to first order
     """
-    tried = [single]
-    for size, some in ((2, count), (3, (count + 1) // 2)):
-        together = [one for one in weighing.pairs if len(one.best) == size]
-        tried += sorted(together, key=lambda one: -one.log_weight)[:some]
+    pairs = [one for one in weighing.pairs if one.best]
+    tried = [single, *sorted(pairs, key=lambda one: -one.log_weight)[:count]]
     refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]

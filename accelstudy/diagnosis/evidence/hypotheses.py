@@ -211,7 +211,7 @@ def unknown_beside(
 
 @dataclass(frozen=True)
 class Together:
-    """Candidates in their best shapes, and the log density of the residuals with all of them."""
+    """Two candidates in their best shapes, and the log density of the residuals with both."""
 
     best: tuple[Hypothesis, ...]
     log_density: float
