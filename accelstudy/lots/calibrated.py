@@ -133,9 +133,8 @@ class CalibratedLot:
     @property
     def usual(self) -> list[CampaignFit]:
         """Calibrations of the sensors that are not odd."""
-        odd = {one.campaign for one in self.lot.odd}
-        fits = [fit for fit in self.fits if isinstance(fit, CampaignFit)]
-        return [fit for fit in fits if fit.campaign.name not in odd]
+        fits = [self.fits[i] for i in self.lot.usual]
+        return [fit for fit in fits if isinstance(fit, CampaignFit)]
 
     @cached_property
     def parameters(self) -> dict[str, TypeParameter]:
@@ -145,8 +144,7 @@ class CalibratedLot:
         for i, fit in enumerate(self.fits):
             if isinstance(fit, CampaignFit):
                 values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(fit))
-        odd = {one.campaign for one in self.lot.odd}
-        usual = np.array([campaign not in odd for campaign, _, _ in each])
+        usual = np.isin(np.arange(len(each)), self.lot.usual)
         has = dict.fromkeys(model.parameter_names, np.ones(len(each), dtype=bool))
         for found, spec in self.lot.effects:
             having = np.array([found.names[0] in names for _, names, _ in each])

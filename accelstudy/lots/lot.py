@@ -109,6 +109,11 @@ class Lot:
         """Odd sensors, with all that was found in the model; the surest first."""
         return self.passes[-1].odd
 
+    @property
+    def usual(self) -> list[int]:
+        """Numbers of the sensors that are not odd."""
+        return self.passes[-1].usual
+
     def each(self) -> list[tuple[str, tuple[str, ...], float]]:
         """Campaign, names of what the model lacks for it, and their posterior, for each sensor."""
         told = {found.names[0] for found, _ in self.effects}
@@ -227,8 +232,7 @@ class _Sensors:
             return sensor_evidence(campaigns[i], models[i], self.approach, seeds[i], noises[i])[1]
 
         now = Pass(tuple(sensors), anything, retested, noises=tuple(noises))
-        odd = {one.campaign for one in now.odd}
-        usual = [k for k, one in enumerate(sensors) if models[k] and one.campaign not in odd]
+        usual = [k for k in now.usual if models[k]]
         mean = None
         # What happens to each sensor at a time of its own has no mean.
         if not any(effect.sudden for effect in whole.effects):

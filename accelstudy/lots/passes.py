@@ -318,11 +318,17 @@ class Pass:
             told.append(Odd(self.sensors[i].campaign, float(alone[i]), self.classes[k]))
         return told
 
+    @property
+    def usual(self) -> list[int]:
+        """Numbers of the sensors that are not odd."""
+        odd = {one.campaign for one in self.odd}
+        return [i for i, each in enumerate(self.sensors) if each.campaign not in odd]
+
     def without_odd(self) -> Pass:
         """The same without the sensors that are odd."""
-        if not (odd := {one.campaign for one in self.odd}):
+        if not self.odd:
             return self
-        usual = [i for i, each in enumerate(self.sensors) if each.campaign not in odd]
+        usual = self.usual
         others = [self.retested(i) for i in range(len(self.sensors)) if i not in {*usual}]
         return replace(
             self,

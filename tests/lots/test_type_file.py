@@ -48,7 +48,7 @@ def type_of(sensors, folder):
     fits = [fitted(one) for one in sensors]
     named = [SimpleNamespace(campaign=one.name) for one in sensors]
     lot = SimpleNamespace(
-        odd=[], sensors=named, effects=(), model=MODEL,
+        usual=range(len(sensors)), sensors=named, effects=(), model=MODEL,
         noises={one.name: SensorNoise(0.002, 200.0) for one in sensors},
         each=lambda: [(one.name, (), 1.0) for one in sensors],
     )  # fmt: skip
