@@ -16,9 +16,9 @@ import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON, ROBOT_UNITS
+from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.checks import OPPOSITE, Remedies, better_angles, check_norm
+from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MOST, TABLES, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
@@ -31,12 +31,6 @@ Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[Any]]
 """The table of positions as it is in its file, by name: text from CSV, values from Parquet."""
 
-REMEDIES = Remedies(
-    unit=f"correct `unit` in {HEADER}",
-    gravity=f"correct {HEADER}: gravity.value_mps2",
-    other="correct the unit, `nominal` or the columns",
-)
-"""What to do about forces that are not as large as gravity."""
 MOST_NAMED = 5
 """Unknown columns of which each has a line."""
 FARTHEST = 1000
@@ -273,13 +267,15 @@ def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = 
     with np.errstate(all="ignore"):  # the checks below find what overflows
         for attribute, array in given.items():
             values[attribute] = header.conversion(attribute).to_si(array)
-        _check_forces(given, values["forces"], header, path, labels, plausible)
+    _check_forces(values["forces"], header, path, labels, plausible)
     if header.robot is not None:
         values.setdefault("yaw", np.zeros(len(labels)))
     for attribute, array in values.items():
         if COLUMNS[attribute].whole:
             values[attribute] = array.astype(np.int64)
     campaign = campaign_of(header, values)
+    if plausible:
+        check_plausible(campaign, f"{path.with_name(HEADER)} and {path.name}")
     reasons = {entry.position: entry.reason for entry in header.excluded or ()}
     try:
         return campaign.without(reasons)
@@ -330,36 +326,18 @@ def _check_robot(given: Mapping[str, Array], header: Header, path: Path) -> None
 
 
 def _check_forces(
-    given: Mapping[str, Array],
-    forces: Array,
-    header: Header,
-    path: Path,
-    labels: Sequence[str],
-    plausible: bool,
+    forces: Array, header: Header, path: Path, labels: Sequence[str], plausible: bool
 ) -> None:
-    """Check that forces can be calculated with and, if asked, that they fit gravity and angles.
-
-    The columns `given` are in the units of the file, `forces` in m/s².
-    """
+    """Check that forces (n, 3), m/s², can be calculated with and, if asked, that none is absurd."""
     where, gravity = f"{path}: fx, fy, fz", header.gravity.value_mps2
     norm = usual_norm(forces)
     if not (norm > 1 / MOST and np.max(abs(forces)) < MOST):
         raise InputError(
-            f"{where}: their norm is about {usual_norm(given['forces']):.3g} {header.unit}, which "
-            f"no unit makes gravity, {gravity:g} m/s^2; correct the columns"
+            f"{where}: their norm is about {norm:.3g} m/s², which no unit makes gravity, "
+            f"{gravity:g} m/s²; correct the columns"
         )
-    if not plausible:
-        return
-    check_norm(where, given["forces"], forces, header.unit, gravity, REMEDIES)
-    better = None
-    if "angles" in given:
-        better = better_angles(given["angles"], "gon", forces, gravity)
-    if better == OPPOSITE:
-        raise InputError(f"{where}: have the opposite sign; at level specific force is (0, 0, -g)")
-    if better is not None:
-        names = ", ".join(COLUMNS["angles"].names)
-        raise InputError(f"{path}: {names}: the angles look like {ROBOT_UNITS[better]}, not gon")
-    for i in np.flatnonzero(np.linalg.norm(forces, axis=1) > FARTHEST * gravity)[:1]:
+    absurd = np.linalg.norm(forces, axis=1) > max(FARTHEST * gravity, FARTHEST * norm)
+    for i in np.flatnonzero(absurd)[: int(plausible)]:
         raise InputError(
             f"{where}: {labels[i]}: more than {FARTHEST} times gravity; correct the mean, or leave "
             "out the hold"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
-from accelstudy.campaign.checks import Remedies, check_norm
+from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.detection import WANDERING, Holds, at_range, scatter
 from accelstudy.campaign.importing.noise import hold_noise, shown
@@ -44,8 +44,6 @@ QUARTER_TURNS = tuple(
 )
 LEAST = 8
 """Holds from which on it is checked that both sensors turn together."""
-
-REMEDIES = Remedies(*["it is read in the unit of the log of which `reference` was made"] * 3)
 
 
 def open_reference(
@@ -134,8 +132,14 @@ class ReferenceLog:
                 "times of the reference"
             )
         means = np.array([record.mean(axis=0) for record in records.values()])
-        raw, unit = means / read.first.conversion.scale[0], read.first.layout.unit
-        check_norm(f"`reference_log` {self.path}", raw, means, unit, gravity, REMEDIES)
+        unit, conversion = read.first.layout.unit, read.first.conversion
+        try:
+            check_size(f"`reference_log` {self.path}", means, gravity, unit, conversion)
+        except InputError as error:
+            raise InputError(
+                f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
+                "`reference` was made"
+            ) from None
         limit = WANDERING * Windows.lasting(read).threshold().sd
         sds = {n: scatter(record) for n, record in records.items()}
         moving = {n: sd for n, sd in sds.items() if sd > limit}

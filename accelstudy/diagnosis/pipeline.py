@@ -55,7 +55,7 @@ def diagnose(
         If the positions do not determine the model, or leave no redundancy to test anything.
     """
     approach = approach or usual_approach(campaign)
-    recognised = recognise(campaign, approach)
+    recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
         campaign = recognised.mended
     # No stage changes what another one draws.

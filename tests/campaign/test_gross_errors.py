@@ -114,10 +114,10 @@ def test_unit_errors_that_are_drawn_are_those_that_plausibility_checks_know(tmp_
     specs = {drawn("unit_error", seed).spec for seed in range(40)}
     assert len(specs) == 3
     for spec in specs:
-        with pytest.raises(InputError, match="look"):
+        with pytest.raises(InputError, match=r"look like|, not in gon"):
             write_campaign(spoiled(spec), tmp_path / "refused")
         write_campaign(spoiled(spec), tmp_path / "written", plausible=False)
-        with pytest.raises(InputError, match="look"):
+        with pytest.raises(InputError, match=r"look like|, not in gon"):
             read_campaign(tmp_path / "written")
     assert not (tmp_path / "refused").exists()
     assert {drawn("unit_error", seed, BLIND).spec for seed in range(20)} == {
@@ -196,8 +196,8 @@ def exchanged(campaign, rows, places):
 
 @pytest.mark.parametrize("design", DESIGNS)
 def test_nothing_is_recognised_where_nothing_is_wrong(design, designs):
-    assert recognise(designs[design], ROBOT) is None
-    assert recognise(replace(designs[design], angles=None), GRAVITY) is None
+    assert recognise(designs[design]) is None
+    assert recognise(replace(designs[design], angles=None), attitude=False) is None
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -210,7 +210,7 @@ def test_all_axes_and_units_are_recognised_and_undone(design, designs):
     ]
     wrong += [f"unit_error(angle={factor})" for factor in (0.9, 0.015707963267949)]
     for spec in wrong:
-        found = recognise(spoiled(spec, campaign=right), ROBOT)
+        found = recognise(spoiled(spec, campaign=right))
         assert found is not None, spec
         assert found.name == spec.partition("(")[0], spec
         np.testing.assert_allclose(found.mended.forces, right.forces, rtol=1e-9, err_msg=spec)
@@ -228,7 +228,7 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
             campaign = exchanged(right, wrong, np.roll(wrong, 1))
             if np.abs(campaign.forces - right.forces).max() < 0.06:
                 continue  # repeats
-            found = recognise(campaign, ROBOT)
+            found = recognise(campaign)
             assert found is not None, (design, wrong)
             assert found.name == "row_order"
             # Which of two repeats is which does not show, and is all the same.
@@ -238,7 +238,7 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
 def test_a_table_that_slipped_by_a_row_is_put_back(designs):
     right = designs["many"]
     rows = np.arange(right.n_positions)
-    found = recognise(exchanged(right, rows, np.roll(rows, 1)), ROBOT)
+    found = recognise(exchanged(right, rows, np.roll(rows, 1)))
     assert found.reason.endswith(" and 40 more are exchanged")
     assert np.abs(found.mended.forces - right.forces).max() < 0.06
 
@@ -264,7 +264,7 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
         **{"gravity": 9.80665, "sigma_force": 0.002, "unit": "counts", "nominal": nominal},
         **{"angles": angles_of(ideal), "sigma_angle": 5e-5},
     )
-    found = recognise(read, ROBOT)
+    found = recognise(read)
     assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
     np.testing.assert_allclose(found.mended.forces, forces, atol=1e-12)
     # Readings in counts are converted, and then turned, as those of the campaign were.
@@ -280,9 +280,9 @@ def test_what_does_not_show_is_not_recognised(designs):
     """Repeats that were exchanged, and the axes and rows where there is no robot."""
     repeated = designs["repeated"]
     alike = np.argsort(np.linalg.norm(repeated.forces - repeated.forces[0], axis=1))[:2]
-    assert recognise(exchanged(repeated, alike, alike[::-1]), ROBOT) is None
+    assert recognise(exchanged(repeated, alike, alike[::-1])) is None
     for spec in ("axis_error(x=-3, y=1, z=2)", "row_order(first=2, second=9)"):
-        assert recognise(spoiled(spec, campaign=BLIND), GRAVITY) is None
+        assert recognise(spoiled(spec, campaign=BLIND), attitude=False) is None
 
 
 def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
@@ -291,7 +291,7 @@ def test_a_sensor_that_is_mounted_in_its_own_way_is_no_gross_error(designs):
     for design in ("turned", "plain"):
         right = designs[design]
         turned = right.forces @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        assert recognise(replace(right, forces=turned), ROBOT) is None
+        assert recognise(replace(right, forces=turned)) is None
 
 
 def test_several_gross_errors_are_undone_together(designs):
@@ -300,7 +300,7 @@ def test_several_gross_errors_are_undone_together(designs):
     wrong.forces[20] += (3, -12, 8)
     for spec in ("axis_error(x=2, y=-1, z=3)", "unit_error(force=0.1019716212978)"):
         wrong = spoiled(spec, campaign=wrong)
-    found = recognise(wrong, ROBOT)
+    found = recognise(wrong)
     assert {name for name, _ in found.named} == set(gross_error_names())
     assert ("outlier_position", 21) in found.named
     assert found.reasons["unit_error"] == "the forces are in g"
@@ -335,4 +335,4 @@ def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
             up.shape
         )
         campaign = replace(GRAVITY_20, forces=forces)
-        assert recognise(campaign, get_approach("gravity")) is None
+        assert recognise(campaign, attitude=False) is None

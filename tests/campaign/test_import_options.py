@@ -348,11 +348,12 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     assert campaign.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
     wrong = "rad" if unit != "rad" else "gon"
+    unit = {"gon": "gon", "deg": "degrees", "rad": "radians"}[unit]
     line = refusal(
         "import",
         *(*arguments, "--out", tmp_path / "new", "--robot-sigma", "3.2mgon", "--robot-unit", wrong),
     )
-    assert f"--robot-unit {unit} would be right" in line
+    assert f"the robot's angles are in {unit}, not in {wrong}" in line
     result = call("import", *arguments, "--out", tmp_path / "new")
     assert "--robot-sigma takes them for the robot's" in result.stderr
 

@@ -133,7 +133,7 @@ REFUSED = {
     "late.csv": ("--reference-log", "whose holds lie from", "--reference-offset"),
     "shifted.csv": ("--reference-log", "do not turn together", "--reference-offset"),
     "between.csv": ("--reference-log", "moves in", "--reference-offset"),
-    "in-g.csv": ("--reference-log", "about 1 m/s^2", "unit"),
+    "in-g.csv": ("--reference-log", "about 1 m/s²", "unit"),
     "other.csv": ("--reference-log", "--reference-columns"),
     "askew.csv": ("--reference-log", "turned by 50 gon", "20 gon"),
     "still.csv": ("--reference-log", "do not turn together"),

@@ -153,14 +153,14 @@ def test_exchanged_axes_are_recognised_in_poor_data(spoil, axes):
     rng = np.random.default_rng([24, *axes])
     campaign, _ = session(24, rng, "robot")
     poor = SPOILS[spoil](campaign.forces, rng)
-    assert "axis_error" not in str(recognise(replace(campaign, forces=poor), ROBOT))
-    found = recognise(replace(campaign, forces=poor[:, axes]), ROBOT)
+    assert "axis_error" not in str(recognise(replace(campaign, forces=poor)))
+    found = recognise(replace(campaign, forces=poor[:, axes]))
     np.testing.assert_array_equal(found.matrix, np.eye(3)[:, axes])
 
 
 def test_exchanged_angles_of_the_robot_are_recognised():
     campaign, _ = session(24, np.random.default_rng(25), "robot")
-    found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()), ROBOT)
+    found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()))
     assert found.reason == "roll and pitch of the robot are exchanged"
     np.testing.assert_array_equal(found.mended.angles, campaign.angles)
 

@@ -12,7 +12,7 @@ from accelstudy.adjustment import quality
 from accelstudy.adjustment.quality import VarianceComponents, variance_components
 from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise, usual_approach
+from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
@@ -119,8 +119,6 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
         *implausible_tilt(*np.hypot(left, missing)),
     )
-    # A gross error of the angles shows even where the fit does not use them.
-    full = usual_approach(fit.campaign)
     return Assessment(
         fit=fit,
         solution=solution,
@@ -135,7 +133,8 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         tilt_reference=by_reference,
         tilt_missing=missing,
         implausible=implausible,
-        gross_error=None if without_gross_error else recognise(fit.campaign, full),
+        # A gross error of the angles shows even where the fit does not use them.
+        gross_error=None if without_gross_error else recognise(fit.campaign),
     )
 
 

@@ -386,7 +386,7 @@ def campaign_estimability(
 
 def _cause(campaign: Campaign, theory: Estimability, diagnosing: bool) -> str:
     """Say what may keep an adjustment from converging."""
-    gross = recognise(campaign, usual_approach(campaign))
+    gross = recognise(campaign)
     more = "none is recognised here" if diagnosing else "`accelstudy diagnose` looks for more"
     if diagnosing and gross is not None:
         return f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"

@@ -30,7 +30,7 @@ from accelstudy.campaign.calibration.applying import (
 )
 from accelstudy.campaign.calibration.device import KNOWN
 from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
-from accelstudy.campaign.checks import Remedies, check_norm
+from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.recording import AXES, CONDITIONS, Log, read_log
 from accelstudy.campaign.importing.sources import LogFile
@@ -57,12 +57,6 @@ OPTIONS = {
 }
 """Conditions that a log can hold, and the options that name their columns."""
 
-REMEDIES = Remedies(
-    unit="give `unit` {unit}",
-    gravity="give the `unit` or the `columns` of this log",
-    other="give the `unit` or the `columns` of this log",
-)
-"""What to do about a log whose readings are not as large as gravity."""
 DECIMALS = 9
 """Decimals of the added columns: far below any noise, and half the digits of a double."""
 
@@ -323,8 +317,8 @@ def _check_forces(calibration: SensorCalibration, readings: Readings) -> None:
     if not len(forces):
         why = _reason(calibration, readings, 0)
         raise InputError(f"{log.path}: no row has three numbers; the first: {why}")
-    raw = forces / abs(float(log.conversion.scale[0]))
-    check_norm(f"{log.path}", raw, forces, log.layout.unit, calibration.gravity, REMEDIES)
+    layout, gravity = log.layout, calibration.gravity
+    check_size(f"{log.path}", forces, gravity, layout.unit, log.conversion)
 
 
 def _of_calibration(calibration: SensorCalibration, readings: Readings) -> Iterator[str]:

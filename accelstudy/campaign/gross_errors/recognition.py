@@ -1,4 +1,4 @@
-"""Recognise gross errors that make all else meaningless, by trying what would mend them.
+"""The judge of plausibility: gross errors are recognised by trying what would mend them.
 
 Even before calibration a real sensor agrees with its robot, or with gravity, within some hundredths
 of g. Data in a wrong unit, with swapped axes or exchanged rows do not. So a sensor is fitted that
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.units import ROBOT_UNITS, SENSOR_UNITS, STANDARD_GRAVITY, UNITS
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.checks import Remedies, check_norm
 from accelstudy.campaign.gross_errors.errors import (
     SIGNED_PERMUTATIONS,
     Array,
@@ -28,11 +28,8 @@ from accelstudy.campaign.gross_errors.errors import (
 )
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force, usual_norm
-from accelstudy.sensors.conversion import Conversion
+from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
-
-if TYPE_CHECKING:
-    from accelstudy.approaches import Approach
 
 USUAL = 0.3
 """Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""
@@ -68,8 +65,6 @@ EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 PART = 8
 """At most one of so many positions may be bumped; if more are off, something else is wrong."""
-REMEDIES = Remedies(*["correct the columns"] * 3)
-"""What to do about forces that no unit makes as large as gravity."""
 
 
 @dataclass(frozen=True)
@@ -143,11 +138,113 @@ class Recognised:
         return np.linalg.multi_dot([*steps[::-1], np.eye(3)]) if steps else None
 
 
-def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
+def check_size(
+    where: str, forces: Array, gravity: float, unit: str, conversion: Conversion
+) -> list[str]:
+    """Check that forces, most of them at rest, are roughly as large as gravity.
+
+    Even bad sensors are wrong by some tenths only, so a factor of two has another cause.
+
+    Parameters
+    ----------
+    where : str, begins the message
+    forces : (n, 3) array, m/s²
+    gravity : float, m/s²
+    unit, conversion : of the numbers that the forces were read from
+
+    Returns
+    -------
+    list of str
+        A warning if the size is farther off than the scale of any accelerometer.
+
+    Raises
+    ------
+    InputError
+        If the size is wrong by a factor of two; it says what would be right.
+    """
+
+    def near(size: float, gravity: float) -> bool:
+        return gravity / 2 < size < gravity * 2
+
+    norm, share = usual_norm(forces), usual_norm(forces) / gravity - 1
+    what = f"the forces are about {norm:.3g} m/s²"
+    if near(norm, gravity):
+        if abs(share) <= LARGEST["scale"]:
+            return []
+        keys = "`scale` and `offset`" if unit == "counts" else "`unit`"
+        return [
+            f"at rest {what}, {100 * abs(share):.0f} % {'more' if share > 0 else 'less'} than "
+            f"gravity, {gravity:g} m/s²: no accelerometer is so far off; check {keys}, and "
+            "`gravity`"
+        ]
+    number = norm / float(np.mean(np.abs(conversion.scale)))
+    if unit != "m/s^2":
+        what = f"the forces are about {number:.3g} {unit}, {norm:.3g} m/s²"
+    if near(norm, STANDARD_GRAVITY):
+        raise InputError(
+            f"{where}: {what}, which does not fit a gravity of {gravity:g} m/s²; give `gravity`"
+        )
+    sizes = UNITS["m/s^2"]
+    better = [u for u in SENSOR_UNITS if u != unit and near(number * sizes[u], gravity)]
+    if not better and unit != "counts" and number > 100:
+        better = ["counts"]
+    if better:
+        needs = ", and need a scale" if better == ["counts"] else ""
+        raise InputError(
+            f"{where}: {what}: these look like {better[0]}, not {unit}{needs}; give `unit` "
+            f"{better[0]}"
+        )
+    raise InputError(
+        f"{where}: {what}, nowhere near gravity, {gravity:g} m/s²; give another `unit`, `scale` or "
+        "`offset`, or other `columns`"
+    )
+
+
+def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> list[str]:
+    """Refuse what no calibration could make use of: a wrong unit, or forces of the wrong sign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    where : str, begins the message
+    angle_unit : str, of the numbers that the robot's angles were read from
+
+    Returns
+    -------
+    list of str, warnings as of `check_size`
+
+    Raises
+    ------
+    InputError
+        If a wrong unit or sign is recognised; it says what would be right.
+    """
+    conversion = campaign.nominal or conversion_of(campaign.unit)
+    doubts = check_size(where, campaign.forces, campaign.gravity, campaign.unit, conversion)
+    gross = recognise(campaign, angle_unit=angle_unit) if campaign.angles is not None else None
+    for error in () if gross is None else gross.errors:
+        if error.name == "unit_error":
+            raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
+        if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
+            raise InputError(
+                f"{where}: {error.reason}; in forward, right, down specific force at level is "
+                "(0, 0, −g)"
+            )
+    return doubts
+
+
+def recognise(
+    campaign: Campaign, attitude: bool = True, angle_unit: str = "gon"
+) -> Recognised | None:
     """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
 
     Without the angles of a robot, swapped axes and exchanged rows do not show: they leave the norm
     of the force as it is.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    attitude : bool, whether to compare with the robot's angles, if there are any
+    angle_unit : str, of the numbers that these were read from
 
     Returns
     -------
@@ -160,9 +257,11 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     """
     errors: list[Mending] = []
     mended = campaign
+    everywhere = (axes, partial(units, angle_unit=angle_unit))
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    for attitude in (False, True)[: 1 + (approach.uses_angles and campaign.angles is not None)]:
-        errors += _errors((axes, units), mended, attitude)
+    attitude = attitude and campaign.angles is not None
+    for of_attitude in (False, True)[: 1 + attitude]:
+        errors += _errors(everywhere, mended, of_attitude)
         mended = errors[-1].campaign if errors else campaign
     # A sensor that is mounted askew is no reason to reorder its positions.
     mounted = _is_mounted(mended, attitude)
@@ -170,8 +269,8 @@ def recognise(campaign: Campaign, approach: Approach) -> Recognised | None:
     for stage in (rows, outliers):
         errors += _errors((stage,), mended, attitude, mounted)
         mended = errors[-1].campaign if errors else campaign
-    where, forces = f"{campaign.name}: fx, fy, fz", mended.forces
-    check_norm(where, forces, forces, "m/s^2", campaign.gravity, REMEDIES)
+    of_mended = conversion_of("m/s^2")
+    check_size(f"{campaign.name}: fx, fy, fz", mended.forces, campaign.gravity, "m/s^2", of_mended)
     return Recognised(tuple(errors)) if errors else None
 
 
@@ -277,7 +376,7 @@ def _axes_in_words(matrix: Array) -> str:
     return f"axes {wrong}: {words}"
 
 
-def units(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+def units(campaign: Campaign, sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Mending]:
     """Convert the forces, or the angles, as if they were in another unit."""
     norm = usual_norm(campaign.forces) / campaign.gravity
     own = campaign.unit if campaign.unit in SENSOR_UNITS else "m/s^2"
@@ -289,7 +388,7 @@ def units(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
                 reason = f"the forces are in {unit}{instead}"
                 yield Mending("unit_error", reason, mended, factor * np.eye(3))
     if sensor.expected is not None:
-        for unit, factor in other_units(ROBOT_UNITS, "rad", "gon").items():
+        for unit, factor in other_units(ROBOT_UNITS, "rad", angle_unit).items():
             reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
             yield Mending("unit_error", reason, angles_times(campaign, factor))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import counted, short_list
-from accelstudy.campaign.checks import Remedies, check_norm
+from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.names import thermometers
@@ -19,9 +20,7 @@ from accelstudy.campaign.importing.recording import AXES, SDS, Log, Recording
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.session import Campaign
-from accelstudy.leveling.angles import usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
-from accelstudy.sensors.plausibility import LARGEST
 
 if TYPE_CHECKING:
     from accelstudy.campaign.reference_log import ReferenceLog
@@ -34,13 +33,6 @@ sensor turns within its holds."""
 
 COUNTS = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
-
-REMEDIES = Remedies(
-    unit="give `unit` {unit}",
-    gravity="give `gravity`",
-    other="give other `unit`, `scale`, `offset` or `columns`",
-)
-"""What to do about forces that are not as large as gravity."""
 
 
 def campaign_of_holds(
@@ -101,7 +93,6 @@ def campaign_of_holds(
         else:
             hold = table.index[table[name].isna()][0]
             warnings.append(f"hold {hold} has no {name}; the column is left out")
-    warnings += far_from_gravity(settings, forces)
     if beside is not None:
         used = ~table.index.isin([*left_out])
         of_reference, poles, note = beside.angles(log, forces, records, used, gravity)
@@ -240,17 +231,14 @@ def imported_campaign(
     Raises
     ------
     InputError
-        If the forces are nowhere near gravity; it names the options that would mend that.
+        If the forces are nowhere near gravity, or the robot's angles are in another unit.
     """
-    conversion = conversion_of(settings.unit, settings.scale, settings.offset)
-    frame = settings.axes
-    raw = conversion.from_si(frame.from_frd(forces))
     nominal = None
     if settings.unit == "counts":
-        scale = frame.rearranged(conversion.scale) * frame.signs
-        nominal = Conversion(scale, frame.rearranged(conversion.offset))
-    check_norm(f"{path}", raw, forces, settings.unit, settings.gravity.value_mps2, REMEDIES)
-    return Campaign(
+        conversion = conversion_of(settings.unit, settings.scale, settings.offset)
+        scale = settings.axes.rearranged(conversion.scale) * settings.axes.signs
+        nominal = Conversion(scale, settings.axes.rearranged(conversion.offset))
+    campaign = Campaign(
         **{
             "name": settings.name,
             "positions": np.arange(1, len(forces) + 1),
@@ -264,20 +252,9 @@ def imported_campaign(
             **columns,
         }
     )
-
-
-def far_from_gravity(settings: ImportSettings, forces: Array) -> list[str]:
-    """Warn if forces (n, 3), m/s², at rest differ from gravity by more than a scale error can."""
-    norm, gravity = usual_norm(forces), settings.gravity.value_mps2
-    share = norm / gravity - 1
-    if abs(share) <= LARGEST["scale"]:
-        return []
-    options = "`scale` and `offset`" if settings.unit == "counts" else "`unit`"
-    return [
-        f"at rest the forces are about {norm:.3g} m/s², {100 * abs(share):.0f} % "
-        f"{'more' if share > 0 else 'less'} than gravity, {gravity:g} m/s²: no accelerometer is so "
-        f"far off; check {options}, and `gravity`"
-    ]
+    angle_unit = "gon" if settings.robot is None else settings.robot.unit
+    doubts = check_plausible(campaign, f"{path}", angle_unit)
+    return replace(campaign, warnings=(*campaign.warnings, *doubts))
 
 
 def _layout_of(settings: LogLayout, log: Log) -> LogLayout:

@@ -9,9 +9,8 @@ import pandas as pd
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
-from accelstudy.campaign.checks import OPPOSITE, better_angles
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.making import far_from_gravity, imported_campaign
+from accelstudy.campaign.importing.making import imported_campaign
 from accelstudy.campaign.importing.noise import shown
 from accelstudy.campaign.importing.recording import SDS, Log, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
@@ -68,10 +67,8 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
             columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
             warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
     columns |= {k: rows[k].to_numpy() for k in ("time", "temperature", "vibration") if k in rows}
-    warnings += far_from_gravity(settings, forces)
     if settings.robot is not None:
-        given, signs = settings.robot.unit, frame.signs
-        unit = UNITS["rad"][given]
+        unit, signs = UNITS["rad"][settings.robot.unit], frame.signs
         angles = np.column_stack([rows[key] for key in ANGLES]) * signs[:2]
         columns |= {"angles": angles * unit, "sigma_angle": settings.robot.angle_sigma_mgon * MGON}
         if "yaw" in rows:
@@ -80,7 +77,7 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
     layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
     sigma = columns.get("sigma_force")
     said = f"sigma of a mean: {'unknown' if sigma is None else shown(sigma)}"
-    campaign = imported_campaign(
+    return imported_campaign(
         path,
         settings,
         forces,
@@ -89,14 +86,6 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
         warnings=tuple(warnings),
         **columns,
     )
-    if settings.robot is not None and (
-        better := better_angles(angles, given, forces, campaign.gravity)
-    ):
-        right = "another `frame`" if better == OPPOSITE else f"`robot_unit` {better}"
-        raise InputError(
-            f"{path}: the robot's angles do not fit the forces in {given}; {right} would be right"
-        )
-    return campaign
 
 
 def _rows(log: Log, settings: ImportSettings) -> tuple[pd.DataFrame, list[str]]:
