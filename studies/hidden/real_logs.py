@@ -24,9 +24,10 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.designs import ANGLE_SIGMA, GRAVITY, Array, Course, Session, joints_of
+from studies.hidden.physics.designs import ANGLE_SIGMA, Course, Session
 from studies.hidden.physics.effects import EFFECTS
-from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Settings
+from studies.hidden.physics.geometry import GRAVITY, Array, joints_of
+from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Setting
 from studies.hidden.physics.measuring import Sensor
 
 Spans = NDArray[np.int_]
@@ -38,9 +39,9 @@ PUT: Mapping[str, Kind] = {
     BUMPED: Kind(
         BUMPED,
         "output",
-        2e-2,
-        lambda p, f, s, x: p * (np.arange(x.n) == s["row"])[:, None],
-        settings=Settings(lambda x, rng: {"row": float(rng.integers(x.n))}),
+        "p * (number == row)",
+        typical=2e-2,
+        row=Setting(lambda x, rng: float(rng.integers(x.n))),
     ),
 }
 """What can be put into a log: effects of the sensor, and a bumped hold."""
@@ -158,7 +159,7 @@ class Donor:
     ) -> Cause:
         """Draw an effect that has a noncentrality in the log."""
         kind, atlas = PUT[name], self.atlas(self.spans, course, self.sigma)
-        settings = kind.settings.draw(atlas.session, rng)
+        settings = kind.draw(atlas.session, rng)
         if "t" in settings:  # between two holds: what jumps within one is another effect
             starts, ends = self.spans.T
             between = (self.time[ends[:-1] - 1] + self.time[starts[1:]]) / 2

@@ -23,8 +23,9 @@ from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import ModelName
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates
-from studies.hidden.physics.designs import Array, Course
+from studies.hidden.physics.designs import Course
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
+from studies.hidden.physics.geometry import Array
 from studies.hidden.physics.oracle import Oracle
 from studies.hidden.real_logs import BUMPED, PUT, Donor, p_value, residuals, spans_of
 from studies.hidden.study import Job, Study
@@ -138,7 +139,7 @@ class LogCase(Case):
 def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
     """Put effects into a log, and import it."""
     rng, course, columns = np.random.default_rng(seed), None, dict[str, Array]()
-    if any("course" in PUT[name].needs for name in case.effect) or not case.effect:
+    if any("temperature" in PUT[name].needs for name in case.effect) or not case.effect:
         course = _course(float(log.time[-1]), rng)
     sizes = [*zip(case.effect, case.lam, strict=True)]
     causes = [log.drawn(name, lam, course, rng) for name, lam in sizes]

@@ -9,10 +9,11 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import GRAVITY, Array, Session, session
+from studies.hidden.physics.designs import Session, session
 from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.geometry import GRAVITY, Array, level_force
 from studies.hidden.physics.kinds import Cause, Kind
-from studies.hidden.physics.measuring import Sensor, level_force, observe
+from studies.hidden.physics.measuring import Sensor, observe
 
 STEP = 1e-5
 """rad, of numerical derivatives by the angles."""
@@ -172,7 +173,7 @@ class Atlas:
             self.shape(effect, settings)
             for effect in EFFECTS.values()
             if effect.shows(self.session)
-            for settings in effect.settings.grid(self.session)
+            for settings in effect.grid(self.session)
         )
         return tuple(shape for shape in candidates if shape is not None)
 

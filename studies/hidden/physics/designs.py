@@ -7,18 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import permutations, product
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import MGON
+from studies.hidden.physics.geometry import GRAVITY, Array, joints_of, level_force, rotated
 
-Array = NDArray[np.float64]
-T = TypeVar("T")
-
-GRAVITY = 9.80665
-"""m/s², at the place of all sessions."""
 REFERENCE = 20.0
 """°C, at which bias and scale have their stated values."""
 
@@ -114,15 +109,9 @@ class Session:
         return change if np.mean(change != 0) > 0.5 else None
 
     @cached_property
-    def way(self) -> Array:
-        """Way that the joints, yaw included, have moved to each hold, rad; 0 for the first."""
-        joints = np.column_stack([self.joints, self.yaw])
-        return np.sum(abs(np.diff(joints, axis=0, prepend=joints[:1])), axis=1)
-
-    @cached_property
     def repeats(self) -> bool:
         """Whether a third of the holds, or more, repeat the attitude of another one."""
-        directions = np.round(_unit_forces(self.joints), 2)
+        directions = np.round(level_force(self.joints) / GRAVITY, 2)
         return len(np.unique(directions + 0.0, axis=0)) <= 2 * self.n / 3
 
     @cached_property
@@ -134,45 +123,6 @@ class Session:
     def duration(self) -> float:
         """From the first hold to the last, as the clock has it."""
         return float(self.clock[-1] - self.clock[0])
-
-    @property
-    def part(self) -> Array:
-        """Time of the holds as a part of the length of the session."""
-        return self.clock / self.duration
-
-    @property
-    def shaking(self) -> Array:
-        """Vibration of the holds over its mean."""
-        vibration = _needed(self.vibration)
-        return vibration / vibration.mean()
-
-    @property
-    def rate(self) -> Array:
-        """Rate of the temperature of the holds, K per 10 min."""
-        return _needed(self.warming) * 600
-
-    @property
-    def part_of_range(self) -> Array:
-        """Temperature of the holds as a part of the range of the session, 0 to 1."""
-        values = _needed(self.course).values
-        return (_needed(self.temperature) - values.min()) / np.ptp(values)
-
-    @property
-    def since_start(self) -> Array:
-        """Temperature of the holds less that at the start, over the range of the session."""
-        values = _needed(self.course).values
-        return (_needed(self.temperature) - values[0]) / np.ptp(values)
-
-    def warmth(self, tau: float = 0.0) -> Array:
-        """Temperature above `REFERENCE` of a body with a lag of `tau` seconds, (n, 1), K."""
-        return _needed(self.course).lagged(_needed(self.time), tau)[:, None] - REFERENCE
-
-
-def _needed(value: T | None) -> T:
-    """Return what a session has to have for a kind of physics."""
-    if value is None:
-        raise ValueError("the session does not have what a kind of physics needs")
-    return value
 
 
 ANGLE_SIGMA = 3.2 * MGON
@@ -213,19 +163,6 @@ def _three_circles() -> Array:
     angle = np.arange(8) * np.pi / 4
     circle = np.round(np.column_stack([np.cos(angle), np.sin(angle), np.zeros(8)]), 15)
     return np.asarray(np.concatenate([np.roll(circle, shift, axis=1) for shift in range(3)]))
-
-
-def joints_of(directions: Array) -> Array:
-    """Roll and pitch of the directions of specific forces (n, 3), as (n, 2), rad."""
-    x, y, z = directions.T + 0.0  # no negative zeros, for which roll would turn by half a turn
-    return np.column_stack([np.arctan2(-y + 0.0, -z + 0.0), np.arctan2(x, np.hypot(y, z))])
-
-
-def _unit_forces(joints: Array) -> Array:
-    """Directions (n, 3) of the specific force at roll and pitch (n, 2); undoes `joints_of`."""
-    roll, pitch = joints.T
-    level = np.cos(pitch)
-    return np.column_stack([np.sin(pitch), -level * np.sin(roll), -level * np.cos(roll)])
 
 
 def _by_hand(directions: Array, rng: np.random.Generator) -> Array:
@@ -336,32 +273,3 @@ def session(design: str) -> Session:
     """The session of a design; the same whenever it is asked for."""
     made = _DESIGNS[design](np.random.default_rng(zlib.crc32(design.encode())))
     return replace(made, name=design)
-
-
-def in_turned_frame(vectors: Array, axis: int, angle: ArrayLike) -> Array:
-    """Components of vectors (..., 3) in a frame that is turned about one of its axes.
-
-    Parameters
-    ----------
-    vectors : (..., 3) array
-    axis : int, 0, 1 or 2
-    angle : (...) array, rad, right-handed
-    """
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    cos, sin = np.cos(angle), np.sin(angle)
-    shape = np.broadcast_shapes(vectors.shape[:-1], np.shape(angle))
-    turned = np.empty((*shape, 3))
-    turned[..., axis] = vectors[..., axis]
-    turned[..., i] = cos * vectors[..., i] + sin * vectors[..., j]
-    turned[..., j] = cos * vectors[..., j] - sin * vectors[..., i]
-    return turned
-
-
-def rotated(vectors: Array, rotation: Array) -> Array:
-    """Vectors (..., 3) rotated by rotation vectors (..., 3), rad (Rodrigues)."""
-    vectors, rotation = np.broadcast_arrays(vectors, rotation)
-    half = np.sqrt(np.sum(rotation**2, axis=-1, keepdims=True)) / (2 * np.pi)
-    along = np.cross(rotation, vectors)
-    # sin(a)/a and (1 - cos(a))/a², which are regular at 0.
-    back = np.cross(rotation, along)
-    return vectors + np.sinc(2 * half) * along + np.sinc(half) ** 2 / 2 * back

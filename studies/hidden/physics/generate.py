@@ -14,8 +14,8 @@ import numpy as np
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.designs import GRAVITY, Array
 from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.geometry import GRAVITY, Array
 from studies.hidden.physics.gross import GROSS
 from studies.hidden.physics.kinds import Cause, Place
 from studies.hidden.physics.measuring import Noise, Sensor, observe
@@ -247,10 +247,10 @@ def drawn(
     effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
         parameters = effect.typical * rng.standard_normal((1, effect.k))
-        return Cause(effect, effect.settings.draw(conditions.session, rng), parameters), (name,)
+        return Cause(effect, effect.draw(conditions.session, rng), parameters), (name,)
     if effect.shows(of_design.session):
         for _ in range(DRAWS):
-            shape = of_design.shape(effect, effect.settings.draw(of_design.session, rng))
+            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
             if shape is None:
                 continue
             cause, change = _scaled(shape, lam, conditions, rng)

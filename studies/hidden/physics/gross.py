@@ -11,7 +11,7 @@ import numpy as np
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
 from studies.hidden.physics.atlas import Conditions
-from studies.hidden.physics.designs import GRAVITY, Array
+from studies.hidden.physics.geometry import GRAVITY, Array
 
 Random = np.random.Generator
 Changed = tuple[Campaign, dict[str, float]]

@@ -1,75 +1,213 @@
-"""What a kind of physics is: a function, what it changes, what it needs, and how it is drawn."""
+"""What a kind of physics is: a formula, what it changes, and how its settings are drawn.
+
+A formula is an expression of the parameters p (B, 1, k), the forces f (B, n, 3) along the axes, the
+settings of the kind, and what is known of the holds: `COORDINATES` in columns, (n, 1), with the
+functions of `VOCABULARY`. So a kind needs of a session what its formula names.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from studies.hidden.physics.designs import Array, Session
+from studies.hidden.physics.designs import REFERENCE, Session
+from studies.hidden.physics.geometry import GRAVITY, Array, flange_force
 
 Place = tuple[str, str]
 """Coordinate and target of a function."""
 
-OUTPUTS = ("output", "clipping")
-"""Targets of the sensor: what its output gains, by the force along its axes or by the output."""
+OUTPUTS = ("bias", "scale", "output", "clipping")
+"""Targets of the sensor: what its output gains, by the force along its axes or, in the end, by the
+output itself."""
 RIG: Mapping[str, Array | float] = {
     "gravity": 0.0,
-    "tilt": np.zeros(3),
+    "tilt": np.zeros(2),
     "skew": 0.0,
     "deflection": 0.0,
     "mounting": np.zeros(3),
     "reading": 0.0,
 }
-"""Targets of the rig, as in an ideal one: gravity less the stated one, m/s²; rotation of the base
-(B, n, 3); turn of the roll axis against the pitch axis (B, n); attitude of the flange less that of
-the joints (B, n, 2); rotation of the sensor on it (B, n, 3); errors of the encoders (B, n, 2)."""
+"""Targets of the rig, as in an ideal one: gravity less the stated one, m/s²; tilt of the base, by
+which it sees g (a, b, −1) for g (0, 0, −1), (B, n, 2); turn of the roll axis against the pitch axis
+(B, n); attitude of the flange less that of the joints (B, n, 2); rotation of the sensor on it
+(B, n, 3); errors of the encoders (B, n, 2)."""
+USUAL: Mapping[str, tuple[int, float]] = {
+    "bias": (3, 5e-3), "scale": (3, 5e-4), "output": (3, 2e-3), "clipping": (3, 5e-2),
+    "gravity": (1, 3e-3), "tilt": (2, 5e-4), "skew": (1, 3e-4), "deflection": (2, 2e-4),
+    "mounting": (3, 1e-3), "reading": (2, 2e-4),
+}  # fmt: skip
+"""Target -> number of parameters and usual size of one, SI, where a kind has no other."""
 OF_ROBOT = ("angle", "yaw", "move")
 """Coordinates that a campaign without the robot's angles does not have."""
-COUNTS = {"output": 3, "clipping": 3, "gravity": 1, "tilt": 2, "skew": 1, "deflection": 2,
-          "mounting": 3, "reading": 2}  # fmt: skip
-"""Target -> its number of parameters, where a kind has no other."""
+STILL = 0.02
+"""m/s², a step between holds that is too small for any effect."""
+
+# --- formulas -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a kind: a random draw, and a grid that covers all there may be."""
-
-    draw: Callable[[Session, np.random.Generator], dict[str, float]] = lambda x, rng: {}
-    grid: Callable[[Session], list[dict[str, float]]] = lambda x: [{}]
+def before(values: Array) -> Array:
+    """Values (..., n, c) of the hold before each; of the first one, 0."""
+    return np.concatenate([0 * values[..., :1, :], values[..., :-1, :]], axis=-2)
 
 
-@dataclass(frozen=True)
+def after(values: Array) -> Array:
+    """Values (..., n, c) of the hold after each; of the last one, its own."""
+    return np.concatenate([values[..., 1:, :], values[..., -1:, :]], axis=-2)
+
+
+def moves(values: Array) -> Array:
+    """Changes of values (..., n, c) from the hold before each; of the first one, 0."""
+    return np.diff(values, axis=-2, prepend=values[..., :1, :])
+
+
+def steps(f: Array) -> Array:
+    """Changes of forces (B, n, 3) from hold to hold; of those that keep still, 0."""
+    return np.where(abs(moves(f)) < STILL, 0.0, moves(f))
+
+
+def memory(f: Array, kept: float) -> Array:
+    """What is left of the forces (B, n, 3) of all holds before, of which each keeps a share."""
+    left: Array = np.zeros(f.shape)
+    for i in range(1, f.shape[1]):
+        left[:, i] = kept * left[:, i - 1] + (1 - kept) * f[:, i - 1]
+    return left
+
+
+def beside(*columns: Array) -> Array:
+    """Join columns (..., 1)."""
+    return np.concatenate(np.broadcast_arrays(*columns), axis=-1)
+
+
+def flips(seed: float, n: int) -> Array:
+    """Of n holds 0 or 1, which changes in one of four, (n, 1)."""
+    return np.asarray(np.cumsum(np.random.default_rng(int(seed)).random(n) < 0.25)[:, None] % 2.0)
+
+
+def stays(seed: float, n: int) -> Array:
+    """Of n holds −1, 0 or 1, which stays for two to five, (n, 1)."""
+    rng = np.random.default_rng(int(seed))
+    return np.asarray(1.0 * np.repeat(rng.integers(-1, 2, n), rng.integers(2, 6, n))[:n, None])
+
+
+def walk(seed: float, part: Array) -> Array:
+    """Random walk over parts of a session."""
+    way = np.cumsum(np.random.default_rng(int(seed)).standard_normal(24))
+    return np.interp(part, np.linspace(-0.1, 1.2, 24), way - way.mean())
+
+
+TURN = 2 * np.pi
+VOCABULARY: dict[str, Any] = {
+    **{name: getattr(np, name) for name in (
+        "abs", "sign", "sin", "cos", "tanh", "cosh", "exp", "expm1", "log1p", "pi", "where",
+        "maximum", "clip", "array",
+    )},
+    **{f.__name__: f for f in (before, after, moves, steps, memory, beside, flips, stays, walk,
+                               flange_force)},
+    "g": GRAVITY,
+    "TURN": TURN,
+    "next_axis": lambda f: np.roll(f, -1, axis=-1),
+    "last_axis": lambda f: np.roll(f, 1, axis=-1),
+    "prod": lambda f: np.prod(f, axis=-1, keepdims=True),
+    "centred": lambda values: values - values.mean(axis=0),
+}  # fmt: skip
+"""What a formula may use of whatever session."""
+COORDINATES: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
+    "n": ("", lambda x: x.n),
+    "number": ("", lambda x: np.arange(x.n)),
+    "joints": ("", lambda x: x.joints),
+    "roll": ("", lambda x: x.joints[:, 0]),
+    "pitch": ("", lambda x: x.joints[:, 1]),
+    "yaw": ("", lambda x: x.yaw),
+    # Way that the joints, yaw included, have moved to each hold, rad; 0 for the first.
+    "way": ("", lambda x: abs(moves(np.column_stack([x.joints, x.yaw]))).sum(axis=1)),
+    "clock": ("", lambda x: x.clock),
+    "duration": ("", lambda x: x.duration),
+    "time": ("time", lambda x: x.time),
+    "part": ("time", lambda x: x.time / x.duration),
+    "vibration": ("vibration", lambda x: x.vibration),
+    "shaking": ("vibration", lambda x: x.vibration / x.vibration.mean()),
+    # Temperature above `REFERENCE` of a body with a lag of so many seconds, K.
+    "warmth": ("temperature",
+               lambda x: lambda tau=0.0: x.course.lagged(x.time, tau)[:, None] - REFERENCE),
+    # Temperature over the range of the session, from its least or that at the start.
+    "in_range": ("temperature",
+                 lambda x: (x.temperature - x.course.values.min()) / np.ptp(x.course.values)),
+    "since_start": ("temperature",
+                    lambda x: (x.temperature - x.course.values[0]) / np.ptp(x.course.values)),
+    "rate": ("warming", lambda x: x.warming * 600),  # K per 10 min
+}  # fmt: skip
+"""What a formula may use of a session -> the attribute that this takes, and how it is found."""
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+class Setting(NamedTuple):
+    """A setting of a kind: a random draw, and a grid that covers all there may be."""
+
+    draw: Callable[[Session, np.random.Generator], float]
+    grid: Callable[[Session], Sequence[float]] = lambda x: ()
+
+
+def between(low: float, high: float) -> Setting:
+    """Anything between two bounds."""
+    return Setting(lambda x, rng: rng.uniform(low, high))
+
+
+def one_of(*values: float) -> Setting:
+    """One of some values."""
+    return Setting(lambda x, rng: float(rng.choice(values)), lambda x: values)
+
+
+PHASE = between(0, TURN)
+SEED = Setting(lambda x, rng: float(rng.integers(1 << 31)))
+"""Of what is random in itself."""
+
+# --- kinds ----------------------------------------------------------------------------------------
+
+
 class Kind:
     """One kind of physics.
 
     Attributes
     ----------
     name : str, canonical, if the catalogue has it
-    target : str, of `OUTPUTS` or `RIG`
+    target : str, of `USUAL`
+    code : the formula, which gives the change of the target
+    coordinate : str, if it is a function of one coordinate of the holds; empty else
     typical : float, usual size of a parameter, SI
-    function : change of the target by parameters p (B, 1, k), forces f (B, n, 3), settings s and
-        the session x
-    needs : attributes of a session without which it does not exist
-    settings : Settings
-    place : coordinate and target, if it is a function of one coordinate that changes one `FACTORS`
-    count : int, number of parameters k
+    k : int, number of parameters
+    settings : mapping of str to Setting
+    needs : set of the attributes of a session without which it does not exist
     """
 
-    name: str
-    target: str
-    typical: float
-    function: Callable[..., Array]
-    needs: tuple[str, ...] = ()
-    settings: Settings = Settings()
-    place: Place | None = None
-    count: int = 0
+    def __init__(
+        self,
+        name: str,
+        target: str,
+        formula: str,
+        coordinate: str = "",
+        *,
+        typical: float | None = None,
+        count: int | None = None,
+        **settings: Setting,
+    ) -> None:
+        self.name, self.target, self.coordinate = name, target, coordinate
+        k, size = USUAL[target]
+        self.k, self.typical, self.settings = count or k, typical or size, settings
+        self.code = compile(formula, name, "eval")
+        self.needs = {COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES} - {
+            ""
+        }
 
     @property
-    def k(self) -> int:
-        """Number of parameters."""
-        return self.count or COUNTS[self.target]
+    def place(self) -> Place | None:
+        """Coordinate and target; to turn the flange is to misread the joints."""
+        target = "reading" if self.target == "deflection" else self.target
+        return (self.coordinate, target) if self.coordinate else None
 
     def shows(self, session: Session) -> bool:
         """Whether a session has what it needs."""
@@ -77,7 +215,16 @@ class Kind:
 
     def has_place(self, robot: bool) -> bool:
         """Whether it has a place whose coordinate a campaign records, with the robot or without."""
-        return self.place is not None and (robot or self.place[0] not in OF_ROBOT)
+        return self.place is not None and (robot or self.coordinate not in OF_ROBOT)
+
+    def draw(self, session: Session, rng: np.random.Generator) -> dict[str, float]:
+        """Draw its settings."""
+        return {name: one.draw(session, rng) for name, one in self.settings.items()}
+
+    def grid(self, session: Session) -> list[dict[str, float]]:
+        """Settings that cover all there may be."""
+        grids = (one.grid(session) for one in self.settings.values())
+        return [dict(zip(self.settings, values, strict=True)) for values in product(*grids)]
 
 
 @dataclass(frozen=True)
@@ -90,26 +237,13 @@ class Cause:
 
     def change(self, force: Array | None, session: Session) -> Array:
         """What it adds to its target."""
-        return self.kind.function(self.parameters[:, None, :], force, self.settings, session)
+        names: dict[str, Any] = {"p": self.parameters[:, None, :], "f": force, **self.settings}
+        for name in {*self.kind.code.co_names} & {*COORDINATES}:
+            value = COORDINATES[name][1](session)
+            names[name] = value[:, None] if np.ndim(value) == 1 else value
+        return np.asarray(eval(self.kind.code, VOCABULARY, names))
 
 
 def table(*kinds: Kind) -> dict[str, Kind]:
     """Kinds by name."""
     return {kind.name: kind for kind in kinds}
-
-
-def tilted(p: Array) -> Array:
-    """Rotations (B, n, 3) by which the base sees g (a, b, −1) for g (0, 0, −1), of a and b."""
-    return np.stack([p[..., 1], -p[..., 0], np.zeros(p.shape[:-1])], axis=-1)
-
-
-STILL = 0.02
-"""m/s², a step between holds that is too small for any effect."""
-
-
-def steps_of(f: Array) -> Array:
-    """Steps from hold to hold of forces (B, n, 3); of those that keep still, 0."""
-    step = np.zeros(f.shape)
-    step[:, 1:] = f[:, 1:] - f[:, :-1]
-    step[abs(step) < STILL] = 0
-    return step

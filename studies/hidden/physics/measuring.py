@@ -7,29 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.hidden.physics.designs import GRAVITY, Array, Session, in_turned_frame, rotated
+from studies.hidden.physics.designs import Session
+from studies.hidden.physics.geometry import GRAVITY, Array, flange_force, rotated, tilted
 from studies.hidden.physics.kinds import OUTPUTS, RIG, Cause
-
-
-def flange_force(
-    joints: Array, yaw: Array | float, force: Array, skew: Array | float = 0.0
-) -> Array:
-    """Specific force in the frame of the flange, (..., 3), of one in the frame of the base.
-
-    Parameters
-    ----------
-    joints : (..., 2) array, rad, roll and pitch
-    yaw : (...) array, rad
-    force : (..., 3) array, m/s²
-    skew : (...) array, rad, by which the roll axis is turned about z against the pitch axis
-    """
-    turned = in_turned_frame(in_turned_frame(force, 2, yaw), 1, joints[..., 1])
-    return in_turned_frame(in_turned_frame(turned, 2, skew), 0, joints[..., 0])
-
-
-def level_force(joints: Array) -> Array:
-    """Specific force in a flange at roll and pitch (..., 2) on a level base, (..., 3)."""
-    return flange_force(joints, 0.0, GRAVITY * np.array([0.0, 0.0, -1.0]))
 
 
 @dataclass(frozen=True)
@@ -75,16 +55,15 @@ def observe(session: Session, sensor: Sensor, causes: Sequence[Cause]) -> tuple[
             rig[cause.kind.target] = rig[cause.kind.target] + cause.change(None, session)
     batch = max((len(cause.parameters) for cause in causes), default=1)
     down = np.broadcast_to([0.0, 0.0, -1.0], (batch, 1, 3))
-    base = rotated((GRAVITY + rig["gravity"]) * down, np.asarray(rig["tilt"]))
+    base = rotated((GRAVITY + rig["gravity"]) * down, tilted(np.asarray(rig["tilt"])))
     force = flange_force(session.joints + rig["deflection"], session.yaw, base, rig["skew"])
     along = rotated(force, np.asarray(rig["mounting"])) @ sensor.axes.T
     output = (1 + sensor.scale) * along + sensor.bias
     # What clips, clips what all else has made of the force.
-    for target in OUTPUTS:
-        for cause in causes:
-            if cause.kind.target == target:
-                force = output if target == "clipping" else along
-                output = output + cause.change(force, session)
+    of_output = (cause for cause in causes if cause.kind.target in OUTPUTS)
+    for cause in sorted(of_output, key=lambda cause: cause.kind.target == "clipping"):
+        force = output if cause.kind.target == "clipping" else along
+        output = output + cause.change(force, session)
     return output, session.joints + rig["reading"] + np.zeros((len(output), 1, 1))
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, softmax
 
 from studies.hidden.physics.atlas import Atlas, atlas
-from studies.hidden.physics.designs import Array
+from studies.hidden.physics.geometry import Array
 from studies.hidden.physics.outside import NOWHERE
 
 Class = tuple[str, ...]
@@ -194,7 +194,7 @@ def visible_outside(design: str, approach: str) -> tuple[str, ...]:
         # No kind changes what another one draws.
         rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
         for _ in range(DRAWS):
-            shape = knowing.atlas.shape(effect, effect.settings.draw(session, rng))
+            shape = knowing.atlas.shape(effect, effect.draw(session, rng))
             if shape is not None:
                 direction = rng.standard_normal(shape.dim)
                 outside += knowing.is_outside(shape.basis @ direction)

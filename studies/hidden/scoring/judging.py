@@ -13,7 +13,7 @@ import pandas as pd
 from accelstudy.effects import effect_names
 from studies.hidden.physics.designs import DESIGNS, session
 from studies.hidden.physics.oracle import CREDIBLE
-from studies.hidden.physics.outside import place_of
+from studies.hidden.physics.outside import NOWHERE
 from studies.hidden.study import Row, family_of
 
 Class = Sequence[str]
@@ -102,6 +102,7 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
     oracle = bool(true) and not pd.isna(row["oracle_detected"])
     found = oracle and bool(row["oracle_detected"])
     top: Row = explanations[0] if explanations else {"names": [], "posterior": np.nan}
+    strange = NOWHERE.get(row["what"])
     true_noise = row["design"] in DESIGNS  # of a log it is not known
     judged = {
         "ok": ok,
@@ -131,7 +132,7 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "oracle_found": found,
         "oracle_right": found and same_effects(row["oracle_best"], true),
         "told_right": oracle and same_effects(row["oracle_told"], true),
-        "its_place": ", ".join(place_of(row["what"]) or ("–",)),
+        "its_place": ", ".join(strange.place if strange and strange.place else ("–",)),
         "has_place": place is not None,
         "learnable": place is not None and place[0] in LEARNABLE.get(place[1], ()),
         "place_right": learned and place is not None and row["place"] == place,
