@@ -1,4 +1,4 @@
-"""Each effect, noise effect and gross error of the catalogue through the commands, pages included.
+"""Effects of each family, noise effects and gross errors through the commands, pages included.
 
 What is registered is taken from the registries, so that something new is covered by itself.
 """
@@ -10,15 +10,17 @@ from calling import call
 from page_helpers import assert_sound, text_of
 
 from accelstudy.campaign.gross_errors import gross_error_names
-from accelstudy.effects import effect_names
+from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import noise_effect_names
 from accelstudy.sensors.models import get_model
 
 BASE = {effect.name for effect in get_model("bias-scale-nonorthogonality").effects}
 HOLDS = ("--temperature", "15:40", "--temperature-order", "random", "--vibration", "0:1",
          "--yaw", "random", "--order", "random")  # fmt: skip
+FAMILIES = {get_effect(name).family or name: name for name in effect_names() if name not in BASE}
+"""An effect of each family; those of one family look alike to all that follows."""
 ADDED = [
-    *(("--effect", name) for name in effect_names() if name not in BASE),
+    *(("--effect", name) for name in FAMILIES.values()),
     *(("--noise-effect", name) for name in noise_effect_names()),
     *(("--gross-error", name) for name in gross_error_names()),
 ]

@@ -98,7 +98,8 @@ def write_inputs(shell, texts):
 def walk(folder, commands, skipped=SKIPPED, **options) -> Texts:
     """Transcripts of lists of commands, {name: commands}, one after the other in one folder."""
     shell = Shell(folder, skipped, **options)
-    write_inputs(shell, "\n".join(line for each in commands.values() for line in each))
+    lines = [line for each in commands.values() for line in each]
+    write_inputs(shell, "\n".join(line for line in lines if not shell.reason_to_skip(line)))
     for name, lines in commands.items():
         yield name, shell.transcript(lines)
 

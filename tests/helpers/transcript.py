@@ -150,9 +150,8 @@ class Shell:
 
     def told(self, command):
         """A command with its exit status, what it printed (>), warned (!) and wrote (---)."""
-        for beginning, why in self.skipped.items():
-            if re.match(rf"{beginning}(?=\s|$)", command):
-                return f"=== {command}\nnot run: {why}\n\n"
+        if why := self.reason_to_skip(command):
+            return f"=== {command}\nnot run: {why}\n\n"
         before = self._files()
         status, printed, warned = self.run(command)
         if command.startswith("snakemake ") and not status:
@@ -170,6 +169,11 @@ class Shell:
                 name = f"{path.relative_to(self.top)}{f' ({more} more like it)' if more else ''}"
                 lines += [f"--- {name}", *file_text(path).splitlines()]
         return masked("\n".join([*lines, "\n"]), self.top)
+
+    def reason_to_skip(self, command):
+        """Why a command is not run; None if it is."""
+        skipped = self.skipped.items()
+        return next((why for x, why in skipped if re.match(rf"{x}(?=\s|$)", command)), None)
 
     def _files(self):
         if not self.files:
