@@ -34,8 +34,6 @@ def designs():
 
 @pytest.mark.parametrize(("approach", "level", "wanted"), [
     ("robot", Level.given(), GIVEN),
-    ("robot", Level.unknown(), NOT_GIVEN),
-    ("gravity", Level.given(), GIVEN),
     ("gravity", Level.unknown(), NOT_GIVEN),
     ("gravity", Level.within_holds(), NOT_GIVEN),
 ])  # fmt: skip

@@ -35,7 +35,7 @@ def tolerance(share, n=N):
 def test_the_level_is_kept_with_noise_of_any_kind(dof, noise):
     rng = np.random.default_rng(1)
     true = [s**2 * cofactors(rng, n) for s, n in zip(noise, (40, 25), strict=True)]
-    n = 400
+    n = 200
     each = zip(differences(rng, sum(true), n), *(estimated(rng, r, n) for r in dof), strict=True)
     rejected = [not Epochs(d, (v * true[0], w * true[1]), dof).test().congruent for d, v, w in each]
     assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, n)
@@ -65,7 +65,7 @@ def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, rat
 
     With degrees of freedom by the estimated shares it was 0.23 with 10 positions, 0.11 with 12.
     """
-    rng, draws = np.random.default_rng(5), 400
+    rng, draws = np.random.default_rng(5), 200
     sessions = []
     for rows, sigma in ((design(n, each=False), ratio), (design(24, each=True), 1.0)):
         solve = np.linalg.pinv(rows)
@@ -97,7 +97,7 @@ def test_a_detectable_change_is_found_about_as_often_as_is_said(dof, least):
     q = cofactors(rng, 40)
     change = np.zeros(P)
     change[3] = Epochs(change, (q, q), (dof, dof)).detectable()[3]
-    n = 400
+    n = 200
     drawn = differences(rng, 2 * q, n) + change
     variances = zip(estimated(rng, dof, n), estimated(rng, dof, n), strict=True)
     found = [not Epochs(d, (v * q, w * q), (dof, dof)).test().congruent

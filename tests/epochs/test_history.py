@@ -54,7 +54,7 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
 def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
     """A change where there is none, and a scatter beside a drift."""
     sure = np.isinf(dof).all()
-    n = 300 if sure else 120
+    n = 300 if sure else 60
     still = [c.p_values()[0] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof)]
     drifting = [c.p_values()[2] < LEVEL for c in drawn(1, sigmas, n=n, dof=dof, rate=3.0)]
     for found in (still, drifting):
@@ -85,7 +85,7 @@ def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
     """Independent scatter is what the usual interval takes it for: it holds far too seldom."""
     rng = np.random.default_rng(6)
     years = np.linspace(-3, 0, n_sessions)
-    ones, rate, level, n = np.ones(n_sessions), 0.4, LEVEL / 9, 300
+    ones, rate, level, n = np.ones(n_sessions), 0.4, LEVEL / 9, 150
     usual, wandering, named = 0, 0, []
     for _ in range(n):
         walk = 100 * np.sqrt(np.diff(years)) * rng.standard_normal(n_sessions - 1)
@@ -110,7 +110,7 @@ def test_all_tests_have_one_level(true):
     rng = np.random.default_rng(3)
     root = np.linalg.cholesky(np.linalg.inv(np.cov(rng.standard_normal((9, 30)))))
     variances = np.outer(UNEQUAL**2, np.sum(root**2, axis=1))
-    n, many = 120, 0 if true is None else 3
+    n, many = 60, 0 if true is None else 3
     right = {"changed"} if true is None else {"changed", true}
     wrong = 0
     for _ in range(n):
@@ -129,9 +129,9 @@ def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
     for size in (
         {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
     ):  # fmt: skip
-        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, n=300, dof=dof, **size)]
+        found = [c.p_values(0.01)[0] < 0.01 for c in drawn(4, sigmas, n=150, dof=dof, **size)]
         # With estimated sigmas, and of the scatter with unequal ones, the distribution is near it.
-        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 300) + 0.03)
+        assert np.mean(found) == pytest.approx(POWER, abs=tolerance(POWER, 150) + 0.03)
 
 
 YEARS = ("2023-01-01", "2023-07-01", "2024-01-01", "2024-06-30", "2025-01-01")

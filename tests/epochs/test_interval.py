@@ -13,7 +13,7 @@ from accelstudy.epochs.history import YEAR, history_of
 from accelstudy.epochs.interval import LONGEST, Interval
 
 G = 9.80665
-N = 80
+N = 40
 CONFIDENCE = 0.9
 AT = np.array([-2.5, -2.0, -1.4, -0.9, -0.5, 0.0])
 """Years of the sessions."""

@@ -339,7 +339,7 @@ def test_the_interval_of_a_scatter_holds_it():
     assert held / n == pytest.approx(0.95, abs=STANDARD_ERRORS * np.sqrt(0.95 * 0.05 / n))
 
 
-N_LOT = 7
+N_LOT = 6
 
 
 @pytest.mark.usefixtures("composed")
