@@ -7,8 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.claims.judging import is_claimed, judge, papers_reductions
-from accelstudy.study.claims.reductions import reductions
+from accelstudy.study.claims.verdicts import is_claimed, judge
 from accelstudy.study.config import Study, read_study
 from accelstudy.study.replicates import Replicates
 from accelstudy.study.results import simulated_tables
@@ -51,6 +50,5 @@ def study_tables(study: Study) -> dict[str, pd.DataFrame]:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        reduced = reductions(calibrations, papers_reductions())
-        tables["claims"], tables["claims_by_scheme"] = judge(study, tables, reduced)
+        tables["claims"], tables["claims_by_scheme"] = judge(study, tables, calibrations)
     return tables

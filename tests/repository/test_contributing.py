@@ -30,7 +30,7 @@ import pandas as pd
 from click.testing import CliRunner
 
 from accelstudy.commands.main import main
-from accelstudy.study.claims.judging import claim_table, judge_claim
+from accelstudy.study.claims.verdicts import claim_table, judge_claim
 from accelstudy.study.claims.quantities import Evidence
 
 found["captions"] = captions(found["figures"], study)
@@ -45,7 +45,7 @@ correlations = pd.DataFrame(pairs, columns=["parameter_1", "parameter_2", "adjus
 settings = study.sensitivity
 cell = settings.cell("gravity")
 tables = {"correlations": correlations.assign(cell=cell)}
-evidence = Evidence(study, tables, pd.DataFrame(), pd.DataFrame())
+evidence = Evidence(study, tables)
 found["claims"] = [judge_claim(claim_table()["paper"][-1], evidence)]
 
 found["said"] = []

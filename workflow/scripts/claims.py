@@ -1,5 +1,5 @@
 from accelstudy.jobs import job, lists
-from accelstudy.study.claims.judging import TABLES, judge_claims
+from accelstudy.study.claims.verdicts import TABLES, judge_claims
 from accelstudy.study.config import Study
 
 with job(snakemake) as provenance:

@@ -8,6 +8,6 @@ a number. Where one is not met, the verdict says by how much.
 Claims of this project say what simulation adds to linear theory. They are of no section of the
 paper, and hold or not by an interval of 95 %; where that has both, they are not decided.
 
-`claims.yaml` lists the claims, `quantities.py` measures what they are about, and `judging.py`
+`claims.yaml` lists the claims, `quantities.py` measures what they are about, and `verdicts.py`
 applies their rules. To add a claim, add an entry to the list.
 """

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -12,18 +10,20 @@ from accelstudy.basics.wording import interval, number
 
 SWEEP = "config/sweeps/positions.yaml"
 """A study for readers of the claims who want one of their own."""
+Rows = list[dict[Any, str]]
+"""Rows of a table, each with its texts by the heads of the columns."""
 
 
 def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
     """Page (HTML, self-contained) with all claims and their verdicts."""
     from accelstudy.pages import render  # which shows numbers as here
 
-    papers, own = _papers_and_own(claims)
+    papers, own = claim_rows(claims)
     return render(
         "study/claims/page.html.j2",
         papers=papers,
         own=own,
-        schemes=by_scheme.to_dict("records"),
+        schemes=_scheme_rows(by_scheme),
         next_steps=[
             ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
             ("Run it", f"snakemake --cores 2 --configfile {SWEEP}"),
@@ -33,30 +33,36 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
 
 def claims_markdown(claims: pd.DataFrame) -> str:
     """The claims as tables in Markdown, one row each: those of the paper, then of this project."""
-    papers, own = _papers_and_own(claims)
-    lines = [
-        "| section | claim | paper | ours (95 % interval) | verdict | |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in papers:
-        paper = "–" if math.isnan(row["paper"]) else f"{number(row['paper'])}{row['unit']}"
-        lines.append(f"| {row['section']} | {row['statement']} | {paper} | {_judged(row)}")
-    if own:
-        lines += ["", "| claim of this project | found (95 % interval) | verdict | |"]
-        lines += ["|---|---|---|---|"]
-        lines += [f"| {row['statement']} | {_judged(row)}" for row in own]
-    return "\n".join(lines) + "\n"
+    return "\n".join(_markdown(rows) for rows in claim_rows(claims) if rows)
 
 
-def _papers_and_own(claims: pd.DataFrame) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
-    """Claims of the paper, and those of this project, each unit as it follows a number."""
-    shown = claims.assign(unit=["" if u in ("1", "ratio") else f" {u}" for u in claims["unit"]])
-    papers, own = (shown[(shown["section"] != "") == paper] for paper in (True, False))
-    return papers.to_dict("records"), own.to_dict("records")
+def _markdown(rows: Rows) -> str:
+    bold = [{**row, "verdict": f"**{row['verdict']}**"} for row in rows]
+    lines = [[*rows[0]], ["---"] * len(rows[0]), *(row.values() for row in bold)]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
-def _judged(row: Mapping[Any, Any]) -> str:
-    """Number, verdict and sentence, as the last cells of a row in Markdown."""
-    spread = interval(row["ci95_low"], row["ci95_high"])
-    ours = f"{number(row['ours'])}{row['unit']}" + (f" ({spread})" if spread else "")
-    return f"{ours} | **{row['verdict']}** | {row['sentence']} |"
+def claim_rows(claims: pd.DataFrame) -> tuple[Rows, Rows]:
+    """Return what readers see of the claims of the paper, and of those of this project."""
+    papers, own = [], []
+    for claim in claims.to_dict("records"):
+        unit = "" if claim["unit"] in ("1", "ratio") else f" {claim['unit']}"
+        spread = interval(claim["ci95_low"], claim["ci95_high"])
+        ours = f"{number(claim['ours'])}{unit}" + (f" ({spread})" if spread else "")
+        judged = {"verdict": claim["verdict"], "why": claim["sentence"]}
+        if claim["section"]:
+            paper = "–" if pd.isna(claim["paper"]) else f"{number(claim['paper'])}{unit}"
+            said = {"section": claim["section"], "claim": claim["statement"], "paper": paper}
+            papers.append({**said, "ours (95 % interval)": ours, **judged})
+        else:
+            own.append({"claim": claim["statement"], "found (95 % interval)": ours, **judged})
+    return papers, own
+
+
+def _scheme_rows(by_scheme: pd.DataFrame) -> Rows:
+    numbers = ["paper", "mean", "median", "percentile"]
+    texts = by_scheme[["claim", "scheme"]].join(by_scheme[numbers].map(number))
+    ends = zip(by_scheme["single_low"], by_scheme["single_high"], strict=True)
+    texts.insert(5, "range", [interval(*pair) for pair in ends])
+    texts = texts.rename(columns={"percentile": "percentile of the paper's number"})
+    return texts.to_dict("records")

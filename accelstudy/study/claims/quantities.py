@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON
@@ -24,12 +23,12 @@ from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
 from accelstudy.study.config import Study
 from accelstudy.study.config.blocks import SensitivityConfig
+from accelstudy.study.sensitivity import APPROACHES
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]
 
 DRAWS = 200_000
-APPROACHES = ("gravity", "robot")
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
 
@@ -41,15 +40,12 @@ class Evidence:
     Attributes
     ----------
     study : Study, with `sensitivity`
-    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
-    reductions : DataFrame, see `accelstudy.study.claims.reductions`
-    by_scheme : DataFrame, what single simulations show in each scheme; empty while it is made
+    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity, shapley, and
+        by_scheme (see `accelstudy.study.claims.by_scheme`), which is made of the others
     """
 
     study: Study
     tables: Mapping[str, pd.DataFrame]
-    reductions: pd.DataFrame
-    by_scheme: pd.DataFrame
 
     @property
     def settings(self) -> SensitivityConfig:
@@ -70,19 +66,15 @@ class Evidence:
         rows = self.tables[table]
         return rows[rows["cell"] == self.settings.cell(approach, scheme)]
 
-    @cached_property
-    def effects_of_forces(self) -> pd.DataFrame:
-        """Total effects of the forces alone on roll and pitch."""
-        settings = self.settings
-        return leveling_sensitivity(
-            [0, 30, 50],
-            [0],
-            self.study.sigma_force,
-            settings.base_samples,
-            settings.resamples,
-            self.study.seed,
-            g=self.study.gravity_mps2,
-        )
+    def single_simulations(self, claim: str) -> pd.DataFrame:
+        """What single simulations show of a claim, a row each scheme."""
+        rows = self.tables["by_scheme"]
+        return rows[rows["claim"] == claim].set_index("scheme")
+
+
+def estimate(value: float, half: float, **others: Any) -> Numbers:
+    """Return a number with half the width of its 95 % interval."""
+    return {"value": value, "low": value - half, "high": value + half, **others}
 
 
 # --- section 3.1: variance propagation -----------------------------------------------------------
@@ -101,12 +93,10 @@ def sd_of_tilt(
     attitude = np.array([at_roll, at_pitch]) * GON
     force = np.array(specific_force(attitude[0], attitude[1], study.gravity_mps2))
     errors = noise * study.sigma_force * rng.standard_normal((DRAWS, 3))
-    values = ((angles_of(force + errors) - attitude) / MGON)[:, ("roll", "pitch").index(angle)]
-    sd, freedom = float(np.std(values, ddof=1)), DRAWS - 1
-    # Quantiles of χ²; scipy.stats has them too, but is slow to import.
-    low, high = sd * np.sqrt(freedom / (2 * special.gammaincinv(freedom / 2, [0.975, 0.025])))
+    angles = (angles_of(force + errors) - attitude) / MGON
+    sd = float(np.std(angles[:, ("roll", "pitch").index(angle)], ddof=1))
     theory = study.sigma_force / study.gravity_mps2 / MGON
-    return {"value": sd, "low": low, "high": high, "theory": theory}
+    return estimate(sd, Z95 * sd / np.sqrt(2 * DRAWS), theory=theory)
 
 
 def sd_ratio_of_noise(evidence: Evidence, times: float, at_pitch: float) -> Numbers:
@@ -121,9 +111,10 @@ def sd_ratio_of_noise(evidence: Evidence, times: float, at_pitch: float) -> Numb
 
 def effect_of_force(evidence: Evidence, force: str, at_roll: float) -> Numbers:
     """Total effect, %, of one force on roll, among the forces alone."""
-    table = evidence.effects_of_forces
-    at = (table["output"] == "roll") & (table["roll_gon"] == at_roll) & (table["input"] == force)
-    return _largest(table[at])
+    study, settings = evidence.study, evidence.settings
+    samples = settings.base_samples, settings.resamples, study.seed
+    table = leveling_sensitivity([at_roll], [0], study.sigma_force, *samples, g=study.gravity_mps2)
+    return _largest(table[(table["output"] == "roll") & (table["input"] == force)])
 
 
 def largest_effect(
@@ -146,12 +137,15 @@ def largest_effect(
     return numbers
 
 
+def _largest(rows: pd.DataFrame) -> Numbers:
+    row = rows.iloc[int(rows["total_effect"].to_numpy().argmax())]
+    return estimate(100 * float(row["total_effect"]), 100 * float(row["ci95"]))
+
+
 def order_of_inputs(evidence: Evidence) -> Numbers:
     """Share of attitudes, %, at which Shapley effects rank the inputs otherwise, and which."""
-    return {
-        "value": _order(evidence, "gravity")[0],
-        **{name: _order(evidence, name)[1] for name in APPROACHES},
-    }
+    shares, texts = zip(*(_order(evidence, approach) for approach in APPROACHES), strict=True)
+    return {"value": shares[0], **dict(zip(APPROACHES, texts, strict=True))}
 
 
 def _order(evidence: Evidence, approach: str) -> tuple[float, str]:
@@ -164,65 +158,58 @@ def _order(evidence: Evidence, approach: str) -> tuple[float, str]:
         return 0.0, f"no input overtakes another; {text}"
     rank = rows.groupby(attitude)["total_effect"].rank(ascending=False, method="first")
     ranked = rows.assign(over=rows["input"], rank=rank)[[*attitude, "over", "rank"]]
-    first = pairs.merge(ranked, on=[*attitude, "over"])["rank"].min()
+    first = pairs.merge(ranked)["rank"].min()
     winners, losers = (", ".join(sorted(set(pairs[column]))) for column in ("input", "over"))
     share = len(pairs[attitude].drop_duplicates()) / len(rows[attitude].drop_duplicates())
     return 100 * share, f"{winners} overtake {losers}, from rank {first:.0f} down; {text}"
 
 
-def _largest(rows: pd.DataFrame) -> Numbers:
-    """Largest total effect, %, with its 95 % confidence interval."""
-    row = rows.iloc[int(rows["total_effect"].to_numpy().argmax())]
-    value, half = 100 * float(row["total_effect"]), 100 * float(row["ci95"])
-    return {"value": value, "low": value - half, "high": value + half}
-
-
 # --- section 4: gravity-based against robot-aided calibration ------------------------------------
 
 
+def mean_sd(
+    evidence: Evidence, effect: str, approach: str = "gravity", scheme: str = ""
+) -> pd.DataFrame:
+    """Mean sd a posteriori of the parameters of an effect, its standard error `se`, and `truth`."""
+    rows = evidence.rows("summary", approach, scheme).set_index("parameter")
+    names = {"sd_posteriori_mean": "sd", "sd_posteriori_se": "se", "truth": "truth"}
+    parameters = [parameter.name for parameter in get_effect(effect).parameters]
+    return rows.loc[parameters, [*names]].rename(columns=names).astype(float).abs()
+
+
+def mean_reduction(evidence: Evidence, effect: str, scheme: str = "") -> Numbers:
+    """Reduction, %, of the mean sd a posteriori of an effect by the robot, in a scheme."""
+    below, above = (mean_sd(evidence, effect, each, scheme).mean() for each in APPROACHES)
+    left = 100 * above["sd"] / below["sd"]
+    error = float(np.hypot(above["se"] / above["sd"], below["se"] / below["sd"]))
+    return estimate(100 - left, Z95 * left * error)
+
+
 def reduction(evidence: Evidence, effect: str) -> Numbers:
-    """Reduction, %, of the mean sd a posteriori of an effect by the robot."""
-    table = evidence.by_scheme[evidence.by_scheme["claim"] == f"reduction-{effect}"]
-    row = table[table["scheme"] == evidence.settings.scheme.name].iloc[0]
-    means = reductions(evidence, effect)
-    half = float(means["half"][means["scheme"] == evidence.settings.scheme.name].iloc[0])
-    inside = table["single_low"].le(table["paper"]) & table["single_high"].ge(table["paper"])
-    names = sorted(table["scheme"][inside])
+    """Return `mean_reduction` in the scheme of the claims, and what single simulations show."""
+    rows = evidence.single_simulations(f"reduction-{effect}")
+    names = sorted(rows.index[rows["paper"].between(rows["single_low"], rows["single_high"])])
     named = f" ({', '.join(names)})" if 0 < len(names) <= 4 else ""
-    return {
-        **{"value": row["mean"], "low": row["mean"] - half, "high": row["mean"] + half},
-        **{name: row[name] for name in ("single_low", "single_high", "percentile")},
-        "where": f"{len(names)} of {len(table)} schemes{named}",
-    }
+    single = rows.loc[evidence.settings.scheme.name, ["single_low", "single_high", "percentile"]]
+    where = f"{len(names)} of {len(rows)} schemes{named}"
+    return {**mean_reduction(evidence, effect), **single, "where": where}
 
 
-def reductions(evidence: Evidence, of: str) -> pd.DataFrame:
-    """Reductions of the sd of an effect in single simulations, a row each scheme."""
-    table = evidence.reductions
-    return table[(table["effect"] == of) & table["scheme"].isin(evidence.schemes)]
-
-
-def scale_correlations(evidence: Evidence, of: str) -> pd.DataFrame:
-    """Correlations of the pairs of scales with an approach, a row each scheme."""
-    values = {scheme: _scale_pairs(evidence, of, scheme) for scheme in evidence.schemes}
-    names = {"mean": "mean", "single_low": "min", "median": "median", "single_high": "max"}
-    rows = [
-        {"scheme": scheme, **{name: getattr(np, how)(pairs) for name, how in names.items()}}
-        for scheme, pairs in values.items()
-    ]
-    return pd.DataFrame(rows).assign(percentile=np.nan)
+def scale_pairs(evidence: Evidence, approach: str, scheme: str = "") -> Array:
+    """Mean |correlation| of each pair of scales, from the adjustment."""
+    return _correlations(evidence, approach, scheme, "s_", "s_")["adjustment"].to_numpy(float)
 
 
 def scale_correlation(evidence: Evidence) -> Numbers:
     """Mean correlation of the scales, gravity-based, and its range over the schemes."""
-    rows = evidence.by_scheme[evidence.by_scheme["claim"] == "scale-correlation-gravity"]
-    value = float(_scale_pairs(evidence, "gravity").mean())
-    return {"value": value, "least": rows["mean"].min(), "most": rows["mean"].max()}
+    means = evidence.single_simulations("scale-correlation-gravity")["mean"]
+    value = float(scale_pairs(evidence, "gravity").mean())
+    return {"value": value, "least": means.min(), "most": means.max()}
 
 
 def scale_correlation_ratio(evidence: Evidence) -> Numbers:
     """Mean correlation of the scales, gravity-based over robot-aided."""
-    gravity, robot = (_scale_pairs(evidence, approach) for approach in APPROACHES)
+    gravity, robot = (scale_pairs(evidence, approach) for approach in APPROACHES)
     means = {"gravity": float(gravity.mean()), "robot": float(robot.mean())}
     value = means["gravity"] / means["robot"]
     return {"value": value, **means, "least": robot.min(), "most": robot.max()}
@@ -232,49 +219,37 @@ def largest_correlation(
     evidence: Evidence, but_of: str = "", first: str = "", second: str = ""
 ) -> Numbers:
     """Largest gravity-based correlation of parameters that begin so, without pairs `but_of`."""
-    rows = evidence.rows("correlations", "gravity")
-    one, other = rows["parameter_1"].astype(str), rows["parameter_2"].astype(str)
-    chosen = (one != other) & one.str.startswith(first) & other.str.startswith(second)
+    rows = _correlations(evidence, "gravity", "", first, second)
     if but_of:
-        chosen &= ~(one.str.startswith(but_of) & other.str.startswith(but_of))
-    return {"value": float(rows.loc[chosen, "adjustment"].abs().max())}
+        rows = rows.drop(_correlations(evidence, "gravity", "", but_of, but_of).index)
+    return {"value": float(rows["adjustment"].max())}
 
 
-def _scale_pairs(evidence: Evidence, approach: str, scheme: str = "") -> Array:
-    """Mean |correlation| of each pair of scales, from the adjustment."""
+def _correlations(
+    evidence: Evidence, approach: str, scheme: str, first: str, second: str
+) -> pd.DataFrame:
+    """Absolute correlations of a cell, of two parameters that begin so."""
     rows = evidence.rows("correlations", approach, scheme)
     one, other = rows["parameter_1"].astype(str), rows["parameter_2"].astype(str)
-    pairs = one.str.startswith("s_") & other.str.startswith("s_") & (one != other)
-    return np.abs(rows.loc[pairs, "adjustment"].to_numpy(float))
+    rows = rows[(one != other) & one.str.startswith(first) & other.str.startswith(second)]
+    return rows.assign(adjustment=rows["adjustment"].abs())
 
 
 def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:
     """True parameters of an effect over their mean sd a posteriori, gravity-based."""
-    sd, error, truth = _sds(evidence, effect)
-    ratios = truth / sd
-    value = float(np.exp(np.mean(np.log(ratios))))
-    half = Z95 * value * float(np.mean(error / sd))
-    return {
-        **{"value": value, "low": value - half, "high": value + half},
-        **dict(zip("xyz", ratios, strict=True)),
-        "orders_off": float(np.abs(np.log10(ratios) - 2).max()),
-    }
+    rows = mean_sd(evidence, effect)
+    ratios = (rows["truth"] / rows["sd"]).to_numpy()
+    value = float(np.exp(np.log(ratios).mean()))
+    half = Z95 * value * float((rows["se"] / rows["sd"]).mean())
+    orders_off = float(np.abs(np.log10(ratios) - 2).max())
+    return estimate(value, half, orders_off=orders_off, **dict(zip("xyz", ratios, strict=True)))
 
 
 def sd_a_posteriori(evidence: Evidence, effect: str) -> Numbers:
     """Mean sd a posteriori of an effect's parameters, gravity-based, also in % of the truth."""
-    sd, error, truth = _sds(evidence, effect)
-    value, half = float(sd.mean()), Z95 * float(error.mean())
-    percent = 100 * value / truth.min()
-    return {"value": value, "low": value - half, "high": value + half, "percent": percent}
-
-
-def _sds(evidence: Evidence, effect: str) -> tuple[Array, Array, Array]:
-    """Mean sd a posteriori of each gravity-based parameter, its standard error, the |truth|."""
-    rows = evidence.rows("summary", "gravity").set_index("parameter")
-    rows = rows.loc[[parameter.name for parameter in get_effect(effect).parameters]]
-    columns = rows[["sd_posteriori_mean", "sd_posteriori_se", "truth"]].to_numpy(float).T
-    return columns[0], columns[1], np.abs(columns[2])
+    rows = mean_sd(evidence, effect)
+    value, half = float(rows["sd"].mean()), Z95 * float(rows["se"].mean())
+    return estimate(value, half, percent=100 * value / rows["truth"].min())
 
 
 # --- slips ---------------------------------------------------------------------------------------
