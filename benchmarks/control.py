@@ -23,7 +23,7 @@ from accelstudy.study.cell import Cell
 from accelstudy.study.config import read_study
 from accelstudy.study.replicates import Replicates, simulate
 from accelstudy.study.statistics import statistics
-from accelstudy.study.summary import tables_of
+from accelstudy.study.tables import tables_of
 
 CONFIG = Path(__file__).parent.parent / "config" / "config.yaml"
 NOISES = (0.002, 0.02, 0.1, 0.3)

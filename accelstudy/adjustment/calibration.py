@@ -234,14 +234,3 @@ class Block:
         }
         correlation_sum = np.sum([part.correlation_sum for part in parts], axis=0)
         return replace(parts[0], **whole, correlation_sum=correlation_sum)
-
-    def rows(self, chosen: slice) -> Block:
-        """Return some of the replicates; `correlation_sum` stays that of all."""
-        return replace(
-            self,
-            estimates=self.estimates[chosen],
-            sigma_priori=self.sigma_priori[chosen],
-            omega=self.omega[chosen],
-            iterations=self.iterations[chosen],
-            converged=self.converged[chosen],
-        )

@@ -35,7 +35,7 @@ from accelstudy.study.statistics import (
     cell_tilt_error,
     simulated_statistics,
 )
-from accelstudy.study.summary import tables_of
+from accelstudy.study.tables import tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,7 +131,7 @@ class Simulation(Result):
         """
         tables = []
         for one in self.statistics:
-            cell, bias, sd = one.cell, one.bias, one.sd
+            cell, bias, sd = one.cell, one["bias"], one["sd"]
             columns = {
                 "truth": cell.true_values,
                 "bias": bias.value,
@@ -152,7 +152,7 @@ class Simulation(Result):
         """
         tables = []
         for one in self.statistics:
-            rms = one.tilt_rms
+            rms = one["tilt_rms"]
             bound = [one.quantile(TILT, angle, 0.95) for angle in ANGLES]
             columns = {
                 "rms": rms.value,

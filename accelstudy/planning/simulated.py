@@ -53,12 +53,12 @@ class Simulated:
     @property
     def rms(self) -> Array:
         """Rms over attitudes and calibrations, (2,), rad."""
-        return self.statistics.tilt_rms.value
+        return self.statistics["tilt_rms"].value
 
     @property
     def error(self) -> Array:
         """Standard error of `rms`, (2,), rad."""
-        return self.statistics.tilt_rms.error
+        return self.statistics["tilt_rms"].error
 
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -198,25 +198,9 @@ class Cell:
         digest = hashlib.sha256(json.dumps(identity).encode()).digest()
         return list(np.frombuffer(digest, dtype="<u4").tolist())
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, from which `from_dict` makes the cell again."""
-        data = json.loads(json.dumps(asdict(self)))
-        # Rare settings are left out where they are not used, so that older results stay valid.
-        return {key: value for key, value in data.items() if value is not None}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Cell:
-        """Make a cell of plain data."""
-        plain = _tuples(data)
-        objects = {"noise": Noise(**plain["noise"]), "holds": HoldPlan(**plain["holds"])}
-        return cls(**{**plain, **objects})
-
-
-def _tuples(data: Any) -> Any:
-    """Plain data with tuples for lists, also for those in lists."""
-    if isinstance(data, Mapping):
-        return {key: _tuples(value) for key, value in data.items()}
-    return tuple(map(_tuples, data)) if isinstance(data, list) else data
+    def __getstate__(self) -> dict[str, Any]:
+        """What a job gets: without the models and positions that it composes itself."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 def fanned_out(cells: Sequence[Cell], pattern: str) -> dict[str, list[Cell]]:

@@ -49,18 +49,18 @@ class Estimates:
     gain: Array
     plain: Array
 
-    @classmethod
-    def unknown(cls, *shape: int) -> Estimates:
-        """Return estimates that are all NaN."""
-        return cls(*np.full((4, *shape), np.nan))
-
     def __getitem__(self, chosen: Any) -> Estimates:
         each = (self.value, self.error, self.gain, self.plain)
         return Estimates(*(values[chosen] for values in each))
 
     def scaled(self, factor: Array | float) -> Estimates:
-        """The numbers times known positive factors."""
-        return Estimates(self.value * factor, self.error * factor, self.gain, self.plain * factor)
+        """The numbers times known positive factors, of as many as there are factors."""
+        value, error, plain = (each * factor for each in (self.value, self.error, self.plain))
+        return Estimates(value, error, np.broadcast_to(self.gain, value.shape), plain)
+
+
+UNKNOWN = Estimates(*np.full(4, np.nan))
+"""What nothing is known of; scaling it makes arrays of it."""
 
 
 class Statistic(NamedTuple):

@@ -28,80 +28,70 @@ class KnownValues:
     ----------
     cell : Cell
     theory : LinearTheory, of the cell
-    tilt : TiltError; None where its statistics are not asked for
     """
 
     cell: Cell
     theory: LinearTheory
-    tilt: TiltError | None = None
 
-    @property
+    @cached_property
     def bias(self) -> Array:
         """Mean errors of the estimates, (u,)."""
         return self.theory.reference - self.cell.true_values
 
-    @property
+    @cached_property
     def sd(self) -> Array:
         """Standard deviations of the estimates, (u,)."""
         return np.sqrt(np.diagonal(self.theory.covariance))
 
-    @property
-    def correlation(self) -> Array:
-        """Correlations of the estimates below the diagonal, (u (u − 1) / 2,)."""
-        matrix = self.theory.covariance / np.outer(self.sd, self.sd)
-        return matrix[np.tril_indices(len(matrix), -1)]
-
-    @property
+    @cached_property
     def sigma_posteriori(self) -> Array:
         """Mean standard deviations a posteriori, (u,)."""
-        return self._mean_root * self.theory.sigma
+        if not self._determines_factor:
+            return np.full(len(self.theory.sigma), np.nan)
+        # The mean of σ̂0, which is the root of a (noncentral) χ² over its degrees of freedom.
+        r, offset = self.theory.redundancy, self.theory.misfit
+        ratio = np.exp(special.gammaln((r + 1) / 2) - special.gammaln(r / 2))
+        root = np.sqrt(2 / r) * ratio * special.hyp1f1(-0.5, r / 2, -offset / 2)
+        return np.asarray(root * self.theory.sigma)
 
     @property
     def effect_sigma(self) -> Array:
         """Mean standard deviation a posteriori of the parameters of each effect, (e,)."""
         return np.array([self.sigma_posteriori[at].mean() for at in self.cell.effect_columns])
 
-    @property
-    def sd_ratio(self) -> Array:
-        """Mean standard deviations a posteriori over those of the estimates, (u,)."""
-        return self.sigma_posteriori / self.sd
-
-    @property
-    def variance_factor(self) -> float:
-        """Mean of σ̂0²."""
-        theory = self.theory
-        return 1 + theory.misfit / theory.redundancy if self._determines_factor else np.nan
-
-    @property
-    def coverage(self) -> Array:
-        """Share of the nominal 95 % intervals that hold the truth, (u,)."""
+    def statistics(self, tilts: TiltDistribution) -> dict[str, Array | float]:
+        """Statistics by their names in `accelstudy.study.statistics.STATISTICS`."""
+        theory, determined = self.theory, self._determines_factor
+        correlation = theory.covariance / np.outer(self.sd, self.sd)
         # The interval has its nominal share where the truth is in its middle.
-        shift = np.abs(self.bias) / self.theory.sigma
-        central = (shift < CENTRAL) & (self.theory.misfit < CENTRAL) & self._determines_factor
-        return np.where(central, 0.95, np.nan)
+        central = np.abs(self.bias) / theory.sigma < CENTRAL
+        central &= theory.misfit < CENTRAL and determined
+        return {
+            "bias": self.bias,
+            "sd": self.sd,
+            "sigma_posteriori": self.sigma_posteriori,
+            "sd_ratio": self.sigma_posteriori / self.sd,
+            "coverage": np.where(central, 0.95, np.nan),
+            "correlation": correlation[np.tril_indices(len(correlation), -1)],
+            "variance_factor": 1 + theory.misfit / theory.redundancy if determined else np.nan,
+            "tilt_rms": np.sqrt(tilts.mean_squares),
+        }
 
-    @property
-    def tilt_rms(self) -> Array:
-        """Rms over attitudes and calibrations of the errors of roll and of pitch, (2,), rad."""
-        return np.sqrt(self.tilts.mean_squares)
-
-    @cached_property
-    def tilts(self) -> TiltDistribution:
+    def tilts(self, tilt: TiltError) -> TiltDistribution:
         """Distribution of the tilt errors."""
-        assert self.tilt is not None
-        u = len(self.tilt.reference)
-        return TiltDistribution(self.tilt, self.theory.covariance[:u, :u])
+        u = len(tilt.reference)
+        return TiltDistribution(tilt, self.theory.covariance[:u, :u])
 
     def error_quantiles(self, levels: Array) -> Array:
         """Quantiles of the errors of the estimates, (u, k)."""
         return np.asarray(self.bias[:, None] + self.sd[:, None] * special.ndtri(levels))
 
-    def factor_quantiles(self, levels: Array) -> Array:
-        """Quantiles of σ̂0, (k,)."""
-        if not self._determines_factor:
-            return np.full(len(levels), np.nan)
-        redundancy = self.theory.redundancy
-        return np.sqrt(special.chndtrix(levels, redundancy, self.theory.misfit) / redundancy)
+    def sigma_quantiles(self, levels: Array) -> Array:
+        """Quantiles of the standard deviations a posteriori, (u, k)."""
+        r, factor = self.theory.redundancy, np.full(len(levels), np.nan)
+        if self._determines_factor:
+            factor = np.sqrt(special.chndtrix(levels, r, self.theory.misfit) / r)
+        return np.outer(self.theory.sigma, factor)
 
     def effect_ratio_quantiles(self, other: KnownValues, effect: int, levels: Array) -> Array:
         """Quantiles of the sigma of an effect over that of another, independent cell, (k,)."""
@@ -116,12 +106,3 @@ class KnownValues:
     def _determines_factor(self) -> bool:
         """Whether the distribution of σ̂0² is known."""
         return self.theory.chi_squared and self.theory.redundancy > 0
-
-    @property
-    def _mean_root(self) -> float:
-        """Mean of σ̂0, the root of a (noncentral) χ² over its degrees of freedom."""
-        if not self._determines_factor:
-            return np.nan
-        r, offset = self.theory.redundancy, self.theory.misfit
-        ratio = np.exp(special.gammaln((r + 1) / 2) - special.gammaln(r / 2))
-        return float(np.sqrt(2 / r) * ratio * special.hyp1f1(-0.5, r / 2, -offset / 2))

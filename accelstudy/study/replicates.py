@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.linear_theory import LinearTheory
-from accelstudy.files.parquet import whole_parquet
-from accelstudy.files.tables import REMEDY
+from accelstudy.files.tables import read_table
 from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
@@ -60,6 +59,22 @@ class Replicates(NamedTuple):
     simulated: Block
     linear: Block | None
 
+    @classmethod
+    def of(
+        cls, simulated: Block, theory: LinearTheory | None, estimates: Array, omega: Array
+    ) -> Replicates:
+        """Put estimates (R, u) and Ω (R,) of linear theory, if any, beside calibrations."""
+        if theory is None:
+            return cls(simulated, None)
+        linear = replace(
+            simulated,
+            estimates=estimates,
+            sigma_priori=np.broadcast_to(theory.sigma, estimates.shape),
+            omega=omega,
+            converged=np.ones(len(estimates), bool),
+        )
+        return cls(simulated, linear)
+
 
 def simulate(cell: Cell, seed: int) -> Replicates:
     """Simulate and calibrate all replicates of an estimable cell.
@@ -69,8 +84,8 @@ def simulate(cell: Cell, seed: int) -> Replicates:
     cell : Cell
     seed : int, of the study
     """
-    calibrate, angles = calibrator(cell), cell.conditions.uses_angles
-    theory = cell.linear_theory
+    calibrate, theory = calibrator(cell), cell.linear_theory
+    angles = cell.conditions.uses_angles
     drawn = cell.ideal.draw_blocks(
         cell.noise,
         cell.replicates,
@@ -79,70 +94,49 @@ def simulate(cell: Cell, seed: int) -> Replicates:
         BLOCK,
         angles=angles,
     )
-    simulated, linear = [], []
+    simulated, estimates, omega = [], [np.empty((0, cell.n_unknowns))], [np.empty(0)]
     for errors, observed in drawn:
         simulated.append(calibrate(cell.estimated_model, cell.conditions, observed))
         if theory is not None:
             noise = errors.force
-            if angles:
-                assert errors.angle is not None
+            if angles and errors.angle is not None:
                 noise = np.concatenate([noise, errors.angle], axis=-1)
-            shift, omega = theory.errors(noise, errors.gravity)
-            linear.append(_linear_block(theory, theory.reference + shift, omega))
-    return Replicates(Block.joined(simulated), Block.joined(linear) if linear else None)
-
-
-def _linear_block(theory: LinearTheory, estimates: Array, omega: Array) -> Block:
-    """Calibrations of linear theory with given estimates (R, u) and Ω (R,)."""
-    count, u = estimates.shape
-    return Block(
-        estimates=estimates,
-        sigma_priori=np.broadcast_to(theory.sigma, (count, u)),
-        omega=omega,
-        redundancy=theory.redundancy,
-        iterations=np.ones(count, int),
-        converged=np.ones(count, bool),
-        correlation_sum=np.full((u, u), np.nan),
-    )
+            shift, of_block = theory.errors(noise, errors.gravity)
+            estimates.append(theory.reference + shift)
+            omega.append(of_block)
+    both = np.concatenate(estimates), np.concatenate(omega)
+    return Replicates.of(Block.joined(simulated), theory, *both)
 
 
 def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     """Rows of `ESTIMATES` of a cell."""
-    units = cell.parameter_units
     simulated, linear = replicates
-    n_replicates, u = simulated.estimates.shape
+    count, u = simulated.estimates.shape
+    parameter = np.tile(np.arange(u), count)
 
-    def per_replicate(values: Any) -> Any:
-        return np.repeat(values, u)
+    def coded(codes: Any, names: Any) -> pa.DictionaryArray:
+        return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array([*names]))
 
-    def per_parameter(values: list[Any]) -> Any:
-        return np.tile(values, n_replicates)
-
+    nothing = pa.nulls(count * u, pa.float64())
     columns = {
-        "cell": _coded(np.zeros(n_replicates * u), [cell.name]),
-        "replicate": per_replicate(np.arange(n_replicates)),
-        "parameter": _coded(per_parameter(list(range(u))), list(units)),
-        "unit": _coded(per_parameter(list(range(u))), list(units.values())),
-        "truth": per_parameter([*cell.true_values]),
+        "cell": coded(np.zeros(count * u), [cell.name]),
+        "replicate": np.repeat(np.arange(count), u),
+        "parameter": coded(parameter, cell.parameter_units),
+        "unit": coded(parameter, cell.parameter_units.values()),
+        "truth": cell.true_values[parameter],
         "estimate": simulated.estimates.ravel(),
-        "linear_estimate": None if linear is None else linear.estimates.ravel(),
+        "linear_estimate": nothing if linear is None else linear.estimates.ravel(),
         "sigma_priori": simulated.sigma_priori.ravel(),
-        "omega": per_replicate(simulated.omega),
-        "linear_omega": None if linear is None else per_replicate(linear.omega),
-        "redundancy": np.full(n_replicates * u, simulated.redundancy),
-        "iterations": per_replicate(simulated.iterations),
-        "converged": per_replicate(simulated.converged),
+        "omega": np.repeat(simulated.omega, u),
+        "linear_omega": nothing if linear is None else np.repeat(linear.omega, u),
+        "redundancy": np.full(count * u, simulated.redundancy),
+        "iterations": np.repeat(simulated.iterations, u),
+        "converged": np.repeat(simulated.converged, u),
     }
-    missing = pa.nulls(n_replicates * u, pa.float64())
-    whole = {name: missing if each is None else each for name, each in columns.items()}
-    return pa.table(whole, schema=ESTIMATES)
+    return pa.table(columns, schema=ESTIMATES)
 
 
-def _coded(codes: Any, names: list[str]) -> pa.DictionaryArray:
-    return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array(names))
-
-
-def read_replicates(paths: Iterable[str | Path], cell: Cell) -> Replicates | None:
+def read_replicates(paths: Sequence[str | Path], cell: Cell) -> Replicates | None:
     """Read the stored replicates of a cell; None if the files hold none of it.
 
     Parameters
@@ -159,41 +153,20 @@ def read_replicates(paths: Iterable[str | Path], cell: Cell) -> Replicates | Non
     InputError
         If a file is missing or damaged.
     """
-    columns = [*ESTIMATES.names[5:]]
-    tables = []
-    for path in paths:
-        with whole_parquet(path, REMEDY) as file:
-            groups = [i for i in range(file.num_row_groups) if _cell_of(file, i) == cell.name]
-            tables += [file.read_row_group(i, columns) for i in groups]
-    if not tables:
+    names = ESTIMATES.names[5:]
+    rows = read_table(paths, columns=names, filters=[("cell", "==", cell.name)])
+    if rows.empty:
         return None
-    rows, u = pa.concat_tables(tables), len(cell.parameter_units)
-
-    def per_parameter(name: str) -> Any:
-        return rows[name].to_numpy().reshape(-1, u)
-
-    def per_replicate(name: str) -> Any:
-        return rows[name].to_numpy()[::u]
-
+    u = cell.n_unknowns
+    stored = {name: rows[name].to_numpy().reshape(-1, u) for name in names}
     simulated = Block(
-        estimates=per_parameter("estimate"),
-        sigma_priori=per_parameter("sigma_priori"),
-        omega=per_replicate("omega"),
-        redundancy=int(rows["redundancy"][0].as_py()),
-        iterations=per_replicate("iterations"),
-        converged=per_replicate("converged"),
+        estimates=stored["estimate"],
+        sigma_priori=stored["sigma_priori"],
+        omega=stored["omega"][:, 0],
+        redundancy=int(stored["redundancy"][0, 0]),
+        iterations=stored["iterations"][:, 0],
+        converged=stored["converged"][:, 0],
         correlation_sum=np.full((u, u), np.nan),
     )
-    theory = cell.linear_theory
-    if theory is None:
-        return Replicates(simulated, None)
-    linear = per_parameter("linear_estimate"), per_replicate("linear_omega")
-    return Replicates(simulated, _linear_block(theory, *linear))
-
-
-def _cell_of(file: pq.ParquetFile, number: int) -> str:
-    """Cell of a row group; each row group holds one."""
-    statistics = file.metadata.row_group(number).column(0).statistics
-    if statistics is not None and statistics.has_min_max:
-        return str(statistics.min)
-    return str(file.read_row_group(number, ["cell"])["cell"][0])  # a name too long for statistics
+    linear = stored["linear_estimate"], stored["linear_omega"][:, 0]
+    return Replicates.of(simulated, cell.linear_theory, *linear)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,7 @@ from accelstudy.files.tables import parquet_writer, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_table
 from accelstudy.study.statistics import CellStatistics, simulated_statistics
-from accelstudy.study.summary import tables_of
-from accelstudy.study.tables import TABLES
+from accelstudy.study.tables import TABLES, tables_of
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +49,7 @@ def simulated_tables(
 
 
 def simulate_cells(
-    cells: Iterable[Mapping[str, Any]],
+    cells: Sequence[Cell],
     leveling: Mapping[str, Any],
     outputs: Mapping[str, str | Path],
     provenance: Mapping[str, Any],
@@ -61,7 +60,7 @@ def simulate_cells(
 
     Parameters
     ----------
-    cells : plain data of each `Cell`
+    cells : sequence of Cell
     leveling : mapping with max_tilt_gon and attitudes
     outputs : paths of `estimates` and of each of `TABLES`
     provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
@@ -69,7 +68,7 @@ def simulate_cells(
     measured = ("estimate", "linear_estimate", "sigma_priori")
     with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
         tables = simulated_tables(
-            [Cell.from_dict(data) for data in cells],
+            cells,
             provenance["seed"],
             leveling,
             lambda cell, replicates: write(estimates_table(cell, replicates)),

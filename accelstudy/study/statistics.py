@@ -21,6 +21,7 @@ from accelstudy.study.estimate import (
     RATIO,
     ROOT_MEAN,
     SD,
+    UNKNOWN,
     Estimates,
     Statistic,
     controlled,
@@ -33,6 +34,22 @@ Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Quantity, and the name of what it is of."""
 
+STATISTICS: dict[str, tuple[Statistic, tuple[str, ...]]] = {
+    "bias": (MEAN, ("error",)),
+    "sd": (SD, ("error",)),
+    "sigma_priori": (MEAN, ("sigma_priori",)),
+    "sigma_posteriori": (MEAN, ("sigma_posteriori",)),
+    "sd_ratio": (RATIO, ("sigma_posteriori", "error")),
+    "coverage": (MEAN, ("inside",)),
+    "correlation": (CORRELATION, ("error",)),
+    "variance_factor": (MEAN, ("variance_factor",)),
+    "tilt_rms": (ROOT_MEAN, ("tilt_squared",)),
+}
+"""Each statistic of a cell, and the numbers of `calibrations` that it is of: bias and standard
+deviation of the errors, the mean standard deviations that are stated, `sd_ratio` of those a
+posteriori and the sd, share of the nominal 95 % intervals that hold the truth, correlations below
+the diagonal, mean of σ̂0², and the rms of roll and pitch over attitudes and calibrations."""
+
 ERROR, POSTERIORI, TILT = "error", "sd_posteriori", "tilt"
 """Quantities that have quantiles: of each parameter, and the rms over attitudes of tilt errors."""
 ANGLES = ("roll", "pitch")
@@ -43,49 +60,27 @@ two, so that both angles stay below its quantile."""
 
 @dataclass(frozen=True)
 class CellStatistics:
-    """Statistics of the calibrations of a cell, SI; NaN where nothing was simulated or converged.
+    """Statistics of the calibrations of a cell, SI.
 
     Attributes
     ----------
     cell : Cell
     replicates : Replicates; None of a cell that is not estimable
-    bias, sd : Estimates, (u,), of the errors of the estimates
-    sigma_priori, sigma_posteriori : Estimates, (u,), means of the stated standard deviations
-    sd_ratio : Estimates, (u,), `sigma_posteriori` over `sd`
-    coverage : Estimates, (u,), shares of the nominal 95 % intervals that hold the truth
-    correlation : Estimates, below the diagonal in the order of `numpy.tril_indices`
-    effect_sigma : Estimates, (e,), mean sigma a posteriori of the parameters of each effect
-    variance_factor : Estimates, (1,), mean of σ̂0²
-    tilt_rms : Estimates, (2,), rad, rms of roll and pitch over attitudes and calibrations
+    estimates : dict of `STATISTICS` to Estimates; empty if nothing converged
+    first : errors and sigmas a posteriori of the first calibration that converged, (u,) each
     levels : (k,) array, probabilities of the quantiles
     quantiles : dict of quantity and name to Estimates, (k,); empty if nothing converged
     """
 
     cell: Cell
-    replicates: Replicates | None
-    bias: Estimates
-    sd: Estimates
-    sigma_priori: Estimates
-    sigma_posteriori: Estimates
-    sd_ratio: Estimates
-    coverage: Estimates
-    correlation: Estimates
-    effect_sigma: Estimates
-    variance_factor: Estimates
-    tilt_rms: Estimates
+    replicates: Replicates | None = None
+    estimates: Mapping[str, Estimates] = field(default_factory=dict)
+    first: tuple[Any, Any] = (np.nan, np.nan)
     levels: Array = field(default_factory=lambda: np.zeros(0))
     quantiles: Mapping[Key, Estimates] = field(default_factory=dict)
 
-    @classmethod
-    def unknown(cls, cell: Cell, replicates: Replicates | None = None) -> CellStatistics:
-        """Return the statistics of a cell without calibrations."""
-        u = cell.n_unknowns
-        sizes = {"correlation": u * (u - 1) // 2, "effect_sigma": len(cell.uniform_effects)}
-        sizes |= {"variance_factor": 1, "tilt_rms": 2}
-        of_parameters = ("bias", "sd", "sigma_priori", "sigma_posteriori", "sd_ratio", "coverage")
-        sizes |= dict.fromkeys(of_parameters, u)
-        unknown: dict[str, Any] = {name: Estimates.unknown(n) for name, n in sizes.items()}
-        return cls(cell, replicates, **unknown)
+    def __getitem__(self, statistic: str) -> Estimates:
+        return self.estimates.get(statistic, UNKNOWN)
 
     @property
     def simulated(self) -> int:
@@ -98,41 +93,15 @@ class CellStatistics:
         return 0 if self.replicates is None else int(self.replicates.simulated.converged.sum())
 
     @property
-    def redundancy(self) -> int:
-        """Redundancy of a calibration; 0 of a cell that was not simulated."""
-        return 0 if self.replicates is None else self.replicates.simulated.redundancy
-
-    @property
     def control(self) -> str:
         """Which control variate the estimates have: `linear` or `none`."""
         linear = self.replicates is not None and self.replicates.linear is not None
         return "linear" if linear and self.simulated >= LEAST else "none"
 
-    @property
-    def mean_correlation(self) -> Array:
-        """Mean of the correlations from Σ_xx, (u, u)."""
-        u = self.cell.n_unknowns
-        if self.replicates is None or not self.converged:
-            return np.full((u, u), np.nan)
-        return self.replicates.simulated.correlation_sum / self.converged
-
-    @property
-    def first(self) -> tuple[Array, Array]:
-        """Errors and sigmas a posteriori of the first calibration that converged, (u,) each."""
-        u = self.cell.n_unknowns
-        if self.replicates is None or not self.converged:
-            return np.full(u, np.nan), np.full(u, np.nan)
-        block = self.replicates.simulated
-        at = int(np.argmax(block.converged))
-        one = calibrations(self.cell, block.rows(slice(at, at + 1)))
-        return one["error"][0], one["sigma_posteriori"][0]
-
     def quantile(self, quantity: str, name: str, level: float) -> Estimates:
         """One quantile; NaN where there is none."""
-        if (quantity, name) not in self.quantiles:
-            return Estimates.unknown(1)[0]
-        at = np.flatnonzero(np.isclose(self.levels, level))
-        return self.quantiles[quantity, name][at][0]
+        quantiles = self.quantiles.get((quantity, name))
+        return UNKNOWN if quantiles is None else quantiles[np.isclose(self.levels, level)][0]
 
 
 def statistics(
@@ -151,83 +120,54 @@ def statistics(
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
     simulated, linear = replicates
-    converged = simulated.converged
-    if not converged.any():
-        return CellStatistics.unknown(cell, replicates)
+    good, count = simulated.converged, int(simulated.converged.sum())
+    if not count:
+        return CellStatistics(cell, replicates)
     tilt = cell_tilt_error(cell, leveling)
     own = calibrations(cell, simulated, tilt)
-    theory = None if linear is None else calibrations(cell, linear, tilt)
-    known = None
-    if cell.linear_theory is not None and theory is not None:
-        known = KnownValues(cell, cell.linear_theory, tilt)
+    at = usual_levels(count) if levels is None else np.asarray(levels, dtype=float)
+    theory, known, known_quantiles = None, {}, {}
+    inexact = np.zeros((len(TILTS), len(at)))
+    if linear is not None and cell.linear_theory is not None:
+        theory, by_theory = calibrations(cell, linear, tilt), KnownValues(cell, cell.linear_theory)
+        tilts = by_theory.tilts(tilt)
+        known = by_theory.statistics(tilts)
+        if len(good) >= LEAST:
+            known_quantiles[ERROR] = by_theory.error_quantiles(at)
+            known_quantiles[POSTERIORI] = by_theory.sigma_quantiles(at)
+            known_quantiles[TILT], inexact = tilts.quantile(at), tilts.relative_error(at)
 
-    def estimate(statistic: Statistic, *names: str, by: str | None) -> Estimates:
-        def numbers(of: Mapping[str, Array]) -> Array:
-            return of[names[0]] if len(names) == 1 else np.hstack([of[name] for name in names])
+    def numbers(of: dict[str, Array] | None, names: Sequence[str]) -> Any:
+        return None if of is None else np.hstack([of[name] for name in names])
 
-        expected = np.nan if known is None or by is None else getattr(known, by)
-        beside = None if theory is None else numbers(theory)
-        return controlled(statistic, numbers(own), beside, expected, converged)
+    def quantiles(quantity: str, column: str, i: int) -> Estimates:
+        beside = None if theory is None else theory[column][:, i]
+        expected = known_quantiles[quantity][i] if known_quantiles else None
+        error = inexact[i] if quantity == TILT else 0.0
+        return controlled_quantiles(at, own[column][:, i], beside, expected, good, error)
 
-    at = usual_levels(len(own["error"])) if levels is None else np.asarray(levels, dtype=float)
+    estimates = {
+        name: controlled(
+            statistic, numbers(own, of), numbers(theory, of), known.get(name, np.nan), good
+        )
+        for name, (statistic, of) in STATISTICS.items()
+        if name != "correlation" or count > cell.n_unknowns
+    }
+    columns = {ERROR: "error", POSTERIORI: "sigma_posteriori", TILT: "tilt"}
+    if simulated.redundancy <= 0:
+        del columns[POSTERIORI]
     return CellStatistics(
         cell,
         replicates,
-        bias=estimate(MEAN, "error", by="bias"),
-        sd=estimate(SD, "error", by="sd"),
-        sigma_priori=estimate(MEAN, "sigma_priori", by=None),  # linear theory has one only
-        sigma_posteriori=estimate(MEAN, "sigma_posteriori", by="sigma_posteriori"),
-        sd_ratio=estimate(RATIO, "sigma_posteriori", "error", by="sd_ratio"),
-        coverage=estimate(MEAN, "inside", by="coverage"),
-        correlation=_correlation(estimate(CORRELATION, "error", by="correlation"), own["error"]),
-        effect_sigma=estimate(MEAN, "effect_sigma", by="effect_sigma"),
-        variance_factor=estimate(MEAN, "variance_factor", by="variance_factor"),
-        tilt_rms=estimate(ROOT_MEAN, "tilt_squared", by="tilt_rms"),
-        levels=at,
-        quantiles=_quantiles(cell, own, theory, known, converged, at, simulated.redundancy > 0),
+        estimates,
+        (own["error"][0], own["sigma_posteriori"][0]),
+        at,
+        {
+            (quantity, name): quantiles(quantity, column, i)
+            for quantity, column in columns.items()
+            for i, name in enumerate(TILTS if quantity == TILT else cell.parameter_units)
+        },
     )
-
-
-def _correlation(estimates: Estimates, errors: Array) -> Estimates:
-    """Correlations within −1 and 1; NaN of fewer calibrations than parameters."""
-    count, u = errors.shape
-    if count <= u:
-        return Estimates.unknown(len(estimates.value))
-    value, plain = (np.clip(each, -1, 1) for each in (estimates.value, estimates.plain))
-    return Estimates(value, estimates.error, estimates.gain, plain)
-
-
-def _quantiles(
-    cell: Cell,
-    own: Mapping[str, Array],
-    theory: Mapping[str, Array] | None,
-    known: KnownValues | None,
-    converged: NDArray[np.bool_],
-    levels: Array,
-    redundant: bool,
-) -> dict[Key, Estimates]:
-    """Quantiles of the errors, of the sigmas a posteriori and of the tilt errors."""
-    quantities = {ERROR: "error", **({POSTERIORI: "sigma_posteriori"} if redundant else {})}
-    by_theory: dict[str, Array] = {}
-    inexact = np.zeros((len(TILTS), len(levels)))
-    if known is not None and len(converged) >= LEAST:
-        by_theory[ERROR] = known.error_quantiles(levels)
-        sigma = known.theory.sigma[:, None]
-        by_theory[POSTERIORI] = sigma * known.factor_quantiles(levels)
-        by_theory[TILT] = known.tilts.quantile(levels)
-        inexact = known.tilts.relative_error(levels)
-    found: dict[Key, Estimates] = {}
-    for quantity, column in (*quantities.items(), (TILT, "tilt")):
-        for i, name in enumerate(TILTS if quantity == TILT else cell.parameter_units):
-            found[quantity, name] = controlled_quantiles(
-                levels,
-                own[column][:, i],
-                None if theory is None else theory[column][:, i],
-                by_theory[quantity][i] if by_theory else None,
-                converged,
-                inexact[i] if quantity == TILT else 0.0,
-            )
-    return found
 
 
 def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dict[str, Array]:
@@ -298,5 +238,5 @@ def simulated_statistics(
     leveling, levels : as of `statistics`
     """
     if not cell.estimability.estimable:
-        return CellStatistics.unknown(cell)
+        return CellStatistics(cell)
     return statistics(cell, simulate(cell, seed), leveling, levels)

@@ -1,19 +1,224 @@
-"""The estimates that are kept, and the tables of a study."""
+"""The tables of a study: what came of its cells, and their estimates as they are stored."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.files.tables import read_table, tables_in
+from accelstudy.basics.shares import Z95, sigmas_95, wilson
+from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
+from accelstudy.design import closed_forms
+from accelstudy.effects import get_effect
+from accelstudy.files.tables import read_table
+from accelstudy.study.cell import Cell
+from accelstudy.study.estimate import UNKNOWN, Estimates
+from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Array = NDArray[np.float64]
+
 TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 """Tables that each cell contributes to."""
+
+
+def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:
+    """Each of `TABLES` with the rows of some cells, in order and in the units shown to people."""
+    import pandas as pd
+
+    makers = (_cell, _summary, _correlations, _leveling, _quantiles)
+    rows = [[pd.DataFrame(make(one)) for make in makers] for one in results]
+    parts = dict(zip(TABLES, zip(*rows, strict=True), strict=True))
+    return {name: pd.concat(part, ignore_index=True) for name, part in parts.items()}
+
+
+def _cell(statistics: CellStatistics) -> dict[str, Any]:
+    """What its positions determine, and how many calibrations there are."""
+    theory, positions = statistics.cell.estimability, statistics.cell.positions
+    return {
+        **statistics.cell.labels,
+        "n_positions": [positions.n_positions],
+        "n_parameters": len(theory.parameter_names),
+        "rank": theory.rank,
+        "condition": theory.condition,
+        "redundancy": theory.redundancy,
+        "fourth_moment": theory.fourth_moment,
+        "pole_distance_gon": theory.pole_distance / GON,
+        "estimable": theory.estimable,
+        "not_estimable": ", ".join(theory.not_estimable),
+        "reason": theory.reason,
+        "n_replicates": statistics.simulated,
+        "n_converged": statistics.converged,
+        "control": statistics.control,
+        **_columns("variance_factor", statistics["variance_factor"]),
+    }
+
+
+def _columns(
+    name: str, estimates: Estimates, short: str | None = None, plain: bool = False
+) -> dict[str, Any]:
+    """Columns of estimates: values, standard errors, gains, and the plain averages."""
+    short = short or name
+    columns = {name: estimates.value, f"{short}_se": estimates.error}
+    columns[f"{short}_gain"] = estimates.gain
+    return {**columns, f"{short}_plain": estimates.plain} if plain else columns
+
+
+def _summary(statistics: CellStatistics) -> dict[str, Any]:
+    """Statistics of each parameter; NaN where there are none."""
+    cell, n, theory = statistics.cell, statistics.converged, statistics.cell.estimability
+    units, exact = cell.parameter_units.values(), _closed_forms(cell)
+    factors = np.array([float(to_recorded(1.0, unit)) for unit in units])
+    bias, sd, priori, posteriori = (
+        statistics[name].scaled(factors)
+        for name in ("bias", "sd", "sigma_priori", "sigma_posteriori")
+    )
+    half = sigmas_95(n - 1) * bias.error if n > 1 else np.nan
+    ratio = statistics["sd_ratio"]
+    spread = np.exp(Z95 * ratio.error / ratio.value)
+    first_error, first_sigma = statistics.first
+    return {
+        **cell.labels,
+        "parameter": [*cell.parameter_units],
+        "unit": [recorded_unit(unit) for unit in units],
+        "truth": cell.true_values * factors,
+        **_columns("bias", bias, plain=True),
+        **_columns("sd_empirical", sd, "sd", plain=True),
+        **_columns("sd_posteriori_mean", posteriori, "sd_posteriori"),
+        **_columns("sd_priori_mean", priori, "sd_priori"),
+        "bias_ci95_low": bias.value - half,
+        "bias_ci95_high": bias.value + half,
+        "sd_linear": theory.sigma * factors,
+        "sd_closed_form": [exact.get(name, np.nan) for name in cell.parameter_units] * factors,
+        "first_error": first_error * factors,
+        "first_sd_posteriori": first_sigma * factors,
+        "sd_ratio": ratio.value,
+        "sd_ratio_ci95_low": ratio.value / spread,
+        "sd_ratio_ci95_high": ratio.value * spread,
+        **coverage_columns(statistics["coverage"], n if theory.redundancy > 0 else 0),
+        "n_replicates": statistics.simulated,
+        "n_converged": n,
+        "estimable": [name not in theory.not_estimable for name in cell.parameter_units],
+        "reason": theory.reason,
+    }
+
+
+def coverage_columns(inside: Estimates, n: int) -> dict[str, Any]:
+    """Shares of the nominal 95 % intervals that hold the truth, with their 95 % intervals.
+
+    Without a gain the interval is Wilson's. With one, few intervals hold the truth in simulation
+    and not in linear theory, or the other way round; one more of these than there were is allowed
+    for, as none may have been seen.
+
+    Parameters
+    ----------
+    inside : Estimates of the shares
+    n : int, calibrations that have such intervals
+    """
+    if not n:
+        nothing = dict.fromkeys(("coverage_95_low", "coverage_95_high"), np.nan)
+        return {**_columns("coverage_95", UNKNOWN), **nothing}
+    plain = np.clip(inside.plain, 0.0, 1.0)  # a mean of ones may round to more than one
+    alone, error = np.sqrt(plain * (1 - plain) / n), np.hypot(inside.error, 1 / n)
+    better = (inside.gain != 1) & (error < alone)
+    gain = np.where(better, (alone / error) ** 2, 1.0)
+    value = np.where(better, inside.value, plain)
+    low, high = np.array([wilson(round(share * n), n) for share in plain]).T
+    return {
+        **_columns("coverage_95", Estimates(value, np.where(better, error, alone), gain, plain)),
+        "coverage_95_low": np.where(better, np.maximum(value - Z95 * error, 0.0), low),
+        "coverage_95_high": np.where(better, np.minimum(value + Z95 * error, 1.0), high),
+    }
+
+
+def _closed_forms(cell: Cell) -> dict[str, float]:
+    """Closed form of each parameter's sd in SI; empty where none applies."""
+    directions = cell.positions.directions
+    if (
+        set(cell.effects) not in closed_forms.COVERED_EFFECTS
+        or cell.noise.sigma_gravity > 0
+        or not closed_forms.has_octahedral_moments(directions)
+    ):
+        return {}
+    sigma = closed_forms.gravity_sigma(directions, cell.noise.sigma_force, cell.gravity)
+    if cell.conditions.uses_angles:
+        if cell.noise.sigma_angle > 0:
+            return {}
+        ratio = closed_forms.perfect_robot_ratio(directions)
+        sigma = {effect: value * ratio[effect] for effect, value in sigma.items()}
+    return {
+        parameter.name: sigma[effect]
+        for effect in cell.effects
+        for parameter in get_effect(effect).parameters
+        if np.isfinite(sigma[effect])
+    }
+
+
+def _correlations(statistics: CellStatistics) -> dict[str, Any]:
+    """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
+    simulated = None if statistics.replicates is None else statistics.replicates.simulated
+    names = [] if simulated is None else [*statistics.cell.parameter_units]
+    u, empirical = len(names), statistics["correlation"]
+    pairs = u * (u - 1) // 2
+    number = np.zeros((u, u), int)  # of each pair; the diagonal stands before them
+    number[np.tril_indices(u, -1)] = np.arange(1, pairs + 1)
+    place = (number + number.T).ravel()
+    one = 1.0 if np.isfinite(empirical.plain).any() else np.nan
+
+    def whole(below: Array, diagonal: float) -> Array:
+        return np.append(diagonal, np.broadcast_to(below, pairs))[place]
+
+    return {
+        "cell": statistics.cell.name,
+        "parameter_1": np.repeat(np.array(names, str), u),
+        "parameter_2": np.tile(np.array(names, str), u),
+        "adjustment": []
+        if simulated is None
+        else simulated.correlation_sum.ravel() / (statistics.converged or np.nan),
+        "empirical": whole(np.clip(empirical.value, -1, 1), one),
+        "empirical_se": whole(empirical.error, 0.0 * one),
+        "empirical_gain": whole(empirical.gain, np.nan),
+        "empirical_plain": whole(np.clip(empirical.plain, -1, 1), one),
+    }
+
+
+def _leveling(statistics: CellStatistics) -> dict[str, Any]:
+    """Rms of the tilt error over all calibrations, and its 95 % quantiles."""
+    columns = statistics.cell.labels
+    rms = statistics["tilt_rms"].scaled(np.ones(len(ANGLES)) / MGON)
+    for i, angle in enumerate(ANGLES):
+        columns |= _columns(f"{angle}_rms_mgon", rms[i], f"{angle}_rms", plain=True)
+    for name in TILTS:
+        bound = statistics.quantile(TILT, name, 0.95).scaled(1 / MGON)
+        columns |= _columns(f"{name}_rms_q95_mgon", bound, f"{name}_rms_q95", plain=True)
+    rows = 0 if statistics.replicates is None else 1
+    return {**columns, "n_converged": np.full(rows, statistics.converged)}
+
+
+def _quantiles(statistics: CellStatistics) -> dict[str, Any]:
+    """Quantiles of the errors and sds of each parameter and of the tilt error."""
+    units = {**statistics.cell.parameter_units, **dict.fromkeys(TILTS, "rad")}
+    each, levels = statistics.quantiles.items(), statistics.levels
+    shown = [found.scaled(float(to_recorded(1.0, units[name]))) for (_, name), found in each]
+    texts = [(quantity, name, recorded_unit(units[name])) for (quantity, name), _ in each]
+    repeated = np.repeat(np.array(texts, str).reshape(-1, 3), len(levels), axis=0)
+    numbers = {
+        end: np.concatenate([np.zeros(0), *(getattr(one, name) for one in shown)])
+        for end, name in {"": "value", "_se": "error", "_gain": "gain", "_plain": "plain"}.items()
+    }
+    return {
+        **statistics.cell.labels,
+        **dict(zip(("quantity", "name", "unit"), repeated.T, strict=True)),
+        "probability": np.tile(levels, len(each)),
+        **{f"value{end}": each for end, each in numbers.items()},
+        "n_converged": statistics.converged,
+    }
 
 
 def collect(parts: Sequence[str | Path], cells: Sequence[str]) -> pd.DataFrame:
@@ -21,18 +226,6 @@ def collect(parts: Sequence[str | Path], cells: Sequence[str]) -> pd.DataFrame:
     table = read_table(parts)
     at = table["cell"].astype(str).map({name: i for i, name in enumerate(cells)})
     return table.iloc[at.argsort(kind="stable")].reset_index(drop=True)
-
-
-def _check_cells(folder: Path) -> None:
-    """Check that no cell stands twice: an earlier configuration may have fanned out otherwise."""
-    files: dict[str, Path] = {}
-    for path in tables_in(folder):
-        for cell in read_table(path, columns=["cell"])["cell"].unique():
-            if (other := files.setdefault(cell, path)) != path:
-                raise InputError(
-                    f"{other} and {path} both hold the cell {cell}; delete what is not of your "
-                    "study"
-                )
 
 
 def read_estimates(
@@ -51,12 +244,21 @@ def read_estimates(
     DataFrame
         The stored columns, and error, sigma0_squared and sigma_posteriori (NaN without
         redundancy), all in SI.
+
+    Raises
+    ------
+    InputError
+        As `accelstudy.files.tables.read_table`; if a cell stands in two files, as an earlier
+        configuration may have left them.
     """
     names = [cells] if isinstance(cells, str) else cells
     filters = None if names is None else [("cell", "in", list(names))]
-    if isinstance(path, str | Path) and Path(path).is_dir():
-        _check_cells(Path(path))
     table = read_table(path, filters=filters)
+    if (twice := table.duplicated(["cell", "replicate", "parameter"])).any():
+        cell = table.loc[twice, "cell"].iloc[0]
+        raise InputError(
+            f"{path}: two files hold the cell {cell}; delete what is not of your study"
+        )
     table["error"] = table["estimate"] - table["truth"]
     table["sigma0_squared"] = table["omega"] / table["redundancy"].where(table["redundancy"] > 0)
     table["sigma_posteriori"] = table["sigma0_squared"] ** 0.5 * table["sigma_priori"]

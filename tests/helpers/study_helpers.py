@@ -57,8 +57,7 @@ def plain(cell, seed):
 def simulate_cells(folder, cells, seed=1, leveling=LEVELING):
     """Simulate cells as a job; the paths of the estimates and the tables."""
     paths = {name: folder / f"{name}.parquet" for name in ("estimates", *TABLES)}
-    plain = [cell.to_dict() for cell in cells]
-    results.simulate_cells(plain, leveling, paths, {**PROVENANCE, "seed": seed})
+    results.simulate_cells([*cells], leveling, paths, {**PROVENANCE, "seed": seed})
     return paths
 
 

@@ -217,7 +217,9 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
         cell.simulated_model, cell.simulated_model.vector(cell.truth), cell.estimated_model,
         replicates.estimates, cap_forces(30 * GON, 200),
     )  # fmt: skip
-    np.testing.assert_allclose(error.rms, plan.first.simulated.statistics.tilt_rms.plain, rtol=1e-5)
+    np.testing.assert_allclose(
+        error.rms, plan.first.simulated.statistics["tilt_rms"].plain, rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("name", data_sheet_names())

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 
 import pytest
 import yaml
@@ -21,7 +22,6 @@ from accelstudy.files.reading import overlay, read_layer
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, get_model
-from accelstudy.study.cell import Cell
 from accelstudy.study.config import Study, config_schema, parse_study, read_study
 
 CONFIG = ROOT / "config" / "config.yaml"
@@ -438,7 +438,7 @@ def test_cells_of_any_valid_study(keys):
     assert cells
     assert len({cell.name for cell in cells}) == len(cells)
     for cell in cells:
-        assert Cell.from_dict(json.loads(json.dumps(cell.to_dict()))) == cell
+        assert pickle.loads(pickle.dumps(cell)) == cell
         assert set(cell.truth) >= set(cell.simulated_model.parameter_names)
     # One cell, one set-up.
     setups = {(c.effects, c.scheme, c.approach, c.noise, c.model) for c in cells}

@@ -183,8 +183,8 @@ def test_stated_errors_are_those_over_seeds(noise, approach):
     cell = cell_of(noise, approach, replicates=100)
     many = [simulated_statistics(cell, seed, LEVELING, [0.5, 0.95]) for seed in range(40)]
     for name in STATISTICS:
-        values = np.array([getattr(one, name).value for one in many])
-        errors = np.array([getattr(one, name).error for one in many])
+        values = np.array([one[name].value for one in many])
+        errors = np.array([one[name].error for one in many])
         ratio = values.std(axis=0, ddof=1) / np.sqrt(np.mean(errors**2, axis=0))
         low, high = (0.8, 1.2) if values.shape[1] > 2 else (0.6, 1.45)
         assert low < np.sqrt(np.mean(ratio**2)) < high, name
@@ -215,12 +215,12 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
     assert (few.control, many.control) == ("linear", "none")
     limit = 6 if keys is DISTURBED else STANDARD_ERRORS  # heavy tails of squares
     for name in ("bias", "sd", "tilt_rms", "variance_factor"):
-        one, other = getattr(few, name), getattr(many, name)
+        one, other = few[name], many[name]
         assert (other.gain == 1).all()
         assert (one.gain > 0.9).all()
         z = (one.value - other.value) / np.hypot(one.error, other.error)
         assert np.abs(z).max() < limit, name
-    assert few.sd.gain.min() > gain * 0.9
+    assert few["sd"].gain.min() > gain * 0.9
     for name in ("roll", "pitch", "both"):
         one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
         assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
@@ -232,7 +232,7 @@ def test_where_calibrations_fail_what_is_left_is_estimated():
     assert 3 < found.simulated - found.converged < 300
     many = plain(replace(cell, replicates=10_000), 2)
     for name in ("bias", "sd", "coverage", "correlation", "tilt_rms"):
-        one, other = getattr(found, name), getattr(many, name)
+        one, other = found[name], many[name]
         error = np.hypot(np.hypot(one.error, other.error), 1 / 1000 if name == "coverage" else 0)
         assert np.abs((one.value - other.value) / error).max() < STANDARD_ERRORS, name
 
@@ -241,11 +241,11 @@ def test_plain_statistics_stand_beside():
     cell = cell_of(0.1, replicates=300)
     found, alone = simulated_statistics(cell, 1, LEVELING), plain(cell, 1)
     errors = simulate(cell, 1).simulated.estimates - cell.true_values
-    np.testing.assert_allclose(found.bias.plain, errors.mean(axis=0))
-    np.testing.assert_allclose(found.sd.plain, errors.std(axis=0, ddof=1))
+    np.testing.assert_allclose(found["bias"].plain, errors.mean(axis=0))
+    np.testing.assert_allclose(found["sd"].plain, errors.std(axis=0, ddof=1))
     for name in STATISTICS:
-        np.testing.assert_array_equal(getattr(found, name).plain, getattr(alone, name).value)
-        assert np.median(getattr(found, name).gain) > 10
+        np.testing.assert_array_equal(found[name].plain, alone[name].value)
+        assert np.median(found[name].gain) > 10
     one, other = found.quantile(TILT, "both", 0.95), alone.quantile(TILT, "both", 0.95)
     assert one.plain == other.value
 

@@ -274,8 +274,10 @@ def test_a_cell_in_two_files_of_a_folder_is_an_error(tmp_path):
     """As a study leaves them that fans out otherwise than before."""
     for name in ("model", "model/scheme"):
         path = tmp_path / name / "gravity.parquet"
-        write_table(path, pd.DataFrame({"cell": ["a", "b"]}), PROVENANCE)
-    with pytest.raises(InputError, match=r"gravity.parquet both hold the cell a; delete"):
+        write_table(
+            path, pd.DataFrame({"cell": ["a", "b"], "replicate": 0, "parameter": "b_x"}), PROVENANCE
+        )
+    with pytest.raises(InputError, match=r"two files hold the cell a; delete"):
         read_estimates(tmp_path)
 
 

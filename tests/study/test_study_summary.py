@@ -4,7 +4,6 @@ Limits of single statistics are 4.5 standard errors.
 """
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -15,10 +14,9 @@ from study_helpers import NINE, PAPER_SENSOR, grid, run_study
 
 from accelstudy.schemes import get_scheme
 from accelstudy.study import replicates as module
-from accelstudy.study import summary as module_of_tables
 from accelstudy.study.compiling import calibrator
 from accelstudy.study.estimate import Estimates
-from accelstudy.study.tables import read_estimates
+from accelstudy.study.tables import coverage_columns, read_estimates
 
 STANDARD_ERRORS = 4.5
 REPLICATES = 2000
@@ -119,8 +117,7 @@ def test_coverage_of_the_confidence_intervals(summary):
 def test_wilson_interval_of_the_coverage():
     """Of plain averages."""
     inside = Estimates(*(np.array([x]) for x in (0.93, 1e-2, 1.0, 0.93)))
-    statistics = SimpleNamespace(converged=500, redundancy=3, coverage=inside)
-    row = module_of_tables._coverage(statistics, 0)
+    row = {name: column[0] for name, column in coverage_columns(inside, 500).items()}
     p, n, z = row["coverage_95"], 500, 1.959964
     centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
@@ -131,8 +128,7 @@ def test_wilson_interval_of_the_coverage():
 def test_a_coverage_that_rounds_to_more_than_one():
     """A mean of ones is made of differences and of linear theory's, each rounded."""
     inside = Estimates(*(np.array([x]) for x in (0.95, 1e-4, 9.0, np.nextafter(1, 2))))
-    statistics = SimpleNamespace(converged=30, redundancy=3, coverage=inside)
-    row = module_of_tables._coverage(statistics, 0)
+    row = {name: column[0] for name, column in coverage_columns(inside, 30).items()}
     assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
     assert row["coverage_95_se"] == 0
 

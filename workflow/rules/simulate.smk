@@ -14,7 +14,7 @@ rule simulate:
     resources:
         mem_mb=lambda wildcards, attempt: memory(SET_UPS[SET_UP.format(**wildcards)]) * attempt,
     params:
-        cells=lambda wildcards: [c.to_dict() for c in SET_UPS[SET_UP.format(**wildcards)]],
+        cells=lambda wildcards: SET_UPS[SET_UP.format(**wildcards)],
         leveling=STUDY.leveling.model_dump(),
         seed=STUDY.seed,
         version=NUMBERS,
