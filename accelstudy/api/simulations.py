@@ -25,8 +25,7 @@ from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.cell import Cell
-from accelstudy.study.config import parse_study
-from accelstudy.study.config.blocks import LevelingConfig
+from accelstudy.study.config import LevelingConfig, parse_study
 from accelstudy.study.statistics import (
     ANGLES,
     TILT,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -62,28 +63,6 @@ class NewSensor:
     source: dict[str, str] = field(default_factory=dict)
     campaign: Path | None = None
 
-    def shown(self) -> dict[str, Any]:
-        """What templates show of it."""
-        effects = [
-            {
-                "name": name,
-                "parameters": ", ".join(p.name for p in get_effect(name).parameters),
-                "source": self.source.get(name, "of the paper"),
-                "value": f"[{', '.join(_number(v / UNITS[name][1]) for v in values)}]",
-                "unit": UNITS[name][0],
-                "si": ", ".join(map(_number, values)),
-            }
-            for name, values in self.errors.items()
-        ]
-        return {
-            "sigma": _number(self.sigma),
-            "noise": self.noise,
-            "sigma_mgon": _number(self.sigma_angle / MGON),
-            "gravity": _number(self.gravity, 9),
-            "effects": effects,
-            "campaign": None if self.campaign is None else str(self.campaign.resolve()),
-        }
-
 
 def new_study(
     folder: Path, template: str = "study", sensor: NewSensor | None = None, force: bool = False
@@ -106,56 +85,50 @@ def new_study(
     InputError
         If the folder is not empty, or cannot be written.
     """
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     name = re.sub(r"[^A-Za-z0-9]+", "-", folder.resolve().name).strip("-") or "study"
     sensor = sensor or NewSensor()
-    content = {
-        "name": name,
-        "template": template,
-        "what": TEMPLATES[template],
-        "sensor": sensor.shown(),
-    }
     jinja = Environment(
-        undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(TEMPLATE, encoding="utf-8"),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
+    jinja.filters["numbers"] = _numbers
+    words = {"name": name, "template": template, "what": TEMPLATES[template], "sensor": sensor}
+    effects = [(get_effect(effect), *UNITS[effect]) for effect in sensor.errors]
     sources = {
-        "Snakefile": TEMPLATE / f"{template}.smk",
-        "config/config.yaml": TEMPLATE / f"{template}.yaml",
-        "README.md": TEMPLATE / "README.md",
+        "Snakefile": f"{template}.smk",
+        "config/config.yaml": f"{template}.yaml",
+        "README.md": "README.md",
     }
     inputs = [] if sensor.campaign is None else [sensor.campaign]
     with result_folder(folder, STUDY, inputs, force=force) as new:
+        (new / "config").mkdir()
         for target, source in sources.items():
-            text = source.read_text(encoding="utf-8")
-            _write(new / target, jinja.from_string(text).render(content))
+            text = jinja.get_template(source).render(**words, effects=effects, mgon=MGON)
+            (new / target).write_text(text, encoding="utf-8")
         if named := as_a_key():  # the workflow runs in the new folder
             named = {k: {os.path.abspath(p): d for p, d in v.items()} for k, v in named.items()}
             with (new / "config" / "config.yaml").open("a", encoding="utf-8") as file:
                 file.write(f"\n{yaml.safe_dump(named)}")
-        for source in sorted(shipped("profiles").glob("*/*.yaml")):
-            _write(new / "profiles" / source.parent.name / source.name, source.read_text("utf-8"))
-        if template == "campaigns" and sensor.campaign is None:
-            write_campaign(_example(sensor), new / "campaigns" / "example")
+        shutil.copytree(shipped("profiles"), new / "profiles")
+        if template == "campaigns" and sensor.campaign is None:  # an example, to begin with
+            settings = CampaignSettings(
+                name="example",
+                sigma=sensor.sigma,
+                gravity=sensor.gravity,
+                effects=tuple(f"{k}: {_numbers(v)}" for k, v in sensor.errors.items()),
+            )
+            write_campaign(simulate_campaign(settings)[0], new / "campaigns" / "example")
     return name
 
 
-def _example(sensor: NewSensor) -> Any:
-    """A campaign that a sensor might have measured, to begin with."""
-    settings = CampaignSettings(
-        name="example",
-        sigma=sensor.sigma,
-        gravity=sensor.gravity,
-        effects=tuple(f"{effect['name']}: {effect['si']}" for effect in sensor.shown()["effects"]),
+def _numbers(values: Iterable[float], unit: float = 1.0, digits: int = 4) -> str:
+    """Write numbers without an exponent, which not all readers of YAML take for a number."""
+    return ", ".join(
+        np.format_float_positional(value / unit, digits, unique=False, fractional=False, trim="-")
+        for value in values
     )
-    return simulate_campaign(settings)[0]
-
-
-def _number(value: float, digits: int = 4) -> str:
-    """Write a number without an exponent, which not all readers of YAML take for a number."""
-    return np.format_float_positional(value, digits, unique=False, fractional=False, trim="-")
-
-
-def _write(target: Path, text: str) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(text, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -11,8 +11,9 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import to_si
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import leveling_shares
-from accelstudy.sensors.sensor import SensorModel
-from accelstudy.study.config import Study
+
+if TYPE_CHECKING:
+    from accelstudy.study.config import SensitivityConfig, Study
 
 APPROACHES = ("gravity", "robot")
 """The approaches with whose calibrations the sensitivity is analysed."""
@@ -29,16 +30,13 @@ def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
     study : Study, with `sensitivity`
     summary : DataFrame, the table of that name, with all cells that are analysed
     """
-    settings = study.sensitivity
-    assert settings is not None
-    model, truth = _sensor(study)
-    tables = []
-    for analysis in ("forces", *APPROACHES):
-        calibrated: dict[str, Any] = {}
-        if analysis != "forces":
-            sigma = _empirical_sigma(study, analysis, summary)
-            calibrated = {"model": model, "parameters": truth, "sigma_parameters": sigma}
-        table = leveling_sensitivity(
+    settings, sensor = _sensor(study)
+    calibrated: dict[str, dict[str, Any]] = {"forces": {}}
+    for approach in APPROACHES:
+        sigma = _empirical_sigma(settings, approach, summary)
+        calibrated[approach] = {**sensor, "sigma_parameters": sigma}
+    tables = {
+        analysis: leveling_sensitivity(
             settings.roll_gon,
             settings.pitch_gon,
             study.sigma_force,
@@ -46,11 +44,11 @@ def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:
             settings.resamples,
             study.seed,
             g=study.gravity_mps2,
-            **calibrated,
+            **of_parameters,
         )
-        table.insert(0, "analysis", analysis)
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+        for analysis, of_parameters in calibrated.items()
+    }
+    return _joined(tables)
 
 
 def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFrame) -> pd.DataFrame:
@@ -64,46 +62,43 @@ def shapley_table(study: Study, summary: pd.DataFrame, correlations: pd.DataFram
     study : Study, with `sensitivity`
     summary, correlations : DataFrame, the tables of those names, as of `sensitivity_table`
     """
-    settings = study.sensitivity
-    assert settings is not None
-    model, truth = _sensor(study)
-    names = list(model.parameter_names)
-    tables = []
+    settings, sensor = _sensor(study)
+    names, tables = list(settings.model.parameter_names), {}
     for approach in APPROACHES:
-        sigma = _empirical_sigma(study, approach, summary)
+        sigma = _empirical_sigma(settings, approach, summary)
         of_cell = correlations[correlations["cell"] == settings.cell(approach)]
         matrix = of_cell.pivot_table("adjustment", "parameter_1", "parameter_2", observed=True)
-        table = leveling_shares(
+        tables[approach] = leveling_shares(
             settings.roll_gon,
             settings.pitch_gon,
             study.sigma_force,
-            model,
-            truth,
-            matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
-            study.gravity_mps2,
+            covariance=matrix.loc[names, names].to_numpy() * np.outer(sigma, sigma),
+            g=study.gravity_mps2,
+            **sensor,
         )
-        table.insert(0, "analysis", approach)
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+    return _joined(tables)
 
 
-def _sensor(study: Study) -> tuple[SensorModel, np.ndarray]:
-    """Model of the sensitivity analysis, and its true parameters, (u,), SI."""
+def _sensor(study: Study) -> tuple[SensitivityConfig, dict[str, Any]]:
+    """Settings of the analysis; its model, and the true parameters of this, (u,), SI."""
     settings = study.sensitivity
     assert settings is not None
-    model = settings.model
-    return model, model.vector(study.truth(e.spec for e in model.effects))
+    truth = settings.model.vector(study.truth(e.spec for e in settings.model.effects))
+    return settings, {"model": settings.model, "parameters": truth}
 
 
-def _empirical_sigma(study: Study, approach: str, summary: pd.DataFrame) -> np.ndarray:
+def _empirical_sigma(
+    settings: SensitivityConfig, approach: str, summary: pd.DataFrame
+) -> np.ndarray:
     """Standard deviations of the parameters over the Monte Carlo, (u,), SI."""
-    settings = study.sensitivity
-    assert settings is not None
     cell = settings.cell(approach)
     rows = summary[summary["cell"] == cell].set_index("parameter")
     if rows.empty or rows["sd_empirical"].isna().any():
         raise InputError(f"sensitivity: the study has no estimates of the cell {cell}")
-    sigma, units = rows["sd_empirical"].to_dict(), rows["unit"].astype(str).to_dict()
-    return np.array(
-        [float(to_si(sigma[p.name], units[p.name], p.unit)) for p in settings.model.parameters]
-    )
+    sigma, unit = rows["sd_empirical"], rows["unit"]
+    parameters = settings.model.parameters
+    return np.array([float(to_si(sigma[p.name], str(unit[p.name]), p.unit)) for p in parameters])
+
+
+def _joined(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    return pd.concat(tables, names=["analysis"]).reset_index("analysis").reset_index(drop=True)

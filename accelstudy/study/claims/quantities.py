@@ -21,8 +21,7 @@ from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
-from accelstudy.study.config import Study
-from accelstudy.study.config.blocks import SensitivityConfig
+from accelstudy.study.config import SensitivityConfig, Study
 from accelstudy.study.sensitivity import APPROACHES
 
 Array = NDArray[np.float64]

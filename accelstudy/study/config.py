@@ -1,0 +1,635 @@
+"""A study, as its configuration `config/*.yaml` says: schema, parser and cells.
+
+The models below are the schema; `workflow/schemas/config.schema.json` is generated from them.
+Models, schemes, approaches and effects are written by their names; a block has the objects.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import core_schema
+
+from accelstudy.approaches import Approach, approach_names, get_approach
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.names import LONGEST
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY, to_si
+from accelstudy.effects import Effect, get_effect
+from accelstudy.files import validation as kinds
+from accelstudy.files.reading import config_hash, overlay, read_layer
+from accelstudy.files.validation import Block, Configuration, OneOrMore, checked
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
+from accelstudy.noise_effects import NoiseEffect, get_noise_effect
+from accelstudy.schemes import Scheme, get_scheme, scheme_names
+from accelstudy.schemes.files import held, remember
+from accelstudy.sensors.models import MODELS, NINE, PRESETS, compose, get_model
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
+from accelstudy.simulation.sessions import Noise, sigma_of_mean
+from accelstudy.study.cell import Cell
+from accelstudy.study.compiling import with_compiled
+
+# --- how a configuration is read ------------------------------------------------------------------
+
+
+def read_study(*paths: str | Path) -> Study:
+    """Read a configuration from YAML files; later ones overlay earlier ones key by key.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, is no YAML mapping, or does not fit the schema.
+    """
+    content: dict[str, Any] = {}
+    for path in paths:
+        content = overlay(content, read_layer(path))
+    return parse_study(content, ", ".join(str(path) for path in paths))
+
+
+def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:
+    """Check a configuration.
+
+    Parameters
+    ----------
+    content : mapping, as read from YAML
+    source : str, named in errors
+
+    Raises
+    ------
+    InputError
+        One line that names the source, the key, what is wrong and what would be right.
+    """
+    study = checked(Study, content, source)
+    with _at(source):
+        study.check()
+    return study
+
+
+def named_files(content: Any) -> list[str]:
+    """Files that a configuration names: of schemes, models and plug-ins."""
+    if isinstance(content, str):
+        named = content.endswith((".yaml", ".yml", ".py")) and Path(content).is_file()
+        return [content] if named else []
+    if isinstance(content, Mapping):
+        content = [*content, *content.values()]
+    if not isinstance(content, list):
+        return []
+    return sorted({path for each in content for path in named_files(each)})
+
+
+def config_schema() -> dict[str, Any]:
+    """JSON schema of the configuration, as kept in `workflow/schemas/config.schema.json`."""
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    return {"$schema": dialect, **Study.model_json_schema()}
+
+
+@contextmanager
+def _at(key: str) -> Iterator[None]:
+    """Name the key at which an error occurs."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from None
+
+
+# --- things that are written by their names -------------------------------------------------------
+
+OWN_MODELS: ContextVar[Mapping[str, SensorModel]] = ContextVar(
+    "own_models", default=MappingProxyType({})
+)
+"""Models that the configuration defines, while the blocks that may name them are parsed."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """How a field is written: the type in the file, and the ways there and back.
+
+    Attributes
+    ----------
+    kind : type, of what the file has
+    parse, plain : functions from that to the object, and back
+    """
+
+    kind: Any
+    parse: Callable[[Any], Any]
+    plain: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        back = core_schema.plain_serializer_function_ser_schema(self.plain)
+        inner = handler.generate_schema(self.kind)
+        return core_schema.no_info_after_validator_function(self.parse, inner, serialization=back)
+
+
+def _one(find: Callable[[str], Any]) -> Written:
+    return Written(str, find, lambda thing: thing.name)
+
+
+def _several(find: Callable[[str], Any], everything: Callable[[], Iterable[str]]) -> Written:
+    """How a list of things is written: by their names, or as `all`."""
+
+    def parse(names: list[str]) -> list[Any]:
+        return [find(name) for name in (everything() if names == ["all"] else names)]
+
+    return Written(OneOrMore[str], parse, lambda things: [thing.name for thing in things])
+
+
+def _model(text: str) -> SensorModel:
+    return get_model(text, OWN_MODELS.get())
+
+
+def _composed(effects: Iterable[str], name: str = "") -> SensorModel:
+    """Compose a model; the same one for the same effects, however they are written."""
+    return compose(name, tuple(get_effect(effect).spec for effect in effects))
+
+
+def _specs(effects: Collection[Any]) -> list[str]:
+    return [effect.spec for effect in effects]
+
+
+def _noise_effects(texts: list[str]) -> list[NoiseEffect]:
+    specs = [get_noise_effect(text).spec for text in texts]
+    return [get_noise_effect(spec) for spec in specs]  # the same one, however it is written
+
+
+def _simulated(effects: list[str]) -> SensorModel | None:
+    return None if effects == ["model"] else _composed(effects, "simulated")
+
+
+_NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
+
+
+def _own_name(name: str) -> str:
+    if name in MODELS:
+        raise InputError("is the name of a registered model; choose another")
+    if name == "all" or not re.fullmatch(_NAME, name) or len(name) > LONGEST:
+        raise InputError(
+            "is not a valid name: use letters, digits, _ and -, "
+            f"at most {LONGEST} of them, and not `all`"
+        )
+    return name
+
+
+Models = Annotated[list[SensorModel], _several(_model, lambda: [*MODELS, *OWN_MODELS.get()])]
+Schemes = Annotated[list[Scheme], _several(get_scheme, scheme_names)]
+Approaches = Annotated[list[Approach], _several(get_approach, approach_names)]
+Composition = Annotated[
+    SensorModel, Written(OneOrMore[str], _composed, lambda model: _specs(model.effects))
+]
+"""A model that is written as a list of effects."""
+Simulated = Annotated[
+    SensorModel | None,
+    Written(
+        OneOrMore[str],
+        _simulated,
+        lambda model: _specs(model.effects) if model else ["model"],
+    ),
+]
+
+# --- the blocks ----------------------------------------------------------------------------------
+
+
+class SensorNoise(Block):
+    """White noise of the accelerometer."""
+
+    sigma_mps2: kinds.SigmaForce = Field(0.002, description="standard deviation per axis, m/s²")
+    per: Literal["position", "sample"] = Field(
+        "position", description="whether sigma_mps2 is that of a position's mean or of one sample"
+    )
+    rate_hz: kinds.Rate = Field(100.0, description="sampling rate; used with per: sample")
+    duration_s: kinds.Duration = Field(2.0, description="duration of a hold; used with per: sample")
+
+    def of_mean(self, sigma_mps2: float) -> float:
+        """Noise of a position's mean, m/s², from a configured noise (per position or sample)."""
+        if self.per == "position":
+            return sigma_mps2
+        return sigma_of_mean(sigma_mps2, self.rate_hz, self.duration_s)
+
+
+class RobotNoise(Block):
+    """Noise of the robot's angles."""
+
+    sigma_mgon: kinds.SigmaAngle = Field(3.2, description="standard deviation of roll and of pitch")
+
+
+class GravityNoise(Block):
+    """What is known of local gravity."""
+
+    sigma_mps2: kinds.SigmaGravity = Field(
+        0.0, description="standard deviation of the value used; 0 holds it fixed in the adjustment"
+    )
+    error_mps2: kinds.GravityError = Field(0.0, description="systematic error of the value used")
+
+
+class NoiseConfig(Block):
+    """The stochastic model of all cells, except where a grid gives other values."""
+
+    sensor: SensorNoise = SensorNoise()
+    robot: RobotNoise = RobotNoise()
+    gravity: GravityNoise = GravityNoise()
+    effects: Annotated[list[NoiseEffect], Written(list[str], _noise_effects, _specs)] = Field(
+        default_factory=list,
+        description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
+        "they act; the calibration ignores them",
+    )
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """The four settings that a grid may vary, by their keys there."""
+        return {
+            "sensor_sigma_mps2": self.sensor.sigma_mps2,
+            "robot_sigma_mgon": self.robot.sigma_mgon,
+            "gravity_sigma_mps2": self.gravity.sigma_mps2,
+            "gravity_error_mps2": self.gravity.error_mps2,
+        }
+
+
+class HoldPlanConfig(Block):
+    """Conditions of the holds, on which some effects depend."""
+
+    interval_s: kinds.Interval | None = Field(None, description="time between holds")
+    temperature_degC: tuple[kinds.Temperature, kinds.Temperature] | None = Field(
+        None, description="temperatures from and to"
+    )
+    temperature_order: Literal["linear", "ABBA", "random"] = Field(
+        "linear", description="course of the temperature; ABBA: in quarters of the session"
+    )
+    vibration_mps2: tuple[kinds.Vibration, kinds.Vibration] | None = Field(
+        None, description="rms of the vibration, drawn for each hold between these"
+    )
+    yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
+
+
+class Quantity(Block):
+    """True values of the parameters of one effect."""
+
+    value: OneOrMore[kinds.Finite] = Field(description="one number per parameter of the effect")
+    unit: str = Field(description="unit of the values, e.g. mgon, ppm, m/s^2")
+
+    def in_si(self, effect: Effect) -> dict[str, float]:
+        """The values by the names of the parameters of the effect, SI."""
+        names = [parameter.name for parameter in effect.parameters]
+        if len(self.value) != len(names):
+            raise InputError(
+                f"value: {len(self.value)} numbers; the effect has {len(names)} parameters "
+                f"({', '.join(names)})"
+            )
+        pairs = zip(self.value, effect.parameters, strict=True)
+        return {p.name: float(to_si(value, self.unit, p.unit)) for value, p in pairs}
+
+
+class Grid(Block):
+    """Cells: every combination of what is listed. A single value may stand for a list of one."""
+
+    models: Models = Field(
+        description="models: names, compositions as bias-scale+warm_up(tau=300), YAML files with a "
+        "model; or all"
+    )
+    schemes: Schemes = Field(
+        description="schemes: names, YAML files as `accelstudy design` writes them; or all"
+    )
+    approaches: Approaches = Field(
+        default=["gravity", "robot"],
+        validate_default=True,
+        description="names of approaches, or all",
+    )
+    replicates: kinds.Replicates = Field(description="simulated calibrations per cell")
+    sensor_sigma_mps2: OneOrMore[kinds.SigmaForce] | None = Field(
+        None, description="noise.sensor.sigma_mps2"
+    )
+    robot_sigma_mgon: OneOrMore[kinds.SigmaAngle] | None = Field(
+        None, description="noise.robot.sigma_mgon"
+    )
+    gravity_sigma_mps2: OneOrMore[kinds.SigmaGravity] | None = Field(
+        None, description="noise.gravity.sigma_mps2"
+    )
+    gravity_error_mps2: OneOrMore[kinds.GravityError] | None = Field(
+        None, description="noise.gravity.error_mps2"
+    )
+
+    def lists(self, usual: Mapping[str, float]) -> list[list[Any]]:
+        """Models, schemes, approaches, and values of the settings of the noise, in their order."""
+        noises = [getattr(self, key) or [value] for key, value in usual.items()]
+        return [self.models, self.schemes, self.approaches, *noises]
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Grid:
+        with _at("number of cells"):
+            bounds.CELLS.check(math.prod(map(len, self.lists(NoiseConfig().settings))))
+        return self
+
+
+class Presets(Block):
+    """The rows of the paper's Table 1, each with its own model and scheme."""
+
+    replicates: kinds.Replicates = Field(description="simulated calibrations per row and approach")
+    approaches: Approaches = Field(
+        default=["gravity", "robot"],
+        validate_default=True,
+        description="names of approaches, or all",
+    )
+
+
+class LevelingConfig(Block):
+    """Where the tilt error that a calibration leaves is evaluated."""
+
+    max_tilt_gon: kinds.Tilt = Field(
+        MAX_TILT_GON, description="largest tilt of the z axis from the vertical"
+    )
+    attitudes: kinds.Attitudes = Field(
+        ATTITUDES, description="least number of attitudes, spread evenly over these tilts"
+    )
+
+
+class SensitivityConfig(Block):
+    """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
+
+    base_samples: kinds.BaseSamples = Field(1024, description="Sobol base samples, a power of two")
+    resamples: kinds.Resamples = Field(
+        100, description="bootstrap resamples for confidence intervals"
+    )
+    roll_gon: OneOrMore[kinds.Angle] = Field(description="rolls of the grid")
+    pitch_gon: OneOrMore[kinds.Pitch] = Field(description="pitches of the grid")
+    model: Annotated[SensorModel, _one(_model)] = Field(
+        NINE, validate_default=True, description="model of figures 5 and 6"
+    )
+    scheme: Annotated[Scheme, _one(get_scheme)] = Field(
+        "mclaren-24",
+        validate_default=True,
+        description="scheme whose calibration gives the sds",
+    )
+
+    def cell(self, approach: str, scheme: str = "") -> str:
+        """Name of the cell of an approach, in the scheme of the analysis if no other is named."""
+        return f"{self.model.name}/{scheme or self.scheme.name}/{approach}"
+
+    def check(self, study: Study) -> None:
+        """Check that the calibrations exist whose standard deviations the analysis needs."""
+        if columns := self.model.hold_columns:
+            raise InputError(
+                f"sensitivity.model: {self.model.name!r} depends on the {columns[0]} of each "
+                "hold, and leveling is analysed without; choose another model"
+            )
+        missing = CLAIMED_EFFECTS - {effect.name for effect in self.model.effects}
+        if study.paper and missing:
+            raise InputError(
+                f"sensitivity.model: {self.model.name!r} lacks {', '.join(sorted(missing))}, "
+                "which the paper's claims need; choose another model, or paper: false"
+            )
+        for name in ("roll_gon", "pitch_gon"):
+            if study.paper and 0 not in getattr(self, name):
+                raise InputError(f"sensitivity.{name}: must contain 0, which paper: true needs")
+        cells = {cell.name: cell for cell in study.cells}
+        for name in map(self.cell, ("gravity", "robot")):
+            if name not in cells or cells[name].replicates < 2:
+                raise InputError(
+                    f"sensitivity: needs at least 2 replicates of the cell {name}, with the noise "
+                    "of `noise`; add it to `grids`"
+                )
+            positions = cells[name].estimability
+            if not positions.estimable:
+                raise InputError(f"sensitivity: {name} cannot be estimated: {positions.reason}")
+            if study.paper and positions.redundancy == 0:
+                raise InputError(f"sensitivity: {name} has no redundancy, which paper: true needs")
+
+
+CLAIMED_EFFECTS = {"bias", "scale", "nonorthogonality"}
+"""Effects that the model of the paper's claims and figures must have."""
+HOLD_KEYS = {
+    "time": "holds.interval_s",
+    "temperature": "holds.temperature_degC",
+    "vibration": "holds.vibration_mps2",
+}
+"""Columns of the holds and the keys that provide them."""
+
+# --- the study -----------------------------------------------------------------------------------
+
+
+class Study(Configuration):
+    """A study."""
+
+    retired = {  # noqa: RUF012
+        "keep": "every calibration is stored in estimates/: leave it out",
+        "control": "linear theory is always the control variate: leave it out",
+        "rare": "quantiles of small shares, such as 1e-6, are in the table quantiles where "
+        "replicates are enough: leave it out",
+    }
+
+    study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=LONGEST)] = Field(
+        description="name; results go to results/<study>/"
+    )
+    seed: kinds.Seed = Field(description="seed of all random numbers")
+    gravity_mps2: kinds.Gravity = Field(STANDARD_GRAVITY, description="true local gravity")
+    noise: NoiseConfig = NoiseConfig()
+    holds: HoldPlanConfig = HoldPlanConfig()
+    sensor: dict[str, Quantity] = Field(
+        default_factory=dict,
+        description="true parameters of the simulated sensor, by effect: its name, or its name "
+        "with settings",
+    )
+    simulated_effects: Simulated = Field(
+        default=["model"],
+        validate_default=True,
+        description="effects that the simulated sensor has: model, for those of the cell's model, "
+        "or a list",
+    )
+    models: dict[Annotated[str, AfterValidator(_own_name)], Composition] = Field(
+        default_factory=dict, description="models of your own: name and effects"
+    )
+    schemes: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="positions of the schemes that are read from files, as `scheme`, `title`, "
+        "`source` and `directions`; filled in when the configuration is read",
+    )
+    grids: list[Grid] = Field(default_factory=list, description="sets of cells")
+    presets: Presets | None = Field(None, description="Table 1 of the paper")
+    leveling: LevelingConfig = LevelingConfig()
+    sensitivity: SensitivityConfig | None = Field(None, description="figures 4 to 6")
+    angle_unit: Literal["gon", "deg"] | None = Field(
+        None,
+        description="unit of angles in figures, gon or deg; without it the environment variable "
+        "ACCELSTUDY_ANGLE_UNIT says, else gon. Tables keep their units",
+    )
+    paper: bool = Field(
+        False,
+        description="draw the paper's figures and judge its claims; needs `sensitivity`, and the "
+        "cells of its model and scheme with both approaches",
+    )
+
+    @field_validator("models")
+    @classmethod
+    def _named(cls, models: dict[str, SensorModel]) -> dict[str, SensorModel]:
+        """Give each model the name under which it stands."""
+        return {name: _composed(_specs(model.effects), name) for name, model in models.items()}
+
+    @field_validator("schemes")
+    @classmethod
+    def _schemes_of_files(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Remember these schemes before the grids name them."""
+        for name, content in given.items():
+            if (proper := remember(content, name).name) != name:
+                raise InputError(
+                    f"{name}: is the name of other positions; the name of these is {proper}"
+                )
+        return dict(given)
+
+    @field_validator("grids", "sensitivity", mode="wrap")
+    @classmethod
+    def _with_own_models(
+        cls, content: Any, parse: ValidatorFunctionWrapHandler, info: ValidationInfo
+    ) -> Any:
+        """Parse what may name models and schemes that the configuration defines itself."""
+        if not {"models", "schemes"} <= info.data.keys():  # it is these that are wrong
+            return content
+        before = OWN_MODELS.set(info.data["models"])
+        try:
+            return parse(content)
+        finally:
+            OWN_MODELS.reset(before)
+
+    @model_validator(mode="after")
+    def _keep_schemes_of_files(self) -> Study:
+        for scheme in (scheme for grid in self.grids for scheme in grid.schemes):
+            if (content := held(scheme.name)) is not None:
+                self.schemes[scheme.name] = content
+        return self
+
+    def check(self) -> None:
+        """Check that all fits together; jobs read a configuration that was checked before.
+
+        Raises
+        ------
+        InputError
+            One line that names the key, what is wrong and what would be right.
+        """
+        for name, quantity in self.sensor.items():
+            with _at(f"sensor.{name}"):
+                quantity.in_si(get_effect(name))
+        if not self.grids and self.presets is None:
+            raise InputError("neither grids nor presets are given: the study has no cells")
+        simulated = [] if self.simulated_effects is None else [self.simulated_effects]
+        models = [*simulated, *(model for grid in self.grids for model in grid.models)]
+        for effect in {e.spec: e for model in models for e in model.effects}.values():
+            if column := self.hold_plan.missing(effect):
+                raise InputError(
+                    f"{HOLD_KEYS[column]}: missing; the effect {effect.name!r} needs the {column} "
+                    "of each hold"
+                )
+        if self.sensitivity is not None:
+            self.sensitivity.check(self)
+        elif self.paper:
+            raise InputError("paper: true needs the block `sensitivity` (figures 4 to 6)")
+
+    @property
+    def all_grids(self) -> list[Grid]:
+        """The grids, and the presets as grids."""
+        shared = dict(self.presets or ())
+        rows = [(get_model(row.model), get_scheme(row.scheme)) for row in PRESETS if shared]
+        of_rows = [Grid.model_construct(models=[m], schemes=[s], **shared) for m, s in rows]
+        return [*self.grids, *of_rows]
+
+    @cached_property
+    def cells(self) -> list[Cell]:
+        """All cells, in the order of the configuration, without repetition.
+
+        A cell that occurs more than once, such as in Table 1 and in a grid, runs once, with the
+        largest number of replicates.
+        """
+        cells: dict[str, Cell] = {}
+        for cell in (cell for grid in self.all_grids for cell in self._cells_of(grid)):
+            earlier = cells.get(cell.name)
+            if earlier is None or cell.replicates > earlier.replicates:
+                cells[cell.name] = cell
+        return with_compiled(list(cells.values()))
+
+    def _cells_of(self, grid: Grid) -> Iterator[Cell]:
+        usual = self.noise.settings
+        for model, scheme, approach, *noise in product(*grid.lists(usual)):
+            settings = dict(zip(usual, noise, strict=True))
+            if not approach.uses_angles:  # the same cell whatever the robot's accuracy
+                settings["robot_sigma_mgon"] = usual["robot_sigma_mgon"]
+            changed = [f"{k}={_shown(v)}" for k, v in settings.items() if v != usual[k]]
+            effects = tuple(_specs(model.effects))
+            simulated = tuple(_specs((self.simulated_effects or model).effects))
+            file = held(scheme.name)
+            yield Cell(
+                name="/".join([model.name, scheme.name, approach.name, *changed]),
+                model=model.name,
+                effects=effects,
+                simulated_effects=simulated,
+                scheme=scheme.name,
+                approach=approach.name,
+                replicates=grid.replicates,
+                noise=Noise(
+                    self.noise.sensor.of_mean(settings["sensor_sigma_mps2"]),
+                    settings["robot_sigma_mgon"] * MGON if approach.uses_angles else 0.0,
+                    settings["gravity_sigma_mps2"],
+                    settings["gravity_error_mps2"],
+                    tuple(_specs(self.noise.effects)),
+                ),
+                gravity=self.gravity_mps2,
+                truth=self.truth(dict.fromkeys([*effects, *simulated])),
+                holds=self.hold_plan,
+                directions=None if file is None else tuple(map(tuple, file["directions"])),
+            )
+
+    @property
+    def hold_plan(self) -> HoldPlan:
+        """Conditions of the holds."""
+        holds = self.holds
+        return HoldPlan(
+            interval=holds.interval_s,
+            temperature=holds.temperature_degC,
+            temperature_order=holds.temperature_order,
+            vibration=holds.vibration_mps2,
+            yaw=holds.yaw,
+            seed=self.seed,
+        )
+
+    @property
+    def sigma_force(self) -> float:
+        """Default noise of a position's mean, m/s²."""
+        return self.noise.sensor.of_mean(self.noise.sensor.sigma_mps2)
+
+    def truth(self, effects: Iterable[str]) -> dict[str, float]:
+        """Return the true parameters of the given effects in SI; those not configured are zero."""
+        given = {**self.sensor, **{get_effect(k).spec: v for k, v in self.sensor.items()}}
+        values: dict[str, float] = {}
+        for effect in map(get_effect, effects):
+            # The value may be that of the whole effect although the model has a part of it.
+            key = effect.spec if effect.spec in given else effect.name
+            configured = given[key].in_si(get_effect(key)) if key in given else {}
+            values |= {p.name: configured.get(p.name, 0.0) for p in effect.parameters}
+        return values
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of everything that the numbers depend on, defaults included."""
+        return config_hash(self.model_dump(mode="json"))
+
+
+def _shown(value: float) -> str:
+    """Show a number briefly, but never two numbers alike."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
