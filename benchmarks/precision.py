@@ -65,8 +65,8 @@ def _needed(found, count):
     """Calibrations for the wanted error, from the errors of so many."""
     bound = found.quantile(TILT, "both", 0.95)
     relative = (
-        np.sqrt(np.mean((found.sd.error / found.sd.value) ** 2)),
-        (found.tilt_rms.error / found.tilt_rms.value).max(),
+        np.sqrt(np.mean((found["sd"].error / found["sd"].value) ** 2)),
+        (found["tilt_rms"].error / found["tilt_rms"].value).max(),
         float(bound.error / bound.value),
     )
     return {what: count * (r / WANTED) ** 2 for what, r in zip(QUANTITIES, relative, strict=True)}
