@@ -8,12 +8,9 @@ multiple of the tilt accuracy that a fixed scheme has.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -34,7 +31,7 @@ from accelstudy.basics.units import (
 )
 from accelstudy.design.estimability import estimability
 from accelstudy.design.task import position_rows
-from accelstudy.drawing.style import FULL, INK, STYLE, approach_colour, approach_marker, new_figure
+from accelstudy.drawing.style import FULL, INK, approach_colour, approach_handles, new_figure
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import tilt_error
 from accelstudy.schemes import get_scheme
@@ -54,13 +51,12 @@ NOISE = Noise()
 PLACING = 2 * GON
 """Sd per axis by which positions miss the chosen attitudes."""
 MOST_POSITIONS = 120
+"""With which a session ends in any case."""
 SEED = 1
 AT_ONCE = 500
 """Sessions that are simulated together; more would only take memory."""
 ROUNDING = 1e-9
 """Relative excess over the promise that is rounding."""
-CENTRAL = (0.05, 0.5, 0.95)
-"""Quantiles of the numbers of positions."""
 
 
 def plain(omega: ArrayLike, redundancy: int) -> Array:
@@ -70,63 +66,36 @@ def plain(omega: ArrayLike, redundancy: int) -> Array:
     return np.asarray(omega) / redundancy
 
 
-RULES = {"known": known, "bound": bound, "plain": plain}
-"""What the variance of unit weight is taken for."""
+RULES: dict[str, tuple[Any, Any, str]] = {
+    "known": (known, "-", "noise known"),
+    "bound": (bound, "--", "upper bound from residuals"),
+    "plain": (plain, ":", "as the residuals seem"),
+}
+"""What the variance of unit weight is taken for, its line in the figure, and its label there."""
+SETTINGS = [*product(("gravity", "robot"), RULES, (0.75, 1.0, 1.5, 2.0))]
+"""Approach, rule, and promised accuracy over that of the fixed scheme."""
+LABELS = ["approach", "rule", "multiple", "promised"]
+"""Columns that identify the setting of a session."""
 
 
-@dataclass(frozen=True)
-class Setting:
-    """Sessions of one kind.
+def simulate(
+    approach: str,
+    rule: str,
+    multiple: float = 1.0,
+    sessions: int = 1000,
+    most_positions: int = MOST_POSITIONS,
+    seed: int = SEED,
+) -> pd.DataFrame:
+    """Simulate the sessions of a setting.
 
-    Attributes
+    Parameters
     ----------
     approach : str
     rule : str, of `RULES`
-    multiple : float, promised accuracy over that of the fixed scheme
+    multiple : float, promised accuracy over that of the fixed scheme, by linear theory
     sessions : int
     most_positions : int, with which a session ends in any case
-    """
-
-    approach: str
-    rule: str
-    multiple: float = 1.0
-    sessions: int = 1000
-    most_positions: int = MOST_POSITIONS
-
-    @cached_property
-    def promise(self) -> Promise:
-        """Promised accuracy: a multiple of that of the fixed scheme, by linear theory."""
-        cofactors = estimability(FIXED, MODEL, get_approach(self.approach), NOISE).cofactors
-        error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
-        return Promise(self.multiple * float(error.rms_of_all(cofactors).max()), TILT_RANGE)
-
-    @cached_property
-    def chooser(self) -> Chooser:
-        """The chooser of the positions."""
-        directions = candidates(DEFAULTS[self.approach])
-        return Chooser(
-            directions,
-            position_rows(MODEL, get_approach(self.approach), NOISE, directions),
-            self.promise.tilt_error(MODEL),
-            self.promise,
-            RULES[self.rule],
-            typical_sizes(MODEL, MODEL.n_parameters),
-        )
-
-    def rng(self, seed: int, part: int) -> np.random.Generator:
-        """Random numbers of a part of the sessions; all rules share them, to be compared."""
-        name = f"{MODEL.name} {self.approach} {self.multiple}"
-        digest = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
-        return np.random.default_rng(np.random.SeedSequence([seed, digest], spawn_key=(part,)))
-
-
-LABELS = ["approach", "rule", "multiple", "promised"]
-"""Columns that identify the setting of a session."""
-SETTINGS = [Setting(*each) for each in product(("gravity", "robot"), RULES, (0.75, 1.0, 1.5, 2.0))]
-
-
-def simulate(setting: Setting, seed: int) -> pd.DataFrame:
-    """Simulate all sessions of a setting.
+    seed : int
 
     Returns
     -------
@@ -135,75 +104,76 @@ def simulate(setting: Setting, seed: int) -> pd.DataFrame:
         that it claims, the one by the true noise, and the actual error of its calibration; the
         shares of intervals that contain the truth.
     """
-    starts = range(0, setting.sessions, AT_ONCE)
-    sizes = [min(AT_ONCE, setting.sessions - start) for start in starts]
-    parts = [_simulate(setting, size, setting.rng(seed, i)) for i, size in enumerate(sizes)]
-    labels = {name: getattr(setting, name) for name in LABELS[:-1]}
-    return pd.concat(parts, ignore_index=True).assign(**labels, promised=setting.promise.accuracy)
+    cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
+    error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
+    promise = Promise(multiple * float(error.rms_of_all(cofactors).max()), TILT_RANGE)
+    directions = candidates(DEFAULTS[approach])
+    rows = position_rows(MODEL, get_approach(approach), NOISE, directions)
+    sizes = typical_sizes(MODEL, MODEL.n_parameters)
+    chooser = Chooser(directions, rows, error, promise, RULES[rule][0], sizes)
+    # All rules share the random numbers, to be compared.
+    name = hashlib.sha256(f"{MODEL.name} {approach} {multiple}".encode()).digest()
+    entropy = [seed, int.from_bytes(name[:8], "big")]
+    parts = []
+    for i, start in enumerate(range(0, sessions, AT_ONCE)):
+        rng = np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=(i,)))
+        count = min(AT_ONCE, sessions - start)
+        parts.append(_simulate(chooser, approach, rule, count, most_positions, rng))
+    return pd.concat(parts, ignore_index=True).assign(
+        approach=approach, rule=rule, multiple=multiple, promised=promise.accuracy
+    )
 
 
-def _simulate(setting: Setting, sessions: int, rng: np.random.Generator) -> pd.DataFrame:
-    chooser, approach = setting.chooser, get_approach(setting.approach)
-    truth, going = _sensors(sessions, rng), np.arange(sessions)
+def _simulate(
+    chooser: Chooser, approach: str, rule: str, sessions: int, most: int, rng: np.random.Generator
+) -> pd.DataFrame:
+    low, high = np.log([e.typical for e in MODEL.effects for _ in e.parameters]).T
+    truth = np.exp(rng.uniform(low, high, (sessions, len(low))))
+    truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
-    so_far = estimate(MODEL, approach, _observed(forces, angles))
-    rms, last = np.full((sessions, 2), np.inf), None
-    ended: list[pd.DataFrame] = []
-    for n in range(1, setting.most_positions + 1):
+    so_far, last = _estimate(approach, forces, angles, None), None
+    rms, going, ended = np.full((sessions, 2), np.inf), np.ones(sessions, dtype=bool), []
+    for n in range(1, most + 1):
         chosen = chooser.choose(so_far.information, so_far.solved, rms, last)
-        # Drawn for all sessions, so that none depends on which others have ended.
-        off = PLACING * rng.standard_normal((sessions, 3))
-        errors = rng.standard_normal((sessions, 3)), rng.standard_normal((sessions, 2))
-        last = chooser.directions[chosen] + off[going]
+        last = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
         last /= np.linalg.norm(last, axis=1, keepdims=True)
         f_b = -STANDARD_GRAVITY * last[:, None]
-        force = MODEL.sense(f_b, truth[going]) + NOISE.sigma_force * errors[0][going, None]
+        noise = rng.standard_normal((sessions, 1, 3)), rng.standard_normal((sessions, 1, 2))
+        force = MODEL.sense(f_b, truth) + NOISE.sigma_force * noise[0]
         angle = angles_of(f_b)
-        angle = angle + MODEL.reading_errors(angle, truth[going])
-        angle = angle + NOISE.sigma_angle * errors[1][going, None]
+        angle = angle + MODEL.reading_errors(angle, truth) + NOISE.sigma_angle * noise[1]
         forces = np.concatenate([forces, force], axis=1)
         angles = np.concatenate([angles, angle], axis=1)
-        so_far = estimate(MODEL, approach, _observed(forces, angles), before=so_far)
-
-        rms = np.full((len(going), 2), np.inf)
-        ok = so_far.solved
+        so_far = _estimate(approach, forces, angles, so_far)
+        ok, rms = so_far.solved, np.full((sessions, 2), np.inf)
         rms[ok] = chooser.rms(so_far.cofactors[ok], so_far.omega[ok], so_far.redundancy)
-        done = setting.promise.reached(rms)
-        if done.any() or n == setting.most_positions:
-            over = done | (n == setting.most_positions)
-            row = _outcome(setting, so_far.sessions(np.flatnonzero(over)), truth[going[over]])
-            row.insert(0, "session", going[over])
-            row["kept"] = done[over]
-            row[["claimed_roll", "claimed_pitch"]] = rms[over]
-            ended.append(row)
-            left = np.flatnonzero(~over)
-            if not len(left):
+        kept = chooser.promise.reached(rms)
+        over = np.flatnonzero(going & (kept | (n == most)))
+        if len(over):
+            outcome = _outcome(chooser, rule, so_far, truth, over)
+            outcome[["claimed_roll", "claimed_pitch"]] = rms[over]
+            ended.append(outcome.assign(kept=kept[over]))
+            going[over] = False
+            if not going.any():
                 break
-            so_far, going = so_far.sessions(left), going[left]
-            forces, angles, rms, last = forces[left], angles[left], rms[left], last[left]
-    return pd.concat(ended).sort_values("session", ignore_index=True).drop(columns="session")
+    return pd.concat(ended).sort_index()
 
 
-def _sensors(count: int, rng: np.random.Generator) -> Array:
-    """Parameters of sensors, (R, u), anywhere between typical sizes, of either sign."""
-    low, high = np.log([e.typical for e in MODEL.effects for _ in e.parameters]).T
-    sizes = np.exp(rng.uniform(low, high, (count, len(low))))
-    return np.asarray(sizes * rng.choice([-1.0, 1.0], sizes.shape))
+def _estimate(approach: str, forces: Array, angles: Array, before: Estimate | None) -> Estimate:
+    sigmas = NOISE.sigma_force, NOISE.sigma_angle
+    observed = Observations(forces, sigmas[0], angles, sigmas[1], STANDARD_GRAVITY)
+    return estimate(MODEL, get_approach(approach), observed, before=before)
 
 
-def _observed(forces: Array, angles: Array) -> Observations:
-    return Observations(forces, NOISE.sigma_force, angles, NOISE.sigma_angle, STANDARD_GRAVITY)
-
-
-def _outcome(setting: Setting, so_far: Estimate, truth: Array) -> pd.DataFrame:
+def _outcome(
+    chooser: Chooser, rule: str, so_far: Estimate, truth: Array, over: NDArray[np.int_]
+) -> pd.DataFrame:
     """Results of sessions that have ended, one row each."""
-    error, cofactors, r = setting.chooser.error, so_far.cofactors, so_far.redundancy
-    delta = so_far.parameters - truth
-    if setting.rule == "known":
-        width = np.full(len(truth), sigmas_95())
-    else:
-        sigma0 = np.sqrt(so_far.omega / r) if r > 0 else np.full(len(truth), np.nan)
-        width = sigmas_95(r) * sigma0
+    r, cofactors = so_far.redundancy, so_far.cofactors[over]
+    delta = so_far.parameters[over] - truth[over]
+    width = np.full(len(over), sigmas_95())
+    if rule != "known":
+        width = sigmas_95(r) * np.sqrt(so_far.omega[over] / r)
     inside = np.abs(delta) <= width[:, None] * np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
     # Intervals of angles are checked level, and tilted by the tilt range.
     sin, cos, ideal = np.sin(TILT_RANGE), np.cos(TILT_RANGE), np.zeros(MODEL.n_parameters)
@@ -211,18 +181,17 @@ def _outcome(setting: Setting, so_far: Estimate, truth: Array) -> pd.DataFrame:
     at = [tilt_error(MODEL, ideal, MODEL, ideal, -STANDARD_GRAVITY * np.array([d])) for d in down]
     angles = np.stack([each.rms(delta) for each in at], axis=1)
     spread = np.stack([rms_of(each, cofactors) for each in at], axis=1)
-    both = {"true": rms_of(error, cofactors), "actual": error.rms(delta)}
-    return pd.DataFrame(
+    outcome = pd.DataFrame(
         {
             "positions": so_far.n_positions,
-            "redundancy": r,
-            "omega": so_far.omega,
-            **{f"{name}_{angle}": rms[:, i] for name, rms in both.items()
-               for i, angle in enumerate(("roll", "pitch"))},
             "parameters_inside": inside.mean(axis=1),
             "angles_inside": np.mean(angles <= width[:, None, None] * spread, axis=(1, 2)),
-        }
-    )  # fmt: skip
+        },
+        index=over,
+    )
+    outcome[["true_roll", "true_pitch"]] = rms_of(chooser.error, cofactors)
+    outcome[["actual_roll", "actual_pitch"]] = chooser.error.rms(delta)
+    return outcome
 
 
 def summary_table(sessions: pd.DataFrame) -> pd.DataFrame:
@@ -233,78 +202,59 @@ def summary_table(sessions: pd.DataFrame) -> pd.DataFrame:
     promise.
     """
     true, promised = sessions[["true_roll", "true_pitch"]].max(axis=1), sessions["promised"]
-    squares = {f"rms_{angle}": (sessions[f"actual_{angle}"] / promised) ** 2
-               for angle in ("roll", "pitch")}  # fmt: skip
     groups = sessions.assign(
-        sessions=1,
         broken=sessions["kept"] & (true > promised * (1 + ROUNDING)),
-        # A posteriori at the end; to stop by it makes it too small.
-        variance=sessions["omega"] / sessions["redundancy"].where(sessions["redundancy"] > 0),
-        **squares,
+        rms_roll=(sessions["actual_roll"] / promised) ** 2,
+        rms_pitch=(sessions["actual_pitch"] / promised) ** 2,
     ).groupby(LABELS, sort=False)
-    means = ["kept", "positions", "broken", "variance", "parameters_inside", "angles_inside"]
-    table = groups[[*means, *squares]].mean().join(groups["sessions"].sum())
-    table[[*squares]] **= 0.5
-    for share in CENTRAL:
-        table[f"positions_{int(100 * share)}"] = groups["positions"].quantile(share)
+    table = groups[["kept", "positions", "broken", "parameters_inside", "angles_inside"]].mean()
+    table[["rms_roll", "rms_pitch"]] = groups[["rms_roll", "rms_pitch"]].mean() ** 0.5
+    table["sessions"] = groups.size()
+    for percent in (5, 95):
+        table[f"positions_{percent}"] = groups["positions"].quantile(percent / 100)
     ends = clopper_pearson(groups["broken"].sum(), table["sessions"])
     table["broken_low"], table["broken_high"] = ends
-    table = table.reset_index()
-    # How often the fixed scheme must be measured in full for the same accuracy.
-    rounds = np.ceil((table["multiple"] ** -2).round(9))
-    return table.assign(fixed_positions=rounds * FIXED.n_positions)
-
-
-NAMES = {
-    "known": "noise known",
-    "bound": "upper bound from residuals",
-    "plain": "as the residuals seem",
-}
-LINES: dict[str, Any] = {"known": "-", "bound": "--", "plain": ":"}
+    return table.reset_index()
 
 
 def stopping_figure(summary: pd.DataFrame) -> Figure:
     """Positions that a promise takes, and how often it is broken; of `summary_table`."""
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        figure = new_figure(FULL, 92)
-        left, right = figure.subplots(1, 2)
-        handles = []
-        for (approach, rule), rows in summary.groupby(["approach", "rule"], sort=False):
-            part, colour = rows.sort_values("promised"), approach_colour(str(approach))
-            look: Any = {"color": colour, "marker": approach_marker(str(approach)),
-                         "linestyle": LINES[str(rule)]}  # fmt: skip
-            x, share = to_display(part["promised"], "rad"), 100 * part["broken"].to_numpy()
-            left.plot(x, part["positions"], **look)
-            if rule != "plain":
-                low, high = part["positions_5"], part["positions_95"]
-                left.fill_between(x, low, high, color=colour, alpha=0.12, linewidth=0)
-            ends = 100 * part[["broken_low", "broken_high"]].to_numpy().T
-            right.errorbar(x, share, yerr=np.abs(ends - share), capsize=2, **look)
-        for approach, part in summary.groupby("approach", sort=False):
-            colour = approach_colour(str(approach))
-            accuracy = to_display((part["promised"] / part["multiple"]).iloc[0], "rad")
-            left.plot(accuracy, FIXED.n_positions, "*", markersize=11, color=colour,
-                      markeredgecolor="white", zorder=5)  # fmt: skip
-            marker = approach_marker(str(approach))
-            handles.append(Line2D([], [], color=colour, marker=marker, label=approach))
-        tilt = f"{float(to_attitude(TILT_RANGE)):.0f} {attitude_unit()}"
-        for axes in (left, right):
-            axes.set(
-                xscale="log", xlabel=f"promised rms up to {tilt} of tilt [{display_unit('rad')}]"
-            )
-            axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
-            axes.xaxis.set_major_formatter("{x:g}")
-            axes.minorticks_off()
-        left.set(ylabel="positions", ylim=(0, None))
-        left.set_title("until the promise seems kept: mean, central 90 %", loc="left")
-        right.set(ylabel="sessions [%]", ylim=(-2, 102))
-        right.set_title("less accurate than promised", loc="left")
-        right.axhline(5, color=INK, linewidth=0.6)
-        right.annotate("5 %", (1, 5), xycoords=("axes fraction", "data"), fontsize=7,
-                       xytext=(-2, 2), textcoords="offset points", ha="right")  # fmt: skip
-        handles += [Line2D([], [], color=INK, linestyle=LINES[rule], label=NAMES[rule])
-                    for rule in summary["rule"].unique()]  # fmt: skip
-        handles.append(Line2D([], [], color=INK, marker="*", markersize=9, linestyle="",
-                              label=f"fixed: {FIXED.name}"))  # fmt: skip
-        figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    figure = new_figure(FULL, 92)
+    left, right = figure.subplots(1, 2)
+    approaches = [*summary["approach"].unique()]
+    handles = approach_handles(approaches, linestyle="-")
+    looks = dict(zip(approaches, handles, strict=True))
+    for (approach, rule), rows in summary.groupby(["approach", "rule"], sort=False):
+        part, handle = rows.sort_values("promised"), looks[approach]
+        look: Any = {"color": handle.get_color(), "marker": handle.get_marker(),
+                     "linestyle": RULES[str(rule)][1]}  # fmt: skip
+        x, share = to_display(part["promised"], "rad"), 100 * part["broken"].to_numpy()
+        left.plot(x, part["positions"], **look)
+        if rule != "plain":
+            left.fill_between(x, part["positions_5"], part["positions_95"], color=look["color"],
+                              alpha=0.12, linewidth=0)  # fmt: skip
+        ends = 100 * part[["broken_low", "broken_high"]].to_numpy().T
+        right.errorbar(x, share, yerr=np.abs(ends - share), capsize=2, **look)
+    for approach, part in summary.groupby("approach", sort=False):
+        accuracy = to_display((part["promised"] / part["multiple"]).iloc[0], "rad")
+        left.plot(accuracy, FIXED.n_positions, "*", markersize=11, markeredgecolor="white",
+                  color=approach_colour(str(approach)), zorder=5)  # fmt: skip
+    tilt = f"{float(to_attitude(TILT_RANGE)):.0f} {attitude_unit()}"
+    for axes in (left, right):
+        axes.set(xscale="log", xlabel=f"promised rms up to {tilt} of tilt [{display_unit('rad')}]")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.minorticks_off()
+    left.set(ylabel="positions", ylim=(0, None))
+    left.set_title("until the promise seems kept: mean, central 90 %", loc="left")
+    right.set(ylabel="sessions [%]", ylim=(-2, 102))
+    right.set_title("less accurate than promised", loc="left")
+    right.axhline(5, color=INK, linewidth=0.6)
+    right.annotate("5 %", (1, 5), xycoords=("axes fraction", "data"), fontsize=7,
+                   xytext=(-2, 2), textcoords="offset points", ha="right")  # fmt: skip
+    handles += [Line2D([], [], color=INK, linestyle=RULES[rule][1], label=RULES[rule][2])
+                for rule in summary["rule"].unique()]  # fmt: skip
+    handles.append(Line2D([], [], color=INK, marker="*", markersize=9, linestyle="",
+                          label=f"fixed: {FIXED.name}"))  # fmt: skip
+    figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure
