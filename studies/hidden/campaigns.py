@@ -10,32 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
-from accelstudy.files.tables import write_table
+from accelstudy.files.outputs import whole_file
 from accelstudy.files.validation import checked
 from accelstudy.sensors.models import get_model
 from studies.hidden.baselines import METHODS, answers
 from studies.hidden.physics.generate import Case, Truth
 from studies.hidden.real_noise import RealNoiseConfig
 from studies.hidden.study import HiddenConfig, Job, Row, removed
-
-_TYPES = {
-    "string": "cell set what design approach sigma classes effects noise gross gross_name "
-    "oracle_best oracle_told true_place sensor verdict found specs positions posteriors "
-    "credible_set place fits methods error",
-    "boolean": "oracle_detected confirmed recorded",
-    "Int64": "campaign oracle_alternatives",
-    "float64": "size held_out_z sigma0_before sigma0_after p_size p_known",
-}
-TYPES = {name: kind for kind, names in _TYPES.items() for name in names.split()}
-"""Type of each column of a campaign; lists and mappings are JSON."""
 
 
 def parse_hidden(
@@ -47,18 +34,21 @@ def parse_hidden(
     return checked(HiddenConfig, content, source)
 
 
-def run(job: Job, path: str | Path, provenance: Mapping[str, Any]) -> None:
-    """Make and diagnose the campaigns of a job, and write them."""
-    write_table(path, table_of(row_of(job, *one) for one in job.campaigns), provenance)
+def run(job: Job, path: str | Path) -> None:
+    """Make and diagnose the campaigns of a job, and write their rows, one a line."""
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        for case, k in job.campaigns:
+            print(json.dumps(row_of(job, case, k)), file=file)
 
 
-def table_of(rows: Iterable[Row]) -> pd.DataFrame:
-    """Truths and answers of campaigns."""
-    return pd.DataFrame(rows, columns=[*TYPES]).astype(TYPES)
+def read_rows(paths: Iterable[str | Path]) -> list[Row]:
+    """Read the rows of jobs."""
+    texts = (Path(path).read_text(encoding="utf-8") for path in paths)
+    return [json.loads(line) for text in texts for line in text.splitlines()]
 
 
 def row_of(job: Job, case: Case, k: int) -> Row:
-    """Truth and answer of a campaign.
+    """Truth and answer of a campaign, of what JSON has.
 
     The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
     """
@@ -75,31 +65,23 @@ def row_of(job: Job, case: Case, k: int) -> Row:
             told, _ = tried(lambda: dict(answers(campaign, model)), what, failed)
             # Where the model cannot be fitted, no method can work: each finds nothing.
             methods = told or dict.fromkeys(METHODS, (False, []))
-    row = {"cell": case.name, "campaign": k} | truth_row(case, campaign, truth) | (answer or {})
-    return row | {"methods": json.dumps(methods), "error": error}
-
-
-def truth_row(case: Case, campaign: Campaign | None, truth: Truth) -> Row:
-    """What is true of a campaign."""
-    # No name is right for what a session cannot show or the catalogue lacks.
-    nameless = case.set in ("invisible", "outside", "unforeseen")
-    known = [[name for name in one if name not in removed(case)] for one in truth.classes]
-    parts = asdict(truth)
-    oracle, p_known = parts.pop("oracle") or {}, parts.pop("p_known")
     given = case.sigma_known if campaign is None else campaign.sigma_force is not None
-    return {
+    # No name is right for what a session cannot show or the catalogue lacks.
+    known = truth.classes if case.set not in ("invisible", "outside", "unforeseen") else ()
+    right = [[name for name in one if name not in removed(case)] for one in known]
+    row = {
+        "cell": case.name,
+        "campaign": k,
         **{name: getattr(case, name) for name in ("set", "what", "size", "design", "approach")},
-        **{name: json.dumps(value) for name, value in parts.items()},
         "sigma": "given" if given else "not given",
         "recorded": getattr(case, "recorded", None),
-        "classes": json.dumps([] if nameless else [one for one in known if one]),
-        "gross_name": truth.gross["name"],
-        "oracle_detected": oracle.get("detected"),
-        "oracle_best": json.dumps(oracle.get("best", [])),
-        "oracle_told": json.dumps(oracle.get("told", [])),
-        "oracle_alternatives": oracle.get("alternatives"),
-        "p_known": p_known,
+        **asdict(truth),
+        "classes": [one for one in right if one],
+        **(answer or {}),
+        "methods": methods,
+        "error": error,
     }
+    return dict(json.loads(json.dumps(row)))
 
 
 def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, str]:
@@ -119,31 +101,26 @@ def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, st
 
 
 def outcome(d: Diagnosis) -> Row:
-    """Row of the table of outcomes."""
+    """What a diagnosis says."""
     test, held = d.global_test, d.gap.held_out
     fits = (d.base, d.final.solution) if d.verdict == "learned" else ()
-    explanations = [
-        {
-            "names": list(one.names),
-            "classes": [list(names) for names in one.classes],
-            "posterior": _rounded(one.posterior),
-        }
-        for one in d.credible_set
-    ]
     return {
         "verdict": d.verdict,
-        "found": json.dumps([one.name for one in d.effects]),
-        "specs": json.dumps([one.spec for one in d.effects]),
-        "positions": json.dumps([one.position for one in d.effects]),
-        "posteriors": json.dumps([_rounded(one.posterior) for one in d.effects]),
-        "credible_set": json.dumps(explanations),
-        "place": json.dumps(d.place),
-        "fits": json.dumps([fit_squares(one) for one in fits]),
+        "found": [one.name for one in d.effects],
+        "specs": [one.spec for one in d.effects],
+        "positions": [one.position for one in d.effects],
+        "posteriors": [_rounded(one.posterior) for one in d.effects],
+        "credible_set": [
+            {"names": one.names, "classes": one.classes, "posterior": _rounded(one.posterior)}
+            for one in d.credible_set
+        ],
+        "place": d.place,
+        "fits": [fit_squares(one) for one in fits],
         "confirmed": bool(d.gap.confirmed),
-        "held_out_z": np.nan if held is None else float(held.z),
+        "held_out_z": None if held is None else float(held.z),
         "sigma0_before": float(d.gap.before),
-        "sigma0_after": np.nan if d.gap.after is None else float(d.gap.after),
-        "p_size": np.nan if test is None else float(test.p_value),
+        "sigma0_after": None if d.gap.after is None else float(d.gap.after),
+        "p_size": None if test is None else float(test.p_value),
     }
 
 

@@ -27,7 +27,7 @@ wildcard_constraints:
 
 rule hidden_diagnose:
     output:
-        f"{RESULTS}/campaigns/{{job}}.parquet",
+        f"{RESULTS}/campaigns/{{job}}.jsonl",
     log:
         f"{RESULTS}/logs/{{job}}.log",
     conda:

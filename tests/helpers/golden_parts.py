@@ -1,5 +1,6 @@
 """The parts of the golden set: what is run, in which folder, and what of it is kept."""
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -285,8 +286,9 @@ def hidden(folder, approach) -> Texts:
 def answer(row):
     """The row of a diagnosis in a line, without what it does not say."""
     shown = {name: row.get(name) for name in ANSWER}
-    texts = {k: f"{v:.9g}" if isinstance(v, float) else str(v) for k, v in shown.items()}
-    said = [f"{k} {v}" for k, v in texts.items() if v not in ("", "[]", "[null]", "nan", "null")]
+    texts = {k: json.dumps(v) if isinstance(v, list) else f"{v:.9g}" if isinstance(v, float)
+             else str(v) for k, v in shown.items()}  # fmt: skip
+    said = [f"{k} {v}" for k, v in texts.items() if v not in ("", "[]", "[null]", "nan", "None")]
     return f"{row['cell']} #{row['campaign']}: {'; '.join(said)}\n"
 
 

@@ -7,7 +7,7 @@ from places import ROOT
 
 from accelstudy.files.reading import read_layer
 from studies.hidden.baselines import METHODS
-from studies.hidden.campaigns import parse_hidden, row_of, table_of
+from studies.hidden.campaigns import parse_hidden, row_of
 from studies.hidden.physics.generate import Case
 from studies.hidden.scoring.page import frames, markdown
 from studies.hidden.scoring.tables import SCORES, table
@@ -37,7 +37,7 @@ def test_the_score_is_that_of_the_code():
     assert len(told) > 10
     asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
     job = CONFIG.simulated(asked)._replace(baselines_every=0)
-    answers = table_of(row_of(job, case, k) for case, k in asked)
+    answers = [row_of(job, case, k) for case, k in asked]
     section = SCORES["score"]["page"]["A sample"]
     listed = table({"list": section["list"]}, frames(answers, CONFIG))
     now = [*quotes.rows(markdown(listed) + "\n")]

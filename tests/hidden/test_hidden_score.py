@@ -1,6 +1,5 @@
 """The score of hand-made truths and answers, of which all numbers are known."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,7 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.models import get_model
-from studies.hidden.campaigns import fit_squares, table_of
+from studies.hidden.campaigns import fit_squares
 from studies.hidden.physics.designs import session
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.scoring.figures import figures
@@ -27,39 +26,32 @@ DRIFT, WARM, SQUARE, MOUNTED = (
 
 
 def truth(set_, classes=(), size=np.nan, oracle=None, **more):
-    """A row of the table of truths; the oracle is right, wrong, or finds nothing."""
+    """Truth of a campaign; the oracle is right, wrong, or finds nothing."""
     best = {"right": classes, "wrong": [["settling"]], "nothing": []}.get(oracle, [])
     return {
         "set": set_, "what": "+".join(one[0] for one in classes), "size": size,
-        "design": "spread-24", "approach": "robot", "sigma": "given",
-        "classes": json.dumps(list(classes)), "effects": "[]", "noise": "null", "gross": "{}",
-        "gross_name": "", "oracle_detected": None if oracle is None else oracle != "nothing",
-        "oracle_best": json.dumps(list(best)), "oracle_told": json.dumps(list(classes)),
-        "oracle_alternatives": 1,
-        "true_place": "null", "sensor": "null",
-        "methods": '{"F test": [true, ["bias_drift"]]}' if set_ == "one" else "null", **more,
+        "design": "spread-24", "approach": "robot", "sigma": "given", "recorded": None,
+        "classes": classes, "gross": {"name": "", "settings": {}}, "true_place": None,
+        "oracle": oracle and {"detected": oracle != "nothing", "best": best, "told": classes,
+                              "alternatives": 1},
+        "p_known": np.nan,
+        "methods": {"F test": [True, ["bias_drift"]]} if set_ == "one" else None, **more,
     }  # fmt: skip
 
 
-def answer(verdict, *found, among=(), place=None, place_of="null", **more):
-    """A row of the table of outcomes; the set is what was found at 0.8, and more at 0.15 each."""
+def answer(verdict, *found, among=(), at=None, **more):
+    """Answer to a campaign; the set is what was found at 0.8, and more at 0.15 each."""
     explanations = [] if verdict == "no_effect" else [(list(found) or ["unknown"], 0.8)]
     explanations += [(names, 0.15) for names in among]
     return {
-        "verdict": verdict, "found": json.dumps(found), "specs": "[]",
-        "positions": json.dumps([place, None, None][: len(found)]), "posteriors": "[]",
-        "credible_set": json.dumps(
-            [{"names": n, "classes": [[i] for i in n], "posterior": p} for n, p in explanations]
-        ),
-        "place": place_of, "fits": "[]",
-        "confirmed": False, "held_out_z": np.nan, "sigma0_before": 2.0,
-        "sigma0_after": 1.0, "p_size": 0.1,
-        "error": "", **more,
+        "verdict": verdict, "found": found, "positions": [at, None, None][: len(found)],
+        "credible_set": [{"names": n, "posterior": p} for n, p in explanations],
+        "place": None, "fits": [], "confirmed": False, "sigma0_before": 2.0, "error": "", **more,
     }  # fmt: skip
 
 
 TRUE = session("spread-24")
-YAW, TIME = '["yaw", "bias"]', '["time", "bias"]'
+YAW, TIME = ["yaw", "bias"], ["time", "bias"]
 
 
 def learned(place, share, **more):
@@ -70,19 +62,13 @@ def learned(place, share, **more):
         {"force": before * TRUE.sigma**2, "angle": 0.0, "noise": 63},
         {"force": (after - 9) * TRUE.sigma**2, "angle": 9 * TRUE.sigma_angle**2, "noise": 53},
     ]
-    return answer("learned", "learned", place_of=place, fits=json.dumps(fits), **more)
+    return answer("learned", "learned", place=place, fits=fits, **more)
 
 
-GIVEN_AWAY = {
-    "verdict": None,
-    "found": None,
-    "positions": None,
-    "credible_set": None,
-    "confirmed": None,
-}
-"""What there is of a diagnosis that failed."""
+def gross(name, **settings):
+    """Truth of a campaign with a gross error."""
+    return truth("gross", gross={"name": name, "settings": settings})
 
-BUMPED = {"gross_name": "outlier_position", "gross": '{"settings": {"position": 7.0}}'}
 
 CASES = [
     *[(truth("null", sigma=s), answer("no_effect")) for s in ("given", "not given")] * 19,
@@ -94,7 +80,7 @@ CASES = [
     (truth("one", [MOUNTED], 25, "wrong"), answer("named", "mounting_rotation")),
     (truth("one", [SQUARE], 25, "nothing"), answer("no_effect")),
     (truth("one", [SQUARE], 60, "right"), answer("named", "quadratic_scale", "settling")),
-    (truth("one", [SQUARE], 60, "right"), {**answer("named"), **GIVEN_AWAY, "error": "refused"}),
+    (truth("one", [SQUARE], 60, "right"), {"error": "refused"}),
     (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "quadratic_scale", "bias_drift")),
     (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "bias_drift")),
     (truth("two", [DRIFT, WARM], 40, "wrong"), answer("named", "warm_up", "settling")),
@@ -115,18 +101,18 @@ CASES = [
            design="repeats-30"), learned(TIME, 0.8)),
     (truth("unforeseen", size=150.0, what="odd"), answer("named", "settling")),
     (truth("null"), learned(YAW, 0.1, confirmed=True)),
-    (truth("gross", gross_name="axis_error"), answer("gross_error", "axis_error", "bias_drift")),
-    (truth("gross", gross_name="row_order"), answer("unknown")),
-    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=7)),
-    (truth("gross", **BUMPED), answer("gross_error", "outlier_position", place=8)),
+    (gross("axis_error"), answer("gross_error", "axis_error", "bias_drift")),
+    (gross("row_order"), answer("unknown")),
+    (gross("outlier_position", position=7.0), answer("gross_error", "outlier_position", at=7)),
+    (gross("outlier_position", position=7.0), answer("gross_error", "outlier_position", at=8)),
 ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def campaigns():
     """Truths and outcomes."""
-    return table_of({"cell": f"cell {i}", "campaign": i % 3, **truth, **answer}
-                    for i, (truth, answer) in enumerate(CASES))  # fmt: skip
+    return [{"cell": f"cell {i}", "campaign": i % 3, **truth, **answer}
+            for i, (truth, answer) in enumerate(CASES)]  # fmt: skip
 
 
 CONFIG = HiddenConfig.model_validate(
@@ -213,7 +199,7 @@ def test_targets(targets, figure, cases, wanted, measured, n, met):
 
 
 def test_what_was_not_measured_is_not_met(campaigns):
-    rows = table(PAGE["Targets"], frames(campaigns.query("set == 'one'"), CONFIG))
+    rows = table(PAGE["Targets"], frames([row for row in campaigns if row["set"] == "one"], CONFIG))
     row = rows[rows["figure"] == "recognised"].iloc[0]
     assert (row["met"], row["95 % interval"], row["measured"]) == ("–", "", "–")
 
@@ -312,9 +298,10 @@ def test_the_simpler_methods_beside_the_diagnosis(judged):
 
 
 def test_a_page_with_every_target_and_every_error(judged, targets):
-    made = {"fingerprint": "0123", "origin": ORIGIN}
-    page = score_page("score", judged, made)
-    assert "configuration `0123`, seed 5, accelstudy 1.2, commit `abcdef0123`" in page
+    page = score_page(CONFIG, judged, ORIGIN)
+    assert (
+        f"configuration `{CONFIG.fingerprint}`, seed 5, accelstudy 1.2, commit `abcdef0123`" in page
+    )
     for row in targets:
         assert f"| {row['figure']} | {row['campaigns']} |" in page
     assert "| refused | 1 |" in page

@@ -1,6 +1,5 @@
 """Effects in public logs: what is put in is what was meant, and answers are judged by it."""
 
-import json
 import re
 
 import numpy as np
@@ -15,7 +14,7 @@ from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
-from studies.hidden.campaigns import parse_hidden, row_of, table_of
+from studies.hidden.campaigns import parse_hidden, row_of
 from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.kinds import Cause
 from studies.hidden.real_logs import BUMPED, PUT, Donor
@@ -80,7 +79,7 @@ def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
 
 def test_p_is_that_of_a_nested_fit(log, tmp_path):
     """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
-    (row,) = of_log(log, (SQUARE, 0)).to_dict("records")
+    (row,) = of_log(log, (SQUARE, 0))
     rng = np.random.default_rng(SQUARE.seed(OURS.seed, 0))
     one = log.drawn("quadratic_scale", 300, None, rng)
     settings = log.write(tmp_path / "log.parquet", [one], None, {})
@@ -117,7 +116,7 @@ def table(campaigns):
 
 def of_job(job):
     """Truths and answers of the campaigns of a job."""
-    return table_of(row_of(job, case, k) for case, k in job.campaigns)
+    return [row_of(job, case, k) for case, k in job.campaigns]
 
 
 def of_log(log, *campaigns, config=OURS):
@@ -137,15 +136,15 @@ def test_plain_effects_in_white_noise_are_found(table):
 def test_with_and_without_its_column_it_is_the_same_session(table):
     rows = table.set_index("cell")
     with_it, without = (
-        json.loads(rows.loc[f"{NAME}/thermal_bias/300/{how}", "effects"])
+        rows.loc[f"{NAME}/thermal_bias/300/{how}", "effects"]
         for how in ("recorded", "not recorded")
     )
     assert with_it == without
 
 
 def test_the_page_counts_every_campaign_once(campaigns):
-    judged, made = frames(campaigns, OURS), {"fingerprint": "", "origin": ORIGIN}
-    page = score_page("real", judged, made)
+    judged = frames(campaigns, OURS)
+    page = score_page(OURS, judged, ORIGIN)
     part = page.partition("## Each effect")[2].partition("##")[0]
     rows = [line.split("|")[1:-1] for line in part.splitlines() if line.startswith("| ")][2:]
     assert (
@@ -158,22 +157,22 @@ def test_the_page_counts_every_campaign_once(campaigns):
 
 
 def said(
-    table, verdict, found=(), true=("thermal_bias",), recorded=True, explanations=(), own=(), **more
+    row, verdict, found=(), true=("thermal_bias",), recorded=True, explanations=(), own=(), **more
 ):
     """What is said of an answer to a campaign."""
     answer = {
-        "verdict": verdict, "recorded": recorded, "classes": json.dumps([[n] for n in true]),
-        "found": json.dumps(found), "positions": json.dumps([7] * len(found)), "error": "",
-        "credible_set": json.dumps(explanations), "oracle_detected": None, "gross_name": "",
+        "verdict": verdict, "recorded": recorded, "classes": [[n] for n in true], "found": found,
+        "positions": [7] * len(found), "error": "", "credible_set": explanations, "oracle": None,
+        "gross": {"name": "", "settings": {}},
     }  # fmt: skip
-    return judge(table[:1].assign(**{**answer, **more}), {NAME: own})["said"].item()
+    return judge([{**row, **answer, **more}], {NAME: own})["said"].item()
 
 
 @pytest.mark.parametrize(("expected", "given"), [
     ("no answer", {"verdict": None, "error": "refused"}),
     ("right name", {"verdict": "named", "found": ["thermal_bias"]}),
-    ("right name", {"verdict": "gross_error", "found": [BUMPED], "true": [], "gross_name": BUMPED,
-                    "gross": '{"settings": {"position": 7}}'}),
+    ("right name", {"verdict": "gross_error", "found": [BUMPED], "true": [],
+                    "gross": {"name": BUMPED, "settings": {"position": 7}}}),
     ("family or set", {"verdict": "narrowed", "found": ["warm_up"], "explanations": [
         {"names": ["warm_up"], "posterior": 0.5}, {"names": ["thermal_bias"], "posterior": 0.4}]}),
     ("family or set", {"verdict": "named", "found": ["thermal_scale"]}),
@@ -194,18 +193,18 @@ def said(
     ("nothing", {"verdict": "no_effect"}),
 ])  # fmt: skip
 def test_what_an_answer_says(campaigns, expected, given):
-    assert said(campaigns, **given) == expected
+    assert said(campaigns[0], **given) == expected
 
 
 def test_what_a_log_has_by_itself_is_neither_right_nor_wrong(campaigns):
     found = {"found": ["quadratic_scale"], "true": ["bias_drift"]}
-    assert said(campaigns, "named", **found) == "other name"
-    assert said(campaigns, "named", own=["quadratic_scale"], **found) == "nothing"
+    assert said(campaigns[0], "named", **found) == "other name"
+    assert said(campaigns[0], "named", own=["quadratic_scale"], **found) == "nothing"
 
 
 def test_of_a_function_learned_in_a_log_no_share_is_explained(campaigns):
     """Its true noise is not known."""
-    assert judge(campaigns[:1].assign(verdict="learned"))["explained"].isna().all()
+    assert judge([{**campaigns[0], "verdict": "learned"}])["explained"].isna().all()
 
 
 @pytest.mark.parametrize(("change", "says"), [
@@ -250,9 +249,9 @@ def test_what_is_beside_a_large_effect_has_an_answer():
     log = Donor(name, path, settings, CONFIG.interval_s)
     case = LogCase("two", name, effect=("thermal_bias", "cubic_scale"), lam=(400.0, 400.0),
                    recorded=True)  # fmt: skip
-    (row,) = of_log(log, (case, 4), config=CONFIG).to_dict("records")
+    (row,) = of_log(log, (case, 4), config=CONFIG)
     assert row["error"] == ""
-    assert "thermal_bias" in json.loads(row["found"])
+    assert "thermal_bias" in row["found"]
 
 
 def test_the_score_is_that_of_the_study():

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,9 +27,6 @@ LEARNABLE: Mapping[str, Sequence[str]] = {
 }
 """Target -> coordinates of which the diagnosis can learn a function for it."""
 
-JSON = ("classes", "found", "positions", "credible_set", "fits", "place", "true_place", "gross",
-        "oracle_best", "oracle_told")  # fmt: skip
-"""Columns of a campaign that are judged."""
 VERDICTS = ("named", "narrowed", "learned", "unknown", "noise_model", "gross_error")
 """Verdicts that something is missing; the first two give effects."""
 RIGHT, NEAR, OTHER, NONE = "right name", "family or set", "other name", "no answer"
@@ -54,12 +49,12 @@ def all_true(given: Sequence[Class], true: Sequence[Class]) -> bool:
     )
 
 
-def judge(campaigns: pd.DataFrame, own: Mapping[str, Sequence[str]] | None = None) -> pd.DataFrame:
+def judge(rows: Iterable[Row], own: Mapping[str, Sequence[str]] | None = None) -> pd.DataFrame:
     """Judge the answers to campaigns.
 
     Parameters
     ----------
-    campaigns : DataFrame, a row of truth and answer each
+    rows : of `studies.hidden.campaigns.row_of`
     own : of designs the names of what they have by themselves, which count neither as right nor as
         wrong
 
@@ -68,21 +63,14 @@ def judge(campaigns: pd.DataFrame, own: Mapping[str, Sequence[str]] | None = Non
     DataFrame
         The same with the answers to all questions; of a diagnosis that failed all are no
     """
-    records: Any = campaigns.to_dict("records")
-    rows = [_judged(row, (own or {}).get(row["design"], ())) for row in records]
-    names = ("set", "what", "design", "approach", "sigma", "verdict", "error")
-    told = campaigns.astype(dict.fromkeys(names, object) | {"oracle_alternatives": float})
-    judged = pd.DataFrame(rows, index=told.index)
-    return told.drop(columns="confirmed").join(judged)
+    return pd.DataFrame([_judged(row, (own or {}).get(row["design"], ())) for row in rows])
 
 
 def _judged(row: Row, own: Sequence[str]) -> Row:
-    """Answers to all questions about a campaign."""
-    for name in JSON:
-        row[name] = json.loads(row[name]) if isinstance(row[name], str) else None
-    ok, true, place = not row["error"], row["classes"], row["true_place"]
-    explanations = row["credible_set"] or []
-    given = [*zip(row["found"] or (), row["positions"] or (), strict=True)]
+    """Truth and answer of a campaign, and the answers to all questions about it."""
+    ok, true, place, oracle = not row["error"], row["classes"], row["true_place"], row["oracle"]
+    explanations = row.get("credible_set", [])
+    given = [*zip(row.get("found", ()), row.get("positions", ()), strict=True)]
     verdict = row["verdict"] if ok else ""
     if own:
         explanations = [
@@ -93,28 +81,32 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         given = [(name, position) for name, position in given if name not in own]
         if verdict in ("named", "narrowed") and not given:
             verdict = "no_effect"
-    row |= {"verdict": verdict, "found": [name for name, _ in given], "credible_set": explanations}
-    names = [[name] for name in row["found"]]
+    found = [name for name, _ in given]
+    names = [[name] for name in found]
     hits = [same_effects([[name] for name in one["names"]], true) for one in explanations]
     in_set = {name for one in explanations for name in one["names"]}
     answered, learned = verdict in ("named", "narrowed"), verdict == "learned"
     right, correct = answered and same_effects(names, true), answered and all_true(names, true)
-    oracle = bool(true) and not pd.isna(row["oracle_detected"])
-    found = oracle and bool(row["oracle_detected"])
+    has_oracle = bool(true and oracle)
+    oracle_found = has_oracle and oracle["detected"]
     top: Row = explanations[0] if explanations else {"names": [], "posterior": np.nan}
     strange = NOWHERE.get(row["what"])
     true_noise = row["design"] in DESIGNS  # of a log it is not known
     judged = {
+        **row,
+        "verdict": verdict,
+        "found": found,
+        "credible_set": explanations,
         "ok": ok,
         "alarm": ok and verdict != "no_effect",
-        "confirmed": ok and bool(row["confirmed"]),
+        "confirmed": ok and row["confirmed"],
         **{name: verdict == name for name in VERDICTS},
         "answered": answered,
         "right": right,
         # A narrowed answer only says that it is one of the set.
         "wrong": answered and not correct and not (verdict == "narrowed" and any(hits)),
         "one_of_two": correct and not right,
-        "recognised": verdict == "gross_error" and _recognised(row, dict(given)),
+        "recognised": verdict == "gross_error" and _recognised(row["gross"], dict(given)),
         "one_name": len(names) == 1,
         "large": row["size"] >= LARGE
         and (row["sigma"] == "given" or (true_noise and session(row["design"]).repeats)),
@@ -128,42 +120,44 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "explanation": "+".join(top["names"]),
         "top_posterior": top["posterior"],
         "top_right": any(hits[:1]),
-        "has_oracle": oracle,
-        "oracle_found": found,
-        "oracle_right": found and same_effects(row["oracle_best"], true),
-        "told_right": oracle and same_effects(row["oracle_told"], true),
+        "has_oracle": has_oracle,
+        "oracle_found": oracle_found,
+        "oracle_right": oracle_found and same_effects(oracle["best"], true),
+        "oracle_told": oracle["told"] if oracle else [],
+        "oracle_alternatives": oracle["alternatives"] if oracle else np.nan,
+        "told_right": has_oracle and same_effects(oracle["told"], true),
         "its_place": ", ".join(strange.place if strange and strange.place else ("–",)),
         "has_place": place is not None,
         "learnable": place is not None and place[0] in LEARNABLE.get(place[1], ()),
         "place_right": learned and place is not None and row["place"] == place,
         "place_wrong": learned and place is not None and row["place"] != place,
-        "its_column": "not recorded" if row.get("recorded") is False else "recorded",
+        "its_column": "not recorded" if row["recorded"] is False else "recorded",
         "p_class": next((p for p, end in [*P_CLASSES.items()][::-1] if row["p_known"] < end), None),
     }
-    return judged | {"said": _said(row, judged)}
+    return judged | {"said": _said(judged)}
 
 
-def _recognised(row: Row, places: Mapping[str, float | None]) -> bool:
+def _recognised(gross: Row, places: Mapping[str, float | None]) -> bool:
     """Whether a gross error is named, and a bumped position where it is."""
-    true, name = row["gross"].get("settings", {}).get("position"), row["gross_name"]
+    true, name = gross["settings"].get("position"), gross["name"]
     return name in places and (true is None or places[name] == true)
 
 
-def _said(row: Row, judged: Row) -> str:
+def _said(row: Row) -> str:
     """What an answer says of what is hidden, in two or three words.
 
     "family or set": of two effects one; a set that holds the right names; other names of the same
     families; or a verdict "unknown" that leaves no doubt of such a family. Without its column, what
     a temperature does is a slow change in time.
     """
-    if not judged["ok"]:
-        return NONE
-    if judged["right"] or judged["recognised"]:
-        return RIGHT
     verdict = row["verdict"]
-    if judged["one_of_two"] or (verdict == "narrowed" and judged["set_holds"]):
+    if not row["ok"]:
+        return NONE
+    if row["right"] or row["recognised"]:
+        return RIGHT
+    if row["one_of_two"] or (verdict == "narrowed" and row["set_holds"]):
         return NEAR
-    slow = family_of("warm_up") if judged["its_column"] == "not recorded" else ()
+    slow = family_of("warm_up") if row["its_column"] == "not recorded" else ()
     heat = family_of("thermal_bias") if slow else ()
     families = [
         {kin for name in names for kin in (*family_of(name), *(slow if name in heat else ()))}

@@ -9,7 +9,6 @@ real noise.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -113,11 +112,12 @@ def label(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return number(value)
+    if isinstance(value, list):
+        value = (
+            " + ".join(one if isinstance(one, str) else " = ".join(one) for one in value) or None
+        )
     if value is None or "/" in str(value):  # what identifies a campaign stays as it is
         return str(value or "–")
-    if str(value).startswith("["):
-        names = [one if isinstance(one, str) else " = ".join(one) for one in json.loads(value)]
-        value = " + ".join(names) or "–"
     return words(str(value))
 
 

@@ -1,7 +1,6 @@
 from accelstudy.jobs import job
 from studies.hidden.campaigns import parse_hidden, run
 
-with job(snakemake) as provenance:
+with job(snakemake):
     config = parse_hidden(snakemake.config)
-    provenance["config_hash"] = config.fingerprint
-    run(config.job(snakemake.wildcards.job), snakemake.output[0], provenance)
+    run(config.job(snakemake.wildcards.job), snakemake.output[0])
