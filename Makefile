@@ -118,9 +118,8 @@ pictures: reproduce ## make the pictures of reports, studies and tutorials in do
 optimal-schemes: $(READY) ## search the table of optimal schemes anew
 	python tests/helpers/optimal_schemes.py
 
-benchmarks: $(READY) ## measure the speed, and take tables and figure into docs
-	python benchmarks/run.py docs/guides/speed.md docs/figures/speed.png
-	python tests/helpers/pictures.py drawn speed
+benchmarks: $(READY) ## measure the speed, and take the tables into docs
+	python benchmarks/run.py docs/guides/speed.md
 
 docs: $(READY) ## build the documentation in site/, offline; open site/index.html
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict

@@ -8,9 +8,8 @@ import numpy as np
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import simulate_campaign
+from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
-from diagnosis import settings
 from log_memory import RATE, lines, write_log
 from problem import MODEL
 from processes import ACCELSTUDY, took
@@ -23,6 +22,22 @@ CAMPAIGNS, FITS = 10, 50
 LOG = 100
 """MB."""
 READ = "import sys, pandas; pandas.read_csv(sys.argv[1])"
+
+
+def settings(effects, seed):
+    """36 positions with a robot, and all columns."""
+    return CampaignSettings(
+        seed=seed,
+        scheme="fibonacci-30",
+        repeat_first=6,
+        order="random",
+        temperature=(15.0, 40.0),
+        temperature_order="ABBA",
+        vibration=(0.0, 1.0),
+        yaw="random",
+        n_samples=200,
+        effects=effects,
+    )
 
 
 def run():

@@ -1,46 +1,21 @@
 """Work in processes of its own."""
 
-import atexit
-import os
-import shutil
 import subprocess
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
 from multiprocessing import get_context
-from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-SCRATCH = "ACCELSTUDY_BENCHMARKS"
-"""Environment variable that tells `scratch` to processes."""
-
 ACCELSTUDY = (sys.executable, "-m", "accelstudy")
 """The command of this package."""
-
-
-@cache
-def scratch():
-    """Folder for what is compiled once, of this process and of those that it starts then.
-
-    It is removed at the end.
-    """
-    if SCRATCH not in os.environ:
-        os.environ[SCRATCH] = tempfile.mkdtemp()
-        atexit.register(shutil.rmtree, os.environ[SCRATCH], ignore_errors=True)
-    return Path(os.environ[SCRATCH])
 
 
 def fresh(function, *arguments):
     """What a function returns in a new process."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(function, *arguments).result()
-
-
-def cores_here():
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 class Took(NamedTuple):

@@ -1,10 +1,10 @@
-"""All benchmarks of speed, and the tables and the figure that show them.
+"""All benchmarks of speed, and the tables that show them.
 
-    python benchmarks/run.py [PAGE FIGURE]
+    python benchmarks/run.py [PAGE]
 
-PAGE is a Markdown file, such as docs/guides/speed.md: its tables are replaced. FIGURE is the PNG
-to write. Without them the tables are printed, and no more. It takes some minutes. All works take
-turns, and processor time is taken, so that what else the machine does hits all alike.
+PAGE is a Markdown file, such as docs/guides/speed.md: its tables are replaced. Without it the
+tables are printed, and no more. It takes some minutes. All works take turns, and processor time is
+taken, so that what else the machine does hits all alike.
 """
 
 import os
@@ -18,17 +18,12 @@ from importlib.metadata import version  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import around  # noqa: E402
-import cores  # noqa: E402
-import figure  # noqa: E402
-import growth  # noqa: E402
 import precision  # noqa: E402
-import roofline  # noqa: E402
 import speeds  # noqa: E402
 from page import put  # noqa: E402
-from processes import cores_here  # noqa: E402
 from ways import WAYS  # noqa: E402
 
-PARTS = (speeds, roofline, growth, cores, around)
+PARTS = (speeds, around)
 NAMES = ("machine", "precision", *(part.__name__ for part in PARTS))
 """Tables of the page."""
 
@@ -40,11 +35,11 @@ def machine():
     name = next((line.split(": ")[1] for line in names if line.startswith("model name")), "")
     used = ("accelstudy", "numpy", "scipy", "llvmlite")
     packages = [f"{each} {version(each)}" for each in used]
-    packages += [f"{one} {version(one)}" for one in ("jax", "numba") if not WAYS.get(one).missing()]
+    packages += [] if WAYS.get("numba").missing() else [f"numba {version('numba')}"]
     load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
     return (
-        f"{name or platform.machine()}, {cores_here()} cores, Python {platform.python_version()}, "
-        f"{', '.join(packages)}; load at the start (1, 5, 15 minutes) {load}."
+        f"{name or platform.machine()}, {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}, {', '.join(packages)}; load at the start (1, 5, 15 minutes) {load}."
     )
 
 
@@ -68,10 +63,6 @@ def main(arguments):
         for name, text in texts.items():
             page = put(page, name, text)
         path.write_text(page)
-        figure.draw(
-            Path(arguments[1]),
-            results[speeds][0], results[growth], results[cores],
-        )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 
 from accelstudy.approaches import get_approach
 from problem import APPROACHES, BLOCK, drawn, ideal_session
-from processes import fresh, scratch
+from processes import fresh
 from timing import in_turns, short, spread, table
 from ways import WAYS
 
@@ -14,7 +14,6 @@ PROCESSES, ROUNDS = 3, 3
 
 def run():
     """Speeds {approach: {way: (rounds,) calibrations/s}}, and differences {approach: {way: σ}}."""
-    scratch()
     speeds, differences = {}, {}
     for name in APPROACHES:
         results = [fresh(measure, name) for _ in range(PROCESSES)]

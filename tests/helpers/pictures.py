@@ -56,8 +56,6 @@ DRAWN = {
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),
     "hidden": ("make hidden-docs", "studies/hidden/scoring/figures.py",
                "studies/hidden/scoring/score.yaml"),
-    "speed": ("make benchmarks",
-              *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.py"))),
 }  # fmt: skip
 """Pictures that no test makes: what makes them, and the code that draws them."""
 
