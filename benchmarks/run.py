@@ -39,7 +39,8 @@ def machine():
     load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
     return (
         f"{name or platform.machine()}, {os.cpu_count()} cores, "
-        f"Python {platform.python_version()}, {', '.join(packages)}; load at the start (1, 5, 15 minutes) {load}."
+        f"Python {platform.python_version()}, {', '.join(packages)}; "
+        f"load at the start (1, 5, 15 minutes) {load}."
     )
 
 
