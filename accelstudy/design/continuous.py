@@ -90,9 +90,11 @@ def continuous_optimum(
 
 def allowed(space: Space, constraints: Constraints, count: int) -> Array:
     """About `count` allowed attitudes, evenly spread; all of a finite set."""
-    attitudes = constraints.keep(space.directions(count))
+    attitudes = space.directions(count)
+    attitudes = attitudes[constraints.allow(attitudes)]
     if 0 < len(attitudes) < count / 2 and space.tangents(attitudes[:1]).shape[2]:
-        attitudes = constraints.keep(space.directions(min(9999, count * count // len(attitudes))))
+        attitudes = space.directions(min(9999, count * count // len(attitudes)))
+        attitudes = attitudes[constraints.allow(attitudes)]
     return attitudes
 
 
@@ -134,8 +136,9 @@ def _lowest(
         around = np.moveaxis(points[..., None] + moves, 2, 1)
         around = around / np.linalg.norm(around, axis=-1, keepdims=True)
         values = np.einsum("kuw,uw->k", task.informations(around.reshape(-1, 3)), gradient)
-        inside = np.all(constraints.margins(around.reshape(-1, 3)) >= -1e-9, axis=1)
-        values = np.where(inside, values, np.inf).reshape(around.shape[:2])
+        values = np.where(constraints.allow(around.reshape(-1, 3)), values, np.inf).reshape(
+            around.shape[:2]
+        )
         points = around[np.arange(len(points)), np.argmin(values, axis=1)]
         step /= 2
     values = np.einsum("kuw,uw->k", task.informations(points), gradient)

@@ -11,6 +11,7 @@ from accelstudy.adjustment import whitened_jacobian
 from accelstudy.adjustment.observations import Known
 from accelstudy.approaches import Approach
 from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.design.information import rank_of
 from accelstudy.effects import HoldConditions
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
@@ -20,17 +21,9 @@ from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
 
-SINGULAR = 1e-7
-"""Singular values of the scaled design matrix below this fraction of the largest count as zero."""
 ABOVE_NOISE = 3.0
 """How far a combination of parameters must show above what the noise of readings makes of it. Where
 positions do not determine it, it shows by noise alone, at about 1 whatever the noise is."""
-INVOLVED, IN_NOISE = 1e-3, 0.1
-"""Share of a parameter in a combination from which on that combination hides it: of one that does
-not show at all, and of one that noise shows, and blurs."""
-ROUNDING = 1e-14
-"""Columns of the design matrix shorter than this fraction of the longest count as zero."""
-
 MANY = 60
 """Positions that determine whatever an approach can determine at all."""
 EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
@@ -175,36 +168,3 @@ def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: floa
     hold = EVERYTHING_VARIES.hold(MANY)
     a = _design(evenly_spread(MANY), model, approach, noise, ideal, gravity, hold, {})
     return rank_of(a)[0] < a.shape[1]
-
-
-def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[np.bool_]]:
-    """Rank and condition of a design matrix, and which columns its null space involves.
-
-    Parameters
-    ----------
-    a : (m, u) array, A
-    least : (k, u) array, D, optional
-        A combination w of columns counts only where |A w| > |D w|. These are generalised singular
-        values, which do not depend on the units of the parameters.
-    """
-    u = a.shape[1]
-    least = np.zeros((0, u)) if least is None else least
-    if not (np.isfinite(a).all() and np.isfinite(least).all()):
-        return 0, np.inf, np.ones(u, dtype=bool)
-    length = np.linalg.norm(a, axis=0)
-    longest = length.max() or 1.0
-    # A column of rounding errors must stay short: scaled to unit length it would count.
-    unit = 1 / np.where(length > ROUNDING * longest, length, longest)
-    # R of a QR decomposition has the same null space, and saves a matrix of all conditions by all
-    # conditions.
-    triangle = np.linalg.qr(a * unit, mode="r") if len(a) > u else a * unit
-    values = np.linalg.svd(triangle, compute_uv=False)
-    floor = np.concatenate([least * unit, SINGULAR * (values[0] or 1.0) * np.eye(u)])
-    back = np.linalg.inv(np.linalg.qr(floor, mode="r"))
-    # The whole null space is wanted, also of a matrix with fewer rows than columns.
-    _, ratios, vt = np.linalg.svd(triangle @ back, full_matrices=True)
-    rank = int(np.count_nonzero(ratios > 1))
-    condition = float(values[0] / values[-1]) if rank == u else np.inf
-    null, _ = np.linalg.qr(back @ vt[rank:].T)
-    share = IN_NOISE if len(least) else INVOLVED
-    return rank, condition, np.linalg.norm(null, axis=1) > share

@@ -1,13 +1,8 @@
-"""The attitudes to choose from: where they lie, how they can move, and what constrains them.
-
-A constraint has margins, which are not negative where it is met. They filter a grid of attitudes,
-and keep positions within the constraints while they are moved.
-"""
+"""The attitudes to choose from: where they lie, how they can move, and what constrains them."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import combinations, product
@@ -208,124 +203,67 @@ TOLERANCE = 1e-7
 """rad, by which rounding may break a constraint."""
 
 
-class Constraint(ABC):
-    """A constraint on single attitudes.
-
-    Attributes
-    ----------
-    text : str, for people
-    """
-
-    text: str
-
-    @abstractmethod
-    def margins(self, directions: Array) -> Array:
-        """Distances of directions (n, 3) from breaking it, (n, m), rad; negative where they do."""
-
-
-@dataclass(frozen=True)
-class RollRange(Constraint):
-    """Roll between two angles, rad."""
-
-    least: float
-    most: float
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """Ends of the range."""
-        return f"roll from {_shown(self.least)} to {_shown(self.most)}"
-
-    def margins(self, directions: Array) -> Array:
-        """Angles to both ends."""
-        roll = attitudes(directions)[:, 0]
-        return np.stack([roll - self.least, self.most - roll], axis=-1)
-
-
-@dataclass(frozen=True)
-class PitchRange(Constraint):
-    """Pitch between two angles, rad."""
-
-    least: float
-    most: float
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """Ends of the range."""
-        return f"pitch from {_shown(self.least)} to {_shown(self.most)}"
-
-    def margins(self, directions: Array) -> Array:
-        """Angles to both ends."""
-        pitch = attitudes(directions)[:, 1]
-        return np.stack([pitch - self.least, self.most - pitch], axis=-1)
-
-
-@dataclass(frozen=True)
-class OffPole(Constraint):
-    """Least angle, rad, between the x axis and the vertical, where roll is undefined."""
-
-    angle: float
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """Least distance."""
-        return f"at least {_shown(self.angle)} from the roll pole"
-
-    def margins(self, directions: Array) -> Array:
-        """Angle to the nearer pole, beyond the least one."""
-        x, y, z = directions.T
-        return (np.arctan2(np.hypot(y, z), np.abs(x)) - self.angle)[:, None]
-
-
-@dataclass(frozen=True)
-class LeastAngle:
-    """Least angle, rad, between any two positions."""
-
-    angle: float
-
-    @property
-    def text(self) -> str:
-        """The angle."""
-        return f"at least {_shown(self.angle)} between positions"
-
-    def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
-        """Which of k directions are far enough from which of the others, (k, j)."""
-        return np.asarray(directions @ others.T <= np.cos(self.angle - TOLERANCE))
-
-
 @dataclass(frozen=True)
 class Constraints:
-    """Constraints that must all be met.
+    """Constraints that positions must meet; rad, None where there is none.
 
     Attributes
     ----------
-    single : of attitudes
-    pair : LeastAngle or None
+    roll, pitch : (least, most)
+    pole_distance : float, least angle between the x axis and the vertical, where roll is undefined
+    least_angle : float, between any two positions
     """
 
-    single: tuple[Constraint, ...] = ()
-    pair: LeastAngle | None = None
+    roll: tuple[float, float] | None = None
+    pitch: tuple[float, float] | None = None
+    pole_distance: float | None = None
+    least_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in self._ranges.items():
+            if not least < most:
+                raise InputError(f"{name}: the first angle must be less than the second")
+
+    @property
+    def _ranges(self) -> dict[str, tuple[float, float]]:
+        """Ranges of angles by their names."""
+        return {name: ends for name in ("roll", "pitch") if (ends := getattr(self, name))}
 
     @property
     def texts(self) -> list[str]:
         """All of them, for people."""
-        return [c.text for c in (*self.single, self.pair) if c is not None]
+        texts = [f"{name} from {_shown(a)} to {_shown(b)}" for name, (a, b) in self._ranges.items()]
+        if self.pole_distance is not None:
+            texts.append(f"at least {_shown(self.pole_distance)} from the roll pole")
+        if self.least_angle is not None:
+            texts.append(f"at least {_shown(self.least_angle)} between positions")
+        return texts
 
-    def margins(self, directions: Array) -> Array:
-        """Margins of all constraints of single attitudes, (n, m)."""
-        each: Sequence[Array] = [c.margins(directions) for c in self.single]
-        return np.concatenate([np.zeros((len(directions), 0)), *each], axis=1)
+    def allow(self, directions: Array) -> NDArray[np.bool_]:
+        """Which of directions (n, 3) meet the constraints on single positions, (n,)."""
+        allowed = np.ones(len(directions), dtype=bool)
+        if self._ranges:
+            angles = dict(zip(("roll", "pitch"), attitudes(directions).T, strict=True))
+        for name, (least, most) in self._ranges.items():
+            allowed &= (angles[name] >= least - TOLERANCE) & (angles[name] <= most + TOLERANCE)
+        if self.pole_distance is not None:
+            x, y, z = directions.T
+            allowed &= np.arctan2(np.hypot(y, z), np.abs(x)) >= self.pole_distance - TOLERANCE
+        return allowed
 
-    def keep(self, directions: Array) -> Array:
-        """Return those of directions (k, 3) that are allowed."""
-        return directions[np.all(self.margins(directions) >= -TOLERANCE, axis=1)]
+    def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
+        """Which of k directions are far enough from all of the others, (k,)."""
+        if self.least_angle is None or not len(others):
+            return np.ones(len(directions), dtype=bool)
+        limit = np.cos(self.least_angle - TOLERANCE)
+        return np.asarray(np.all(directions @ others.T <= limit, axis=1))
 
-    def kept(self, directions: Array) -> bool:
+    def met(self, directions: Array) -> bool:
         """Whether a set of positions meets all constraints."""
-        if np.any(self.margins(directions) < -TOLERANCE):
-            return False
-        if self.pair is None or len(directions) < 2:
-            return True
-        near = ~self.pair.apart(directions, directions)
+        allowed = bool(np.all(self.allow(directions)))
+        if self.least_angle is None or not allowed:
+            return allowed
+        near = directions @ directions.T > np.cos(self.least_angle - TOLERANCE)
         np.fill_diagonal(near, False)
         return not near.any()
 

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment import whitened_jacobian
-from accelstudy.adjustment.equations import equations_of
-from accelstudy.adjustment.gauss_helmert import whitened_design
-from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
-from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import angles_of
+from accelstudy.design.information import Information, information, position_rows
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan, check_needs_no_plan
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
@@ -106,8 +101,7 @@ class Task:
     @cached_property
     def scale(self) -> Array:
         """Root of the information of one position on each parameter, mean over the sphere, (u,)."""
-        rows = self._rows(evenly_spread(SPHERE))
-        size = np.sqrt(np.mean(np.sum(rows**2, axis=1), axis=0))
+        size = np.sqrt(np.mean(np.sum(self._rows(evenly_spread(SPHERE)) ** 2, axis=1), axis=0))
         return np.where(size > 1e-12 * size.max(), size, 1.0)
 
     def _rows(self, directions: Array) -> Array:
@@ -118,25 +112,33 @@ class Task:
 
     def informations(self, directions: ArrayLike) -> Array:
         """Scaled information of each of k positions, (k, u, u)."""
-        directions = np.asarray(directions, dtype=float)
-        return information(self._rows(directions) / self.scale)
+        return information(self._rows(np.asarray(directions, dtype=float)) / self.scale)
+
+    @cached_property
+    def _before(self) -> Array:
+        """Scaled rows of what is known before the first position, (m, u)."""
+        sigmas = dict(self.prior_sigmas)
+        if self.noise.sigma_gravity > 0:
+            sigmas["g"] = self.noise.sigma_gravity
+        known = np.diag([1 / sigmas.get(name, np.inf) for name in self.names]) / self.scale
+        if self.measured is None:
+            return known
+        rows = self._rows(self.measured) / self.scale
+        return np.concatenate([known, rows.reshape(-1, len(self.names))])
 
     @cached_property
     def prior(self) -> Array:
         """Scaled information before the first position, (u, u)."""
-        weights = np.zeros(len(self.names))
-        for name, sigma in self.prior_sigmas.items():
-            weights[self.names.index(name)] = sigma**-2
-        if self.noise.sigma_gravity > 0:
-            weights[-1] = self.noise.sigma_gravity**-2
-        information_before = np.diag(weights / self.scale**2)
-        if self.measured is not None:
-            information_before = information_before + self.informations(self.measured).sum(axis=0)
-        return information_before
+        return np.asarray(self._before.T @ self._before)
 
     def normal(self, directions: ArrayLike) -> Array:
         """Scaled normal matrix of positions and of what was known before, (u, u)."""
         return self.prior + self.informations(directions).sum(axis=0)
+
+    def information(self, directions: ArrayLike) -> Information:
+        """What positions, and what was known before, tell of the scaled parameters."""
+        rows = self._rows(np.asarray(directions, dtype=float)) / self.scale
+        return Information.of(self._before, rows)
 
     @cached_property
     def tilt(self) -> TiltError:
@@ -154,43 +156,34 @@ class Task:
         weights[:, :m, :m] = self.tilt.quadratic / np.outer(self.scale[:m], self.scale[:m])
         return weights
 
-    @cached_property
-    def neglected_variance(self) -> Array:
-        """Scaled mean squares of the parameters that are neglected, (u − estimated,)."""
-        sizes = [
-            self.neglected[e.spec]
-            for e in self.extended.effects
-            if e.spec in self.neglected
-            for _ in e.parameters
-        ]
-        return (np.array(sizes) * self.scale[~self.estimated]) ** 2
+    def places(self, effect: str) -> NDArray[np.int_]:
+        """Places of the parameters of an effect among all parameters."""
+        owner = [e.spec for e in self.extended.effects for _ in e.parameters]
+        return np.flatnonzero([spec == effect for spec in owner])
 
-    def covariance(self, directions: ArrayLike) -> Array:
-        """Scaled covariance matrix of the estimated parameters, of linear theory."""
-        keep = np.ix_(self.estimated, self.estimated)
-        return np.asarray(np.linalg.inv(self.normal(directions)[keep]))
+    @cached_property
+    def neglected_sigmas(self) -> Array:
+        """Scaled standard deviations of the parameters that are neglected, (u − estimated,)."""
+        sizes = np.zeros(len(self.names))
+        for effect, size in self.neglected.items():
+            sizes[self.places(effect)] = size
+        return np.asarray((sizes * self.scale)[~self.estimated])
 
     def rms_tilt(self, directions: ArrayLike) -> Array:
         """Expected rms of roll and of pitch, rad, (2,), without the noise of the leveled reading.
 
         Neglected effects contribute as a scatter of their given size.
         """
-        kept, left = self.estimated, ~self.estimated
-        normal = self.normal(directions)
-        covariance = np.linalg.inv(normal[np.ix_(kept, kept)])
-        whole = np.zeros((len(normal), len(normal)))
-        whole[np.ix_(kept, kept)] = covariance
-        if left.any():
-            shift = np.zeros((len(normal), left.sum()))
-            shift[kept] = covariance @ normal[np.ix_(kept, left)]
-            shift[left] = -np.eye(left.sum())
-            whole += (shift * self.neglected_variance) @ shift.T
-        return np.sqrt(np.einsum("auw,uw->a", self.tilt_weights, whole))
+        columns = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
+        errors = self.information(directions).errors(*columns, self.neglected_sigmas)
+        if errors is None:
+            return np.full(2, np.inf)
+        return np.sqrt(np.einsum("us,auw,ws->a", errors, self.tilt_weights, errors, optimize=True))
 
     def missing(self, directions: Array) -> str:
         """Why positions do not determine the model; empty if they do."""
-        keep = np.ix_(self.estimated, self.estimated)
-        if np.linalg.cond(self.normal(directions)[keep]) < 1e13:
+        columns = np.flatnonzero(self.estimated)
+        if not self.information(directions).undetermined(columns).any():
             return ""
         scheme = Scheme("allowed", "allowed", directions, "generated", "")
         hold = HoldPlan().hold(len(directions))
@@ -205,85 +198,3 @@ def extended_model(model: SensorModel, effects: list[str]) -> SensorModel:
     extended = SensorModel.of("extended", (*(e.spec for e in model.effects), *effects))
     name = composition_name(extended.effects)
     return compose(name, tuple(effect.spec for effect in extended.effects))
-
-
-def position_rows(
-    model: SensorModel,
-    approach: Approach,
-    noise: Noise,
-    directions: ArrayLike,
-    parameters: Array | None = None,
-    gravity: float = STANDARD_GRAVITY,
-    hold: HoldConditions | None = None,
-    errors: AngleErrors | None = None,
-) -> Array:
-    """Rows of the design matrix that each position contributes, at unit weight.
-
-    The normal matrix of any choice of positions is the sum of RᵀR over their rows R. Where
-    effects depend on the position before, the order of the directions is that of the session.
-
-    Parameters
-    ----------
-    model : SensorModel
-    approach : Approach
-    noise : Noise
-        With `sigma_gravity` > 0 gravity is the last parameter. Its observation belongs to no
-        position, so its weight 1/σ² is not in the rows.
-    directions : (k, 3) array of unit vectors, gravity in the body frame
-    parameters : (u,) array, SI, optional; the ideal sensor by default
-    gravity : float, m/s²
-    hold : HoldConditions, optional
-        What else is known of the k positions.
-    errors : function of angles (k, 2), optional
-        `sigma_angle` and `common` of `Observations`; errors that all angles share are parameters.
-
-    Returns
-    -------
-    (k, c, u') array, with the c conditions of the approach
-
-    Raises
-    ------
-    InputError
-        If the model needs what `hold` does not tell.
-    """
-    directions = np.asarray(directions, dtype=float)
-    if parameters is None and errors is None and not model.hold_columns:
-        return _ideal_rows(model, approach, noise, directions, gravity)
-    at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
-    ideal = session(model, at, directions, gravity, hold)
-    observed = ideal.observations(noise)
-    if errors is not None:
-        sigma_angle, common = errors(ideal.angles)
-        observed = replace(observed, sigma_angle=sigma_angle, common=common)
-    rows = whitened_jacobian(model, approach, observed, at)
-    k, c = len(directions), approach.n_conditions
-    return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))
-
-
-def _ideal_rows(
-    model: SensorModel, approach: Approach, noise: Noise, directions: Array, gravity: float
-) -> Array:
-    """Rows of the ideal sensor: its output is the force, so that nothing is iterated.
-
-    A search for positions takes most of its time for them.
-    """
-    force = -gravity * directions
-    observed, variance = force, np.full(force.shape, noise.sigma_force**2)
-    if approach.uses_angles:
-        angles = angles_of(force)
-        observed = np.concatenate([force, angles], axis=1)
-        of_angles = np.full(angles.shape, noise.sigma_angle**2)
-        variance = np.concatenate([variance, of_angles], axis=1)
-    equations = equations_of(model.trace, approach, noise.sigma_gravity > 0)
-    x = np.zeros((equations.n_parameters, 1))
-    if equations.estimates_gravity:
-        x[-1] = gravity + noise.gravity_error
-    conditions = equations.at(model.settings, gravity + noise.gravity_error, None)
-    at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
-    rows = whitened_design(at, variance.T)[:, :, 0]
-    return np.ascontiguousarray(rows.transpose(2, 0, 1))
-
-
-def information(rows: Array) -> Array:
-    """Normal matrices RᵀR, (k, u, u), of the rows (k, c, u) of k positions."""
-    return np.einsum("kcu,kcw->kuw", rows, rows)

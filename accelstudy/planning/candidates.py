@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.design.information import Information
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.theory import Expected, Theory, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
@@ -126,39 +127,34 @@ def of_scheme(
     question: Question, equipment: Equipment, scheme: Scheme, models: list[SensorModel]
 ) -> Iterator[Candidate]:
     """Candidates in one scheme with one equipment."""
-    theory = theory_of(question.tilt_range)
-    directions, n = scheme.directions, scheme.n_positions
-    at_unit: dict[str, Expected | None] = {}
+    if equipment.reference is not None:  # the rotation between the sensors is unknown
+        models = [model for model in models if ROTATIONS & {*names_of(model)}]
+
+    @cache
+    def expected(sigma: float) -> list[Expected | None]:
+        """Errors that each of the models leaves."""
+        theory = theory_of(question.tilt_range)
+        information = information_of(question, equipment, theory, scheme.directions, sigma)
+        return [theory.expected(information, names_of(m), question.neglectable) for m in models]
+
+    n = scheme.n_positions
     for hold in question.holds:
         if equipment.seconds(n, hold) > question.most_seconds:
             continue
         sigma = sigma_of(question, equipment, n, hold)
-        rows: Array | None = None
-        for model in models:
-            if equipment.name == "gravity":  # with a single noise the result scales with it
-                if model.name not in at_unit:
-                    if rows is None:
-                        rows = theory.rows(directions, "gravity", Noise(sigma_force=1.0))
-                    at_unit[model.name] = theory.expected(rows, model, question.neglectable)
-                unit = at_unit[model.name]
-                expected = None if unit is None else unit.with_noise(sigma)
-            else:
-                if equipment.reference is not None and not ROTATIONS & {*names_of(model)}:
-                    continue  # the rotation between the sensors is unknown
-                if rows is None:
-                    rows = rows_of(question, equipment, theory, directions, sigma)
-                expected = theory.expected(rows, model, question.neglectable)
-            if expected is None or expected.redundancy < LEAST_REDUNDANCY * expected.conditions:
-                continue
-            yield Candidate(equipment, model, scheme, hold, sigma, expected)
+        single = equipment.name == "gravity"  # with a single noise, errors are in proportion to it
+        for model, each in zip(models, expected(1.0 if single else sigma), strict=True):
+            if each is not None and each.redundancy >= LEAST_REDUNDANCY * each.conditions:
+                own = each.with_noise(sigma) if single else each
+                yield Candidate(equipment, model, scheme, hold, sigma, own)
 
 
-def rows_of(
+def information_of(
     question: Question, equipment: Equipment, theory: Theory, directions: Array, sigma: float
-) -> Array:
-    """Whitened rows of a calibration, as `Theory.rows` has them."""
+) -> Information:
+    """What a calibration tells of the parameters of every effect."""
     noise = Noise(sigma, angle_sigma(question, equipment))
-    return theory.rows(directions, equipment.approach, noise, equipment.reference)
+    return theory.information(directions, equipment.approach, noise, equipment.reference)
 
 
 def angle_sigma(question: Question, equipment: Equipment) -> float:

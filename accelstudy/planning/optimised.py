@@ -27,8 +27,8 @@ STARTS = 1
 """Random sets from which a search starts; more find designs that are better by 0.1 % at most."""
 USUALLY, AT_LEAST = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
-ROUGHLY = 0.995
-"""Accuracy of the best positions, of that of positions that were sought roughly."""
+REFINED = 0.95
+"""About as many of refined positions suffice as of others."""
 SURE = 0.99
 """Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
@@ -78,56 +78,43 @@ class Sought:
             n, self.model, self.equipment.approach, MINIMAX, tilt_range, noise, starts=STARTS
         )
 
-    def candidate(self, n: int, rough: bool = False) -> Candidate | None:
-        """Calibration in the best n positions; None if so many are not allowed, or too few.
+    def candidate(self, n: int, refined: bool = True) -> Candidate | None:
+        """Calibration in the best n positions, or in some near them if these are not refined.
 
-        `rough` asks for positions near the best ones.
+        None if so many are not allowed, or too few.
         """
         if not self.least <= n <= self.most:
             return None
         alone = replace(self.question, holds=(self.hold,))
-        scheme = best_positions(self.request(n), rough)
+        scheme = best_positions(self.request(n), refined)
         return next(of_scheme(alone, self.equipment, scheme, [get_model(self.model)]), None)
 
-    def fewest(self, confidence: float | None, near: int) -> Candidate | None:
+    def fewest(self, confidence: float | None, needed: float) -> Candidate | None:
         """Calibration in the fewest positions that reach the target, by linear theory.
 
-        The search begins near a number of positions, first roughly, and goes on as if each gave
-        the same information. It ends where one position less is known to miss the target.
+        The search begins near a number of positions, and goes on as if each gave the same
+        information; first among positions that are not refined, which takes a fifth of the time.
         """
-        target, tried = self.question.target, {}
-        near = self._roughly_fewest(confidence, near)
-        if SURE**2 * near > self.most:
-            return None
-        low, high = self.least - 1, self.most + 1
-        while high - low > 1:
-            n = min(max(near, low + 1), high - 1)
-            tried[n] = candidate = self.candidate(n)
-            if candidate is None:
-                low = n
-                continue
-            share = candidate.accuracy(confidence) / target
-            near = math.ceil(n * share**2)
-            if share > 1:
-                low = n
-            else:
-                high = n
-                if n > 1 and SURE * share * math.sqrt(n / (n - 1)) > 1:
-                    break
-        return tried.get(high)
-
-    def _roughly_fewest(self, confidence: float | None, near: int) -> int:
-        """Number of positions that reach the target by a rough search; the least is not tried."""
-        tried: set[int] = set()
-        while near > self.least and near not in tried:
-            tried.add(near)
-            n = min(near, self.most)
-            candidate = self.candidate(n, rough=True)
-            if candidate is None:
-                break
-            share = ROUGHLY * candidate.accuracy(confidence) / self.question.target
-            near = math.ceil(n * share**2)
-        return near
+        found = None
+        for refined in (False, True):
+            low, high, found = self.least - 1, self.most + 1, None
+            while high - low > 1:
+                n = min(max(math.ceil(needed), low + 1), high - 1)
+                candidate = self.candidate(n, refined)
+                share = math.inf
+                if candidate is not None:
+                    share = candidate.accuracy(confidence) / self.question.target
+                    needed = n * share**2
+                if share > 1:
+                    low = n
+                else:
+                    high, found = n, candidate
+                    if SURE * share * math.sqrt(n / max(n - 1, 0.5)) > 1:
+                        break
+            needed *= REFINED
+            if needed > self.most:
+                return None
+        return found
 
 
 def cheapest(question: Question, good: Sequence[Candidate], confidence: float | None) -> Candidate:
@@ -166,9 +153,9 @@ def request_of(question: Question, candidate: Candidate) -> Request:
 
 
 @cache
-def best_positions(request: Request, rough: bool = False) -> Scheme:
-    """The best positions, or such as are near them, as a scheme that a study can have."""
-    directions = request.find(bounded=False, rough=rough).directions.tolist()
+def best_positions(request: Request, refined: bool = True) -> Scheme:
+    """The best positions, as a scheme that a study can have."""
+    directions = request.find(bounded=False, refined=refined).directions.tolist()
     source = "accelstudy design"
     return remember(
         {"title": "minimax", "source": source, "directions": directions},

@@ -18,6 +18,7 @@ from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.reasons import limits
+from accelstudy.planning.theory import NOISE
 from accelstudy.planning.wording import (
     answer_lines,
     assumption_lines,
@@ -139,5 +140,5 @@ def _row(candidate: Candidate) -> dict[str, Any]:
     }
     for i, angle in enumerate(ANGLES):
         row[f"{angle}_rms_mgon"] = float(candidate.expected.rms[i]) / MGON
-        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.expected.noise[i])) / MGON
+        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.expected.squares[NOISE][i])) / MGON
     return row

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.effects import get_effect
-from accelstudy.planning.candidates import PLANNED_MODELS, Candidate
-from accelstudy.planning.question import Question
-from accelstudy.planning.theory import OF_RIG, Theory, theory_of
-from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise
-
-Array = NDArray[np.float64]
+from accelstudy.planning.candidates import Candidate, information_of, names_of
+from accelstudy.planning.question import Question, Size
+from accelstudy.planning.theory import NOISE, OF_RIG, Expected, theory_of
 
 PLAIN = {
     "nonorthogonality": "angles between the axes",
@@ -39,9 +34,7 @@ class Need:
     Attributes
     ----------
     effect : str
-    size : float, SI
-    unit : str, SI
-    source : str, where the size comes from
+    size : Size
     in_model : bool
     left : float, rad, rms that neglecting the effect adds; NaN if the positions cannot show it
     cost : float, rad, rms that noise adds if the effect is estimated; NaN if it cannot be
@@ -49,18 +42,11 @@ class Need:
     """
 
     effect: str
-    size: float
-    unit: str
-    source: str
+    size: Size
     in_model: bool
     left: float
     cost: float
     verdict: str
-
-    @property
-    def title(self) -> str:
-        """The effect in plain words."""
-        return PLAIN[self.effect]
 
 
 @dataclass(frozen=True)
@@ -70,22 +56,23 @@ class Spoiler:
     Attributes
     ----------
     effect : str
-    unit : str, SI
     size : float, SI; inf if no size of it matters
-    usual : (float, float), SI, sizes of good and of cheap equipment
     verdict : "spoils it", "may spoil it" or "does not matter"
     """
 
     effect: str
-    unit: str
     size: float
-    usual: tuple[float, float]
     verdict: str
 
     @property
-    def title(self) -> str:
-        """The effect in plain words."""
-        return PLAIN[self.effect]
+    def usual(self) -> tuple[float, float]:
+        """Sizes in good and in cheap equipment, SI."""
+        return get_effect(self.effect).typical
+
+
+def unit_of(effect: str) -> str:
+    """SI unit of the parameters of an effect."""
+    return get_effect(effect).parameters[0].unit
 
 
 @dataclass(frozen=True)
@@ -114,64 +101,51 @@ class InUse:
 
 def limits(question: Question, candidate: Candidate) -> str:
     """What limits the accuracy of a candidate, in a few words."""
-    expected = candidate.expected
-    worse = int(np.argmax(expected.rms))
-    total = float(expected.rms[worse] ** 2)
-    parts = {
-        f"neglected {PLAIN[name]}": float(square[worse]) / total
-        for name, square in expected.neglected.items()
-    }
-    noise = float(expected.noise[worse]) / total
+    worse = int(np.argmax(candidate.expected.rms))
+    parts = {cause: each[worse] for cause, each in candidate.expected.squares.items()}
+    noise = parts.pop(NOISE)
+    by_words = {f"neglected {PLAIN[effect]}": square for effect, square in parts.items()}
     if candidate.equipment.name == "robot":
-        quiet = _noise_square(question, candidate, sigma_angle=1e-12)[worse] / total
-        parts["noise of the robot's angles"] = noise - float(quiet)
-        noise = float(quiet)
-    sheet = question.sheet
-    if sheet.velocity_random_walk is not None:
-        white = sheet.velocity_random_walk**2 / candidate.hold / candidate.sigma**2
-        parts["wander of the sensor's bias"] = noise * max(0.0, 1 - white)
-        noise *= min(1.0, white)
-    parts["noise of the sensor"] = noise
-    return max(parts, key=lambda name: parts[name])
+        perfect = replace(question, sigma_angle=1e-12)
+        quiet = _expected(perfect, candidate, names_of(candidate.model))
+        robot = noise - (0.0 if quiet is None else quiet.squares[NOISE][worse])
+        by_words["noise of the robot's angles"], noise = robot, noise - robot
+    walk = question.sheet.velocity_random_walk
+    if walk is not None:
+        white = min(1.0, walk**2 / candidate.hold / candidate.sigma**2)
+        by_words["wander of the sensor's bias"], noise = noise * (1 - white), noise * white
+    by_words["noise of the sensor"] = noise
+    return max(by_words, key=lambda words: by_words[words])
 
 
 def needs(question: Question, candidate: Candidate) -> list[Need]:
     """Say for each effect of the sensor whether the model needs it to reach the target."""
-    theory = theory_of(question.tilt_range)
-    rows = _rows(question, theory, candidate)
-    effects = [effect.name for effect in candidate.model.effects]
-    judged = []
+    effects, judged = names_of(candidate.model), []
     for effect, size in question.sizes.items():
         if size.value == 0:
             continue
-        unit = get_effect(effect).parameters[0].unit
-        inside = effect in effects
-        without = _model_with(effects, effect, False)
-        including = _model_with(effects, effect, True)
-        alone = theory.expected(rows, without, question.neglectable)
-        more = theory.expected(rows, including, question.neglectable)
+        others = [name for name in effects if name != effect]
+        alone = _expected(question, candidate, others)
+        more = _expected(question, candidate, [*others, effect])
         left = cost = math.nan
         if alone is not None:
-            left = float(np.sqrt(alone.neglected[effect].max()))
+            left = float(np.sqrt(alone.squares[effect].max()))
         if more is not None:
-            quieter = np.zeros(2) if alone is None else alone.noise
-            cost = float(np.sqrt(np.maximum(more.noise - quieter, 0.0).max()))
-        if inside:
+            quieter = np.zeros(2) if alone is None else alone.squares[NOISE]
+            cost = float(np.sqrt(np.maximum(more.squares[NOISE] - quieter, 0.0).max()))
+        verdict = "worth it" if left > cost else "not needed"
+        if effect in effects:
             fails = alone is None or not replace(candidate, expected=alone).reaches(
                 question.target, question.confidence
             )
             verdict = "needed" if fails else "worth it" if left > cost else "of no use"
-        else:
-            verdict = "worth it" if left > cost else "not needed"
-        judged.append(Need(effect, size.value, unit, size.source, inside, left, cost, verdict))
+        judged.append(Need(effect, size, effect in effects, left, cost, verdict))
     return judged
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
     """Sizes at which effects that are not in the model would by themselves use up the target."""
-    theory = theory_of(question.tilt_range)
-    rows = _rows(question, theory, candidate)
-    inside = {effect.name for effect in candidate.model.effects}
+    inside = names_of(candidate.model)
     effects = [e for e in ("quadratic_scale", "cubic_scale") if e not in inside]
     if candidate.equipment.name == "robot":
         # Without a robot the mounting of the sensor neither shows nor does harm.
@@ -179,19 +153,32 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects += OF_RIG
     else:
         effects.append("gravity_error")
+    expected = _expected(question, candidate, inside, dict.fromkeys(effects, 1.0))
+    assert expected is not None
     sizes = []
-    for name in effects:
-        effect = get_effect(name)
-        each = float(theory.neglecting(rows, candidate.model, name).max())
+    for effect in effects:
+        each = float(np.sqrt(expected.squares[effect].max()))
         # An effect without influence leaves rounding errors only.
         size = math.inf if each < 1e-6 else question.target / each
-        low, high = effect.typical
+        low, high = get_effect(effect).typical
         verdict = "spoils it"
         if size > low:
             verdict = "may spoil it" if size <= high else "does not matter"
-        unit = effect.parameters[0].unit
-        sizes.append(Spoiler(name, unit, size, (low, high), verdict))
+        sizes.append(Spoiler(effect, size, verdict))
     return sizes
+
+
+def _expected(
+    question: Question,
+    candidate: Candidate,
+    effects: Iterable[str],
+    sizes: Mapping[str, float] | None = None,
+) -> Expected | None:
+    """Errors in the positions of a candidate with other effects; see `Theory.expected`."""
+    theory = theory_of(question.tilt_range)
+    directions = candidate.scheme.directions
+    told = information_of(question, candidate.equipment, theory, directions, candidate.sigma)
+    return theory.expected(told, effects, question.neglectable if sizes is None else sizes)
 
 
 def in_use(
@@ -219,27 +206,3 @@ def in_use(
         restart = tilt(bias=sheet.bias_change(0.0, restarted=True))
     reading = tilt(bias=sheet.sigma_mean(seconds))
     return InUse(reading, seconds, drift, hours, warmth, kelvin, restart)
-
-
-def _rows(question: Question, theory: Theory, candidate: Candidate) -> Array:
-    noise = Noise(candidate.sigma, question.sigma_angle)
-    return theory.rows(candidate.scheme.directions, candidate.equipment.name, noise)
-
-
-def _noise_square(question: Question, candidate: Candidate, sigma_angle: float) -> Array:
-    """Mean square error that noise leaves, (2,), rad², with another noise of the robot."""
-    theory = theory_of(question.tilt_range)
-    noise = Noise(candidate.sigma, sigma_angle)
-    rows = theory.rows(candidate.scheme.directions, candidate.equipment.name, noise)
-    expected = theory.expected(rows, candidate.model, {})
-    return np.zeros(2) if expected is None else expected.noise
-
-
-def _model_with(effects: list[str], effect: str, inside: bool) -> SensorModel:
-    """Model of these effects, with or without one of them."""
-    kept = [name for name in effects if name != effect] + ([effect] if inside else [])
-    for name in PLANNED_MODELS:
-        model = get_model(name)
-        if {e.name for e in model.effects} == set(kept):
-            return model
-    return get_model("+".join(kept))

@@ -14,7 +14,7 @@ from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.planning.candidates import Candidate, shortest
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.question import Question
-from accelstudy.planning.reasons import PLAIN, in_use, limits, needs, spoilers
+from accelstudy.planning.reasons import PLAIN, in_use, limits, needs, spoilers, unit_of
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
@@ -28,7 +28,8 @@ def answer_lines(answer: Answer) -> list[str]:
     question, candidate = answer.question, answer.first.candidate
     bent = spoilers(question, candidate) if question.is_linear else []
     quadratic = [s for s in bent if s.effect == "quadratic_scale"]
-    return lines(SENTENCES, "answer", answer, in_use(question), quadratic, OTHER_CONFIDENCE)
+    use = in_use(question)
+    return lines(SENTENCES, "answer", answer, use, quadratic, OTHER_CONFIDENCE, unit_of)
 
 
 def unreachable(answer: Answer) -> str:
@@ -66,6 +67,8 @@ def reason_lines(answer: Answer) -> list[str]:
         needs(question, candidate),
         spoilers(question, candidate),
         in_use(question),
+        PLAIN,
+        unit_of,
     )
 
 

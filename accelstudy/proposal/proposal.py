@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics.units import GON, MGON, angles_in, to_recorded
-from accelstudy.design.criteria import RIDGE, Rivals
+from accelstudy.design.criteria import RIDGE, MeanSquare
+from accelstudy.design.information import position_rows
 from accelstudy.design.search import Design, rounded
 from accelstudy.design.spaces import Mountings, attitudes
-from accelstudy.design.task import Task, position_rows
+from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme
@@ -100,14 +101,15 @@ class Proposal:
     def nameable(self, directions: Array) -> dict[str, tuple[float, str]]:
         """Size from which each parameter of two rivals can be told from the other effect, SI."""
         criterion, task = self.request.chosen, self.request.task
-        if not isinstance(criterion, Rivals):
+        if not self.request.discriminate:
             return {}
-        root = np.sqrt(noncentrality(1) / criterion.left(task.normal(directions)))
-        places = np.concatenate([np.flatnonzero(criterion.first), np.flatnonzero(criterion.second)])
+        assert isinstance(criterion, MeanSquare)
+        size = np.sqrt(noncentrality(1) * criterion.squares(task.normal(directions)))
+        places = np.concatenate([task.places(effect) for effect in task.neglected])
         units = {p.name: p.unit for p in task.extended.parameters}
         return {
-            task.names[i]: (float(size / task.scale[i]), units[task.names[i]])
-            for i, size in zip(places, root, strict=True)
+            task.names[i]: (float(one / task.scale[i]), units[task.names[i]])
+            for i, one in zip(places, size, strict=True)
         }
 
     def made(self) -> Mapping[str, Any]:

@@ -12,22 +12,9 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
-from accelstudy.design.criteria import CRITERIA, ROBUST, Criterion, get_criterion, rivals
+from accelstudy.design.criteria import CRITERIA, DISCRIMINATE, ROBUST, Criterion, get_criterion
 from accelstudy.design.search import STARTS, Design, optimal_design
-from accelstudy.design.spaces import (
-    Constraint,
-    Constraints,
-    LeastAngle,
-    Mountings,
-    OffPole,
-    PitchRange,
-    RollRange,
-    Space,
-    Sphere,
-    by_eye,
-    cube,
-    listed_in,
-)
+from accelstudy.design.spaces import Constraints, Mountings, Space, Sphere, by_eye, cube, listed_in
 from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -144,9 +131,8 @@ class Request:
     @cached_property
     def chosen(self) -> Criterion:
         """The criterion."""
-        if self.discriminate:
-            return rivals(self.task, *self._rivals)
-        return get_criterion(ROBUST if self.neglect else self.criterion, self.task)
+        own = DISCRIMINATE if self.discriminate else ROBUST if self.neglect else self.criterion
+        return get_criterion(own, self.task)
 
     @cached_property
     def space(self) -> Space:
@@ -169,24 +155,15 @@ class Request:
     @cached_property
     def constraints(self) -> Constraints:
         """The constraints on the positions."""
-        single: list[Constraint] = []
-        for name, ends, kind in (("roll", self.roll, RollRange), ("pitch", self.pitch, PitchRange)):
-            if ends is not None:
-                if not ends[0] < ends[1]:
-                    raise InputError(f"{name}: the first angle must be less than the second")
-                single.append(kind(*ends))
-        if self.pole_distance is not None:
-            single.append(OffPole(self.pole_distance))
-        pair = None if self.least_angle is None else LeastAngle(self.least_angle)
-        return Constraints(tuple(single), pair)
+        return Constraints(self.roll, self.pitch, self.pole_distance, self.least_angle)
 
-    def find(self, bounded: bool = True, rough: bool = False) -> Design:
+    def find(self, bounded: bool = True, refined: bool = True) -> Design:
         """Find the positions.
 
         Parameters
         ----------
         bounded : bool, whether a bound of how good they can be is wanted
-        rough : bool, whether positions near the best ones are enough
+        refined : bool, as in `optimal_design`
 
         Raises
         ------
@@ -202,7 +179,7 @@ class Request:
             self.seed,
             self.starts,
             bounded,
-            rough,
+            refined,
         )
 
 

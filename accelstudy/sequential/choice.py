@@ -26,16 +26,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON
-from accelstudy.design.spaces import (
-    Constraint,
-    Constraints,
-    OffPole,
-    PitchRange,
-    RollRange,
-    by_eye,
-    cube,
-    listed_in,
-)
+from accelstudy.design.spaces import Constraints, by_eye, cube, listed_in
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.estimate import Estimate, has_full_rank, to_unit_diagonal
@@ -85,14 +76,8 @@ def candidates(
         directions = listed_in(Path(name)).directions(0)
     else:
         raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
-    limits: list[Constraint] = []
-    if pole_distance is not None:
-        limits.append(OffPole(pole_distance))
-    if max_roll is not None:
-        limits.append(RollRange(-max_roll, max_roll))
-    if max_pitch is not None:
-        limits.append(PitchRange(-max_pitch, max_pitch))
-    left = Constraints(tuple(limits)).keep(directions)
+    roll, pitch = (None if most is None else (-most, most) for most in (max_roll, max_pitch))
+    left = directions[Constraints(roll, pitch, pole_distance).allow(directions)]
     if not len(left):
         raise InputError(f"attitudes: none of {name} is within the limits that are given")
     # Simple attitudes first: with vertical axes, then with horizontal ones.

@@ -30,7 +30,7 @@ from accelstudy.basics.units import (
     to_display,
 )
 from accelstudy.design.estimability import estimability
-from accelstudy.design.task import position_rows
+from accelstudy.design.information import position_rows
 from accelstudy.drawing.style import FULL, INK, approach_colour, approach_handles, new_figure
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import tilt_error

@@ -11,7 +11,8 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
-from accelstudy.design.task import Task, position_rows
+from accelstudy.design.information import position_rows
+from accelstudy.design.task import Task
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.proposal.proposal import _drift_shown, field_order
 from accelstudy.proposal.request import Request
@@ -218,7 +219,7 @@ def test_two_effects_are_told_apart_by_what_neither_can_imitate():
         for column in rows[:, own].T:
             missed = column - rest @ np.linalg.lstsq(rest, column, rcond=None)[0]
             left.append(missed @ missed)
-    np.testing.assert_allclose(criterion.left(task.normal(directions)), left, rtol=1e-6)
+    np.testing.assert_allclose(1 / criterion.squares(task.normal(directions)), left, rtol=1e-6)
 
 
 def test_the_order_is_a_round_trip_of_small_turns():

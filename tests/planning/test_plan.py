@@ -27,7 +27,7 @@ from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
-from accelstudy.planning.candidates import NINE, candidates
+from accelstudy.planning.candidates import NINE, candidates, names_of
 from accelstudy.planning.optimised import Sought
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, needs, spoilers
@@ -47,6 +47,7 @@ from accelstudy.simulation.sessions import Noise
 from accelstudy.study.config import parse_study, read_study
 
 MODEL = get_model(NINE)
+MODELLED = names_of(MODEL)
 MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 SIZES = (9, 12, 20, 30, 40, 80, 120)
@@ -97,8 +98,8 @@ def asked(sheet=None, **options):
 )
 def test_the_numbers_of_the_readme_come_from_linear_theory(approach, rms, q95):
     theory = theory_of(50 * GON)
-    rows = theory.rows(MCLAREN.directions, approach, Noise())
-    expected = theory.expected(rows, MODEL, {})
+    told = theory.information(MCLAREN.directions, approach, Noise())
+    expected = theory.expected(told, MODELLED, {})
     np.testing.assert_allclose(expected.rms / MGON, rms, atol=0.06)
     np.testing.assert_allclose(expected.quantile(0.95) / MGON, q95, atol=0.1)
 
@@ -107,11 +108,11 @@ def test_the_numbers_of_the_readme_come_from_linear_theory(approach, rms, q95):
 def test_columns_of_one_model_are_the_designs_of_all(model):
     model, robot = get_model(model), get_approach("robot")
     theory = theory_of(30 * GON)
-    rows = theory.rows(MCLAREN.directions, "robot", Noise())
+    told = theory.information(MCLAREN.directions, "robot", Noise())
     zeros = np.zeros(model.n_parameters)
     error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
     own = estimability(MCLAREN, model, robot)
-    expected = theory.expected(rows, model, {})
+    expected = theory.expected(told, names_of(model), {})
     np.testing.assert_allclose(expected.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
     assert expected.redundancy == own.redundancy
 
@@ -119,9 +120,9 @@ def test_columns_of_one_model_are_the_designs_of_all(model):
 def test_at_level_it_is_the_closed_form_of_bias_and_axes():
     sigma = gravity_sigma(MCLAREN.directions, 0.002)
     theory = theory_of(1e-4)
-    rows = theory.rows(MCLAREN.directions, "gravity", Noise())
+    told = theory.information(MCLAREN.directions, "gravity", Noise())
     level = math.hypot(sigma["bias"] / STANDARD_GRAVITY, sigma["nonorthogonality"])
-    roll, pitch = theory.expected(rows, MODEL, {}).rms
+    roll, pitch = theory.expected(told, MODELLED, {}).rms
     assert roll == pytest.approx(level, rel=1e-3)
     assert pitch == pytest.approx(level, rel=1e-3)
 
@@ -129,8 +130,8 @@ def test_at_level_it_is_the_closed_form_of_bias_and_axes():
 def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
     # Ten sensors of quadratic scales drawn with the size that is expected, without noise.
     size, theory = 300e-6, theory_of(30 * GON)
-    rows = theory.rows(MCLAREN.directions, "gravity", Noise(sigma_force=1e-9))
-    expected = theory.expected(rows, MODEL, {"quadratic_scale": size})
+    told = theory.information(MCLAREN.directions, "gravity", Noise(sigma_force=1e-9))
+    expected = theory.expected(told, MODELLED, {"quadratic_scale": size})
     draws = size * np.random.default_rng(3).standard_normal((10, 3))
     whitened = np.cov(draws.T, bias=True) + np.outer(draws.mean(0), draws.mean(0))
     draws = draws @ np.linalg.inv(np.linalg.cholesky(whitened)).T * size  # of just that size
@@ -156,11 +157,11 @@ def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE):
 
 def test_the_quantile_is_that_of_draws():
     theory = theory_of(30 * GON)
-    rows = theory.rows(MCLAREN.directions, "robot", Noise())
-    expected = theory.expected(rows, MODEL, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6})
+    told = theory.information(MCLAREN.directions, "robot", Noise())
+    expected = theory.expected(told, MODELLED, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6})
     rng = np.random.default_rng(1)
-    draws = rng.standard_normal((20_000, expected.scatter.shape[1])) @ expected.scatter.T
-    squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.quadratic], 1)
+    draws = rng.standard_normal((20_000, len(expected.causes)))
+    squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.form], 1)
     np.testing.assert_allclose(np.sqrt(squares.mean(axis=0)), expected.rms, rtol=0.02)
     for share in (0.5, 0.9, 0.95, 0.99):
         drawn = np.sqrt(np.quantile(squares, share, axis=0))
@@ -173,8 +174,8 @@ def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
     theory = theory_of(30 * GON)
     turned = get_model(f"{NINE}-crossaxis")
     for approach, seen in (("gravity", False), ("robot", True)):
-        rows = theory.rows(MCLAREN.directions, approach, Noise())
-        assert (theory.expected(rows, turned, {}) is not None) is seen
+        told = theory.information(MCLAREN.directions, approach, Noise())
+        assert (theory.expected(told, names_of(turned), {}) is not None) is seen
 
 
 # --- candidates and their ranking ----------------------------------------------------------------
@@ -272,10 +273,10 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
     assert math.isinf(sizes["gravity_error"].size)
     assert sizes["base_tilt"].size < 20 * MGON
     theory = theory_of(question.tilt_range)
-    rows = theory.rows(MCLAREN.directions, "robot", Noise(0.002, question.sigma_angle))
+    told = theory.information(MCLAREN.directions, "robot", Noise(0.002, question.sigma_angle))
     for name, spoiler in sizes.items():
         if math.isfinite(spoiler.size):
-            alone = theory.expected(rows, MODEL, {name: spoiler.size}).neglected[name]
+            alone = theory.expected(told, MODELLED, {name: spoiler.size}).squares[name]
             assert np.sqrt(alone.max()) == pytest.approx(question.target, rel=1e-9)
 
 

@@ -14,7 +14,7 @@ from accelstudy.data_sheets import of_sigma
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.answer import _beside
-from accelstudy.planning.candidates import rows_of
+from accelstudy.planning.candidates import information_of, names_of
 from accelstudy.planning.question import Equipment, Question, planned_reference
 from accelstudy.planning.theory import theory_of
 from accelstudy.schemes import get_scheme
@@ -37,8 +37,8 @@ def test_what_is_left_is_what_simulated_sessions_leave(beside):
     scheme, reference = get_scheme("fibonacci-15"), beside.reference
     question = Question(10 * MGON, RANGE, of_sigma(SIGMA), (beside,))
     theory = theory_of(RANGE)
-    rows = rows_of(question, beside, theory, scheme.directions, SIGMA)
-    expected = theory.expected(rows, TWELVE, {}).rms
+    told = information_of(question, beside, theory, scheme.directions, SIGMA)
+    expected = theory.expected(told, names_of(TWELVE), {}).rms
     forces, used = -G * scheme.directions, cap_forces(RANGE, 64)
     root = np.linalg.cholesky(np.array(reference.covariance))
     squares = []
@@ -57,7 +57,8 @@ def test_what_is_left_is_what_simulated_sessions_leave(beside):
     np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected, rtol=0.1)
     # With a robot of the same noise it would be clearly less.
     noise = Noise(SIGMA, reference.sigma_mps2 / G)
-    robot = theory.expected(theory.rows(scheme.directions, "robot", noise), TWELVE, {}).rms
+    told = theory.information(scheme.directions, "robot", noise)
+    robot = theory.expected(told, names_of(TWELVE), {}).rms
     assert np.all(robot < 0.85 * expected)
 
 

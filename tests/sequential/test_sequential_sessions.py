@@ -7,7 +7,7 @@ from scipy import stats
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.task import position_rows
+from accelstudy.design.information import position_rows
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.choice import (

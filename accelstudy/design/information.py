@@ -1,0 +1,224 @@
+"""What positions tell of parameters, by linear theory.
+
+Each position has rows of the design matrix at unit weight. Those of several positions, of several
+sessions and of what is known before stand below each other. Where a model estimates the parameters
+of the columns A, and neglects others, of the columns N and of values p, the noise n shifts the
+estimates by (AᵀA)⁻¹Aᵀ n, the neglected parameters shift them by (AᵀA)⁻¹Aᵀ N p, and are missing
+themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.adjustment import whitened_jacobian
+from accelstudy.adjustment.equations import equations_of
+from accelstudy.adjustment.gauss_helmert import whitened_design
+from accelstudy.adjustment.observations import AngleErrors
+from accelstudy.approaches import Approach
+from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.angles import angles_of
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.sessions import Noise, session
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-7
+"""Singular values of the scaled design matrix below this fraction of the largest count as zero."""
+INVOLVED, IN_NOISE = 1e-3, 0.1
+"""Share of a parameter in a combination from which on that combination hides it: of one that does
+not show at all, and of one that noise shows, and blurs."""
+ROUNDING = 1e-14
+"""Columns of the design matrix shorter than this fraction of the longest count as zero."""
+
+
+@dataclass(frozen=True)
+class Information:
+    """What conditions tell of u parameters.
+
+    Attributes
+    ----------
+    rows : (m, u) array, rows of the design matrix at unit weight, or any with the same RᵀR
+    conditions : int, how many there are
+    """
+
+    rows: Array
+    conditions: int
+
+    @classmethod
+    def of(cls, *rows: Array) -> Information:
+        """Information of rows (..., u), condensed to at most u of them."""
+        every = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
+        return cls(_triangle(every) if len(every) > every.shape[1] else every, len(every))
+
+    def beside(self, unknown: int) -> Information:
+        """Information on the other parameters if the first ones are unknown, too."""
+        return Information(_triangle(self.rows)[unknown:, unknown:], self.conditions - unknown)
+
+    def undetermined(self, estimated: Sequence[int] | NDArray[np.int_]) -> NDArray[np.bool_]:
+        """Which of the estimated parameters are not determined."""
+        return rank_of(self.rows[:, estimated])[2]
+
+    def errors(
+        self,
+        estimated: Sequence[int] | NDArray[np.int_],
+        neglected: Sequence[int] | NDArray[np.int_] = (),
+        sizes: ArrayLike = (),
+    ) -> Array | None:
+        """Errors of all parameters as a linear function of standard normal variables.
+
+        Parameters
+        ----------
+        estimated, neglected : columns of parameters; all others are known
+        sizes : (q,) array, SI, standard deviations of the neglected parameters
+
+        Returns
+        -------
+        (u, k + q) array, by k variables of the noise, as many as there are estimated parameters,
+        and by the q neglected parameters; its product with its transpose is the covariance matrix.
+        None if the estimated parameters are not determined.
+        """
+        estimated, neglected = list(estimated), list(neglected)
+        design = self.rows[:, estimated]
+        if len(design) < len(estimated):
+            return None
+        size = _column_size(design)
+        left, values, right = np.linalg.svd(design / size, full_matrices=False)
+        if values[-1] <= SINGULAR * values[0]:
+            return None
+        root = right.T / values / size[:, None]
+        errors = np.zeros((self.rows.shape[1], len(estimated) + len(neglected)))
+        errors[estimated] = root @ np.hstack(
+            [np.eye(len(estimated)), left.T @ self.rows[:, neglected]]
+        )
+        errors[neglected, len(estimated) + np.arange(len(neglected))] = -1.0
+        errors[:, len(estimated) :] *= np.asarray(sizes)
+        return errors
+
+
+def _triangle(rows: Array) -> Array:
+    """R of a QR decomposition."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def _column_size(a: Array) -> Array:
+    """Lengths of columns; of one of rounding errors, which must stay short, that of the longest."""
+    length = np.linalg.norm(a, axis=0)
+    longest = length.max() or 1.0
+    return np.where(length > ROUNDING * longest, length, longest)
+
+
+def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[np.bool_]]:
+    """Rank and condition of a design matrix, and which columns its null space involves.
+
+    Parameters
+    ----------
+    a : (m, u) array, A
+    least : (k, u) array, D, optional
+        A combination w of columns counts only where |A w| > |D w|. These are generalised singular
+        values, which do not depend on the units of the parameters.
+    """
+    u = a.shape[1]
+    least = np.zeros((0, u)) if least is None else least
+    if not (np.isfinite(a).all() and np.isfinite(least).all()):
+        return 0, np.inf, np.ones(u, dtype=bool)
+    unit = 1 / _column_size(a)
+    # R has the same null space, and saves a matrix of all conditions by all conditions.
+    triangle = _triangle(a * unit) if len(a) > u else a * unit
+    values = np.linalg.svd(triangle, compute_uv=False)
+    floor = np.concatenate([least * unit, SINGULAR * (values[0] or 1.0) * np.eye(u)])
+    back = np.linalg.inv(_triangle(floor))
+    # The whole null space is wanted, also of a matrix with fewer rows than columns.
+    _, ratios, vt = np.linalg.svd(triangle @ back, full_matrices=True)
+    rank = int(np.count_nonzero(ratios > 1))
+    condition = float(values[0] / values[-1]) if rank == u else np.inf
+    null, _ = np.linalg.qr(back @ vt[rank:].T)
+    share = IN_NOISE if len(least) else INVOLVED
+    return rank, condition, np.linalg.norm(null, axis=1) > share
+
+
+def position_rows(
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise,
+    directions: ArrayLike,
+    parameters: Array | None = None,
+    gravity: float = STANDARD_GRAVITY,
+    hold: HoldConditions | None = None,
+    errors: AngleErrors | None = None,
+) -> Array:
+    """Rows of the design matrix that each position contributes, at unit weight.
+
+    The normal matrix of any choice of positions is the sum of RᵀR over their rows R. Where
+    effects depend on the position before, the order of the directions is that of the session.
+
+    Parameters
+    ----------
+    model : SensorModel
+    approach : Approach
+    noise : Noise
+        With `sigma_gravity` > 0 gravity is the last parameter. Its observation belongs to no
+        position, so its weight 1/σ² is not in the rows.
+    directions : (k, 3) array of unit vectors, gravity in the body frame
+    parameters : (u,) array, SI, optional; the ideal sensor by default
+    gravity : float, m/s²
+    hold : HoldConditions, optional
+        What else is known of the k positions.
+    errors : function of angles (k, 2), optional
+        `sigma_angle` and `common` of `Observations`; errors that all angles share are parameters.
+
+    Returns
+    -------
+    (k, c, u') array, with the c conditions of the approach
+
+    Raises
+    ------
+    InputError
+        If the model needs what `hold` does not tell.
+    """
+    directions = np.asarray(directions, dtype=float)
+    if parameters is None and errors is None and not model.hold_columns:
+        return _ideal_rows(model, approach, noise, directions, gravity)
+    at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
+    ideal = session(model, at, directions, gravity, hold)
+    observed = ideal.observations(noise)
+    if errors is not None:
+        sigma_angle, common = errors(ideal.angles)
+        observed = replace(observed, sigma_angle=sigma_angle, common=common)
+    rows = whitened_jacobian(model, approach, observed, at)
+    k, c = len(directions), approach.n_conditions
+    return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))
+
+
+def _ideal_rows(
+    model: SensorModel, approach: Approach, noise: Noise, directions: Array, gravity: float
+) -> Array:
+    """Rows of the ideal sensor: its output is the force, so that nothing is iterated.
+
+    A search for positions takes most of its time for them.
+    """
+    force = -gravity * directions
+    observed, variance = force, np.full(force.shape, noise.sigma_force**2)
+    if approach.uses_angles:
+        angles = angles_of(force)
+        observed = np.concatenate([force, angles], axis=1)
+        of_angles = np.full(angles.shape, noise.sigma_angle**2)
+        variance = np.concatenate([variance, of_angles], axis=1)
+    equations = equations_of(model.trace, approach, noise.sigma_gravity > 0)
+    x = np.zeros((equations.n_parameters, 1))
+    if equations.estimates_gravity:
+        x[-1] = gravity + noise.gravity_error
+    conditions = equations.at(model.settings, gravity + noise.gravity_error, None)
+    at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
+    rows = whitened_design(at, variance.T)[:, :, 0]
+    return np.ascontiguousarray(rows.transpose(2, 0, 1))
+
+
+def information(rows: Array) -> Array:
+    """Normal matrices RᵀR, (k, u, u), of the rows (k, c, u) of k positions."""
+    return np.einsum("kcu,kcw->kuw", rows, rows)
