@@ -67,7 +67,7 @@ class Expected:
     @cached_property
     def squares(self) -> dict[str, Array]:
         """Mean square of the errors of roll and of pitch, (2,), rad², by each cause."""
-        each = np.diagonal(self.form, axis1=1, axis2=2)
+        each = np.maximum(np.diagonal(self.form, axis1=1, axis2=2), 0.0)  # rounding of zero
         causes = np.array(self.causes)
         return {c: each[:, causes == c].sum(axis=1) for c in dict.fromkeys(self.causes)}
 

@@ -65,67 +65,44 @@ class NoiseTaken:
 
 
 @dataclass(frozen=True)
-class LastPosition:
-    """The last position, tested by all others as in the report of a calibration.
-
-    Attributes
-    ----------
-    index : int, in the session
-    p_value : float, adjusted for the number of positions; NaN where the others cannot test it
-    conflict : bool, whether it contradicts the others
-    """
-
-    index: int
-    p_value: float
-    conflict: bool
-
-
-@dataclass(frozen=True)
-class NextPosition:
-    """The position to take next.
-
-    Attributes
-    ----------
-    direction : (3,) array, of gravity in the body frame
-    repeats : int or None, number of the position that it repeats
-    """
-
-    direction: Array
-    repeats: int | None
-
-
-@dataclass(frozen=True)
 class Advice:
     """The whole advice.
 
     Attributes
     ----------
     positions : (n,) int array, numbers of the positions, without those that the campaign leaves out
-    last : LastPosition or None
+    p_last : float, of the last position by all others, adjusted for the number of positions, as in
+        the report of a calibration; NaN where they cannot test it
     suspects : tuple of int, numbers of positions that contradict the others; they are used
     state : str, of a calibration with these positions; empty if there is none yet
     undetermined : tuple of str, parameters that the positions do not determine yet
     vague : tuple of str, parameters known less well than the typical size in a cheap sensor
     noise : NoiseTaken
     rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
-    next : NextPosition
+    next : (3,) array, direction of gravity in the body frame in the position to take next
     to_go : int or None, positions still needed; None if unknown or too many
     foreseeable : bool, whether `to_go` can be known
     enough : bool, whether the promise is kept, by a calibration that is not rejected
     """
 
     positions: NDArray[np.int_]
-    last: LastPosition | None
+    p_last: float
     suspects: tuple[int, ...]
     state: str
     undetermined: tuple[str, ...]
     vague: tuple[str, ...]
     noise: NoiseTaken
     rms: Array | None
-    next: NextPosition
+    next: Array
     to_go: int | None
     foreseeable: bool
     enough: bool
+
+    @property
+    def repeats(self) -> int | None:
+        """Number of the last position, if it contradicts the others, so that it is taken again."""
+        last = int(self.positions[-1]) if len(self.positions) else None
+        return last if last in self.suspects else None
 
 
 def _check(
@@ -207,39 +184,33 @@ def advise(
         rms = chooser.rms(so_far.cofactors, so_far.omega, so_far.redundancy)
     enough = bool(promise.reached(rms)[0]) and not wrong
 
-    last, repeats = None, None
+    last = None
     if campaign.n_positions:
         last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
-    latest = _last_position(campaign, assessed)
-    if latest is not None and latest.conflict:
-        repeats = int(campaign.positions[latest.index])
     # The conditions of later positions are unknown.
     to_go, varying = None, bool(CONDITIONS & {*model.hold_columns})
     foreseeable = (trusted or so_far.redundancy >= LEAST_REDUNDANCY) and not varying
     if foreseeable and not enough and not wrong:
         variance = 1.0 if trusted else float(so_far.omega[0]) / so_far.redundancy
         to_go = chooser.positions_to_go(so_far, variance, rms[0], last)
-    if repeats is None or last is None:
-        before = None if last is None else last[None]
-        choice = chooser.choose(so_far.information, so_far.solved, rms, before)[0]
-        best = chooser.directions[choice]
-    else:
-        best = last
+    before = None if last is None else last[None]
+    choice = chooser.choose(so_far.information, so_far.solved, rms, before)[0]
     suspects = () if assessed is None else assessed.suspects
-    return Advice(
+    advice = Advice(
         positions=campaign.positions,
-        last=latest,
+        p_last=np.nan if assessed is None else float(assessed.p_adjusted[-1]),
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         state="" if assessed is None else assessed.state,
         undetermined=() if solved else _undetermined(campaign, model, approach, so_far),
         vague=_vague(model, so_far) if solved else (),
         noise=_noise_taken(so_far, campaign, trusted, noise.sigma_force),
         rms=rms[0] if np.isfinite(rms).all() else None,
-        next=NextPosition(best, repeats),
+        next=chooser.directions[choice],
         to_go=to_go,
         foreseeable=foreseeable,
         enough=enough,
     )
+    return advice if last is None or advice.repeats is None else replace(advice, next=last)
 
 
 def _assessed(campaign: Campaign, model: SensorModel, approach: Approach) -> Assessment | None:
@@ -273,17 +244,6 @@ def _vague(model: SensorModel, so_far: Estimate) -> tuple[str, ...]:
     sigma = np.sqrt(np.diag(so_far.cofactors[0]))[: len(names)]
     sizes = typical_sizes(model, len(names))
     return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
-
-
-def _last_position(campaign: Campaign, assessed: Assessment | None) -> LastPosition | None:
-    """Say of the last position what the assessment says of it."""
-    last = campaign.n_positions - 1
-    if last < 0:
-        return None
-    if assessed is None:
-        return LastPosition(last, np.nan, conflict=False)
-    conflict = any(suspect.position == last for suspect in assessed.suspects)
-    return LastPosition(last, float(assessed.p_adjusted[last]), conflict)
 
 
 def _noise_taken(so_far: Estimate, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:

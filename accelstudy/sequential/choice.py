@@ -29,7 +29,7 @@ from accelstudy.basics.units import GON
 from accelstudy.design.spaces import Constraints, by_eye, cube, listed_in
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.estimate import Estimate, has_full_rank, to_unit_diagonal
+from accelstudy.sequential.estimate import Estimate, has_full_rank
 from accelstudy.sequential.promise import Promise, rms_of
 
 Array = NDArray[np.float64]
@@ -99,65 +99,31 @@ def typical_sizes(model: SensorModel, unknowns: int) -> Array:
     return np.array([*sizes, *[np.inf] * (unknowns - len(sizes))])
 
 
-def gain_of_parameters(information: Array, sizes: Array, rows: Array) -> Array:
-    """Growth of the log-determinant of the information by each candidate.
+def gains(cofactors: Array, rows: Array, weight: Array | None = None) -> Array:
+    """Gain of each candidate, for leveling or, without a weight, for the parameters.
 
     Parameters
     ----------
-    information : (R, u, u) array, Q⁻¹; it may be singular
-    sizes : (u,) array, of the parameters in a cheap sensor
-    rows : (k, c, u) array, of k candidates
-
-    Returns
-    -------
-    (R, k) array
-    """
-    spread = _spread(_root_of_inverse(information + np.diag(sizes**-2.0)), rows)
-    return np.asarray(np.linalg.slogdet(_with_noise(spread))[1])
-
-
-def gain_of_leveling(information: Array, weight: Array, rows: Array) -> Array:
-    """Fall of the mean variance of roll and pitch by each candidate, at unit weight.
-
-    Parameters
-    ----------
-    information : (R, u', u') array, Q⁻¹, of full rank
+    cofactors : (R, u', u') array, Q
+    rows : (k, c, u') array, A of k candidates
     weight : (R, u, u) array, W; without gravity, even where that is estimated
-    rows : (k, c, u) array, of k candidates
 
     Returns
     -------
-    (R, k) array, rad²
+    (R, k) array, rad², at unit weight, or growth of a logarithm
     """
-    root = _root_of_inverse(information)
-    spread = _spread(root, rows)
-    parameters = root[:, : weight.shape[-1]]  # without gravity
-    weighted = np.swapaxes(parameters, 1, 2) @ weight @ parameters
-    part = spread @ weighted[:, None] @ np.swapaxes(spread, -1, -2)
-    return np.trace(np.linalg.solve(_with_noise(spread), part), axis1=-2, axis2=-1)
+    spread = rows @ cofactors[:, None]
+    with_noise = np.eye(rows.shape[1]) + spread @ np.swapaxes(rows, 1, 2)
+    if weight is None:
+        return np.asarray(np.linalg.slogdet(with_noise)[1])
+    spread = spread[..., : weight.shape[-1]]
+    part = spread @ weight[:, None] @ np.swapaxes(spread, -1, -2)
+    return np.trace(np.linalg.solve(with_noise, part), axis1=-2, axis2=-1)
 
 
 def best(gains: Array) -> NDArray[np.int_]:
     """First candidate of each session (R,) whose gain, of (R, k), is as good as the best."""
     return np.asarray(np.argmax(gains >= ALIKE * gains.max(axis=1, keepdims=True), axis=1))
-
-
-def _root_of_inverse(information: Array) -> Array:
-    """L⁻ᵀ with Q⁻¹ = L Lᵀ, (R, u, u): Q is its product with its transpose."""
-    scaled, size = to_unit_diagonal(information)
-    root: Array = np.swapaxes(np.linalg.inv(np.linalg.cholesky(scaled)), 1, 2)
-    return root / size[:, :, None]
-
-
-def _spread(root: Array, rows: Array) -> Array:
-    """A times the root of Q, (R, k, c, u): A Q Aᵀ is its product with its transpose."""
-    k, c, u = rows.shape
-    return (rows.reshape(k * c, u) @ root).reshape(len(root), k, c, u)
-
-
-def _with_noise(spread: Array) -> Array:
-    """I + A Q Aᵀ, (R, k, c, c)."""
-    return np.eye(spread.shape[2]) + spread @ np.swapaxes(spread, -1, -2)
 
 
 @dataclass(frozen=True)
@@ -200,15 +166,15 @@ class Chooser:
         rms : (R, 2) array, so far; ignored where they are not
         last : (R, 3) array, directions of the last positions; None before the first
         """
-        gains = np.empty((len(solved), len(self.directions)))
-        if not solved.all():
-            gains[~solved] = gain_of_parameters(information[~solved], self.sizes, self.rows)
-        if solved.any():
-            weight = self.promise.weight(self.error, rms[solved])
-            gains[solved] = gain_of_leveling(information[solved], weight, self.rows)
+        gained = np.empty((len(solved), len(self.directions)))
+        with_sizes = information[~solved] + np.diag(self.sizes**-2.0)
+        gained[~solved] = gains(np.asarray(np.linalg.inv(with_sizes)), self.rows)
+        weight = self.promise.weight(self.error, rms[solved])
+        cofactors = np.asarray(np.linalg.inv(information[solved]))
+        gained[solved] = gains(cofactors, self.rows, weight)
         if last is not None and len(self.directions) > 1:
-            gains = np.where(apart_from(self.directions, last), gains, 0.0)
-        return best(gains)
+            gained = np.where(apart_from(self.directions, last), gained, 0.0)
+        return best(gained)
 
     def positions_to_go(
         self, so_far: Estimate, variance: float, rms: Array, last: Array | None

@@ -159,16 +159,11 @@ def estimate(
     return Estimate(n, solved, parameters, information, omega, redundancy)
 
 
-def to_unit_diagonal(information: Array) -> tuple[Array, Array]:
-    """Scale matrices (R, u, u) to a diagonal of 1, or 0 where it was; roots of the diagonal."""
-    root = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    size = np.where(root > 0, root, 1.0)
-    return information / (size[:, :, None] * size[:, None, :]), size
-
-
 def has_full_rank(information: Array) -> NDArray[np.bool_]:
     """Whether information matrices (R, u, u) have full rank, as the adjustment judges it."""
-    scaled, _ = to_unit_diagonal(information)
+    root = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    size = np.where(root > 0, root, 1.0)
+    scaled = information / (size[:, :, None] * size[:, None, :])
     known: NDArray[np.bool_] = np.all(np.isfinite(scaled), axis=(1, 2))
     values = np.linalg.eigvalsh(np.where(known[:, None, None], scaled, 0.0))
     return np.asarray(values[:, 0] > PIVOT_TOLERANCE)

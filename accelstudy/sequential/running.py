@@ -40,14 +40,13 @@ class Running:
     unfinished: str
 
 
-def read_running(folder: str | Path, settled: str = "") -> Running:
+def read_running(folder: str | Path, settled: bool = False) -> Running:
     """Read a session so far.
 
     Parameters
     ----------
     folder : path
-    settled : str
-        A last line without an end that is taken all the same, because it has not changed lately.
+    settled : bool, whether a last line without an end is taken all the same
 
     Raises
     ------
@@ -70,9 +69,8 @@ def read_running(folder: str | Path, settled: str = "") -> Running:
         text = read_text(path)
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-    whole, unfinished = _split(text)
-    if unfinished and unfinished == settled:
-        whole, unfinished = text, ""
+    end = len(text) if settled else max(text.rfind("\n"), text.rfind("\r")) + 1
+    whole, unfinished = text[:end], text[end:]
     if not whole.strip():
         return Running(_without_positions(header), unfinished)
     columns = columns_of(whole, path)
@@ -92,17 +90,11 @@ def read_as_it_is(folder: str | Path) -> Running:
     if not running.unfinished:
         return running
     try:
-        whole = read_running(folder, running.unfinished).campaign
+        whole = read_running(folder, settled=True).campaign
     except InputError:  # it is half a line
         return running
     odd = f"{folder}: the last line of the table does not end; check that it is whole"
     return Running(replace(whole, warnings=(*whole.warnings, odd)), "")
-
-
-def _split(text: str) -> tuple[str, str]:
-    """Complete lines, and the text after them."""
-    end = max(text.rfind("\n"), text.rfind("\r")) + 1
-    return text[:end], text[end:]
 
 
 def _without_positions(header: Header) -> Campaign:
@@ -122,8 +114,8 @@ class Watch:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._seen: Running | None = None
-        self._files = self._whole = b""
+        self._files: bytes | None = None
+        self._whole, self._count = b"", -1
         self._rested, self._complaint = 0, ""
 
     def look(self) -> Iterator[Campaign]:
@@ -137,26 +129,24 @@ class Watch:
         """
         files = b"".join(path.read_bytes() for path in _files(self.folder))
         self._rested = self._rested + 1 if files == self._files else 0
-        self._files, before = files, self._seen
-        unfinished = "" if before is None else before.unfinished
-        if before is not None and self._rested and not (unfinished and self._rested >= SETTLED):
+        self._files, first_look = files, self._count < 0
+        if self._rested not in (0, SETTLED):
             return
         try:
-            now = read_running(self.folder, unfinished if self._rested else "")
+            now = read_running(self.folder, settled=self._rested > 0)
         except InputError as error:
-            if before is not None and str(error) == self._complaint:
+            if not first_look and str(error) == self._complaint:
                 return
             self._complaint = str(error)
             raise
-        whole = files.removesuffix(now.unfinished.encode()).strip()
-        self._complaint, self._seen = "", now
-        count, changed = now.campaign.n_positions, whole != self._whole
-        self._whole = whole
-        if before is not None and not (changed and (count or before.campaign.n_positions)):
-            return
-        first = count if before is None else min(before.campaign.n_positions + 1, count)
-        for n in range(first, count + 1):
-            yield _first(now.campaign, n)
+        whole, count = files.removesuffix(now.unfinished.encode()).strip(), now.campaign.n_positions
+        changed, before = whole != self._whole, self._count
+        self._whole, self._count, self._complaint = whole, count, ""
+        if first_look:
+            yield now.campaign
+        elif changed and (count or before):
+            for n in range(min(before + 1, count), count + 1):
+                yield _first(now.campaign, n)
 
 
 def _files(folder: Path) -> list[Path]:

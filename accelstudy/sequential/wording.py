@@ -39,7 +39,7 @@ def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promi
         promise,
         _by_effect(advice.undetermined, model),
         _by_effect(advice.vague, model),
-        attitude(advice.next.direction, FRD if campaign.log is None else campaign.log.axes),
+        attitude(advice.next, FRD if campaign.log is None else campaign.log.axes),
         LEAST_REDUNDANCY,
     )
 

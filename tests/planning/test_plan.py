@@ -160,7 +160,7 @@ def test_the_quantile_is_that_of_draws():
     told = theory.information(MCLAREN.directions, "robot", Noise())
     expected = theory.expected(told, MODELLED, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6})
     rng = np.random.default_rng(1)
-    draws = rng.standard_normal((20_000, len(expected.causes)))
+    draws = rng.standard_normal((200_000, len(expected.causes)))
     squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.form], 1)
     np.testing.assert_allclose(np.sqrt(squares.mean(axis=0)), expected.rms, rtol=0.02)
     for share in (0.5, 0.9, 0.95, 0.99):

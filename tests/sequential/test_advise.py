@@ -138,7 +138,7 @@ def test_the_next_position_is_worth_more_than_others(begun):
         return np.mean(error_of.rms_of_all(result.cofactors[0]) ** 2)
 
     variances = np.array([after(direction) for direction in directions])
-    chosen = np.flatnonzero((directions == advice.next.direction).all(axis=1))[0]
+    chosen = np.flatnonzero((directions == advice.next).all(axis=1))[0]
     whole = np.mean(error_of.rms_of_all(before.covariance) ** 2)
     assert whole - variances[chosen] > 0.98 * (whole - variances.min())
 

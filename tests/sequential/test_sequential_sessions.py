@@ -14,8 +14,7 @@ from accelstudy.sequential.choice import (
     apart_from,
     best,
     candidates,
-    gain_of_leveling,
-    gain_of_parameters,
+    gains,
     typical_sizes,
 )
 from accelstudy.sequential.promise import (
@@ -47,10 +46,10 @@ def test_the_gain_is_what_the_position_brings(approach):
     weight = promise.weight(error, np.full((1, 2), 20 * MGON))
     so_far = measured.T @ measured
     before = np.linalg.inv(so_far)
-    by_leveling = gain_of_leveling(so_far[None], weight, rows)[0]
+    by_leveling = gains(before[None], rows, weight)[0]
     sizes = typical_sizes(NINE, 9)
     information = so_far + np.diag(sizes**-2)
-    by_parameters = gain_of_parameters(so_far[None], sizes, rows)[0]
+    by_parameters = gains(np.linalg.inv(information)[None], rows)[0]
     for row, leveling, parameters in zip(rows, by_leveling, by_parameters, strict=True):
         after = np.linalg.inv(so_far + row.T @ row)
         fall = np.mean(error.rms_of_all(before) ** 2 - error.rms_of_all(after) ** 2)
@@ -83,8 +82,8 @@ def test_of_positions_that_are_as_good_the_first_is_chosen():
 def test_nine_positions_by_determinant_determine_nine_parameters():
     rows, so_far, chosen = rows_of("gravity", "faces-edges-corners-26"), np.zeros((1, 9, 9)), []
     for _ in range(9):
-        gain = gain_of_parameters(so_far, typical_sizes(NINE, 9), rows)
-        chosen.append(int(best(gain)[0]))
+        information = so_far + np.diag(typical_sizes(NINE, 9) ** -2.0)
+        chosen.append(int(best(gains(np.linalg.inv(information), rows))[0]))
         so_far = so_far + rows[chosen[-1]].T @ rows[chosen[-1]]
     assert len({*chosen}) == 9
     design = rows[chosen].reshape(-1, 9)
