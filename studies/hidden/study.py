@@ -12,7 +12,6 @@ from itertools import combinations, product
 from math import ceil
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from accelstudy.basics.bounds import Range
@@ -194,11 +193,9 @@ class HiddenConfig(Study):
         return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
 
     def job(self, name: str) -> Job:
-        """A job by its name: a part of all campaigns, as large as those of the others."""
-        campaigns, jobs = self.campaigns(), self.jobs
-        ends = np.linspace(0, len(campaigns), len(jobs) + 1).round().astype(int).tolist()
-        i = jobs.index(name)
-        return self.simulated(campaigns[ends[i] : ends[i + 1]])
+        """A job by its name: a part of all campaigns."""
+        start = JOB * int(name)
+        return self.simulated(self.campaigns()[start : start + JOB])
 
     def simulated(self, campaigns: Iterable[Numbered]) -> Job:
         """Campaigns by the physics of the study."""
