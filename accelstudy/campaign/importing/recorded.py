@@ -34,8 +34,6 @@ _IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 _BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
 _SENSOR = "sensor_accel"
 _LONGEST_GAP = 3600.0  # s
-_FIELDS = 10_000
-"""Numbers of the largest message of a flight log; PX4 has some hundred."""
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
