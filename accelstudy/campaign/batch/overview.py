@@ -113,7 +113,7 @@ def summarise_campaigns(
     table = pd.DataFrame({column: flat.get(key) for column, (_, key) in _CAMPAIGNS.items()})
     table = table.astype(CAMPAIGN_COLUMNS)
     table["sigma0"] = table["sigma_posteriori_mps2"] / table["sigma_priori_mps2"]
-    angles = [column for column in table if column.endswith("_rad")]
+    angles = [column for column in CAMPAIGN_COLUMNS if column.endswith("_rad")]
     table[angles] *= MGON
     write_table(campaigns, table, provenance)
     long = pd.DataFrame(values, columns=list(PARAMETER_COLUMNS)).astype(PARAMETER_COLUMNS)

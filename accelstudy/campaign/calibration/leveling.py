@@ -182,7 +182,11 @@ def level(
     leveled : Leveled
     """
     readings = readings_of(log, calibration, given, start or 0.0)
-    _check_forces(calibration, readings)
+    read, usable = readings.log, readings.forces[np.isfinite(readings.forces).all(axis=1)]
+    if not len(usable):
+        why = _reason(calibration, readings, 0)
+        raise InputError(f"{read.path}: no row has three numbers; the first: {why}")
+    check_size(f"{read.path}", usable, calibration.gravity, read.layout.unit, read.conversion)
     if sigma is not None:
         bounds.SIGMA_READING.check_key("`sigma`", sigma)
     noise = noise_of_reading(calibration) if sigma is None else sigma
@@ -279,7 +283,8 @@ def _leveled(
         corrected = calibration.correct(forces, hold)
         angles, sigmas = calibration.level(forces, noise, hold)
     lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
-    lost |= clipped(calibration, forces).any(axis=1)
+    full = calibration.content.get("range_mps2") or np.inf
+    lost |= (np.abs(forces) >= CLIPPED * full).any(axis=1)
     corrected[lost] = np.nan
     shown = frame.from_frd(corrected)
     added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
@@ -302,23 +307,6 @@ def _with(table: pa.Table, added: Mapping[str, pa.ChunkedArray]) -> pa.Table:
         else:
             table = table.append_column(name, column)
     return table
-
-
-def clipped(calibration: SensorCalibration, forces: Array) -> NDArray[np.bool_]:
-    """Which readings (k, 3), m/s², are at the end of the sensor's range."""
-    full = calibration.content.get("range_mps2")
-    return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
-
-
-def _check_forces(calibration: SensorCalibration, readings: Readings) -> None:
-    """Raise `InputError` if no row is usable, or most readings are far from gravity."""
-    log, forces = readings.log, readings.forces
-    forces = forces[np.isfinite(forces).all(axis=1)]
-    if not len(forces):
-        why = _reason(calibration, readings, 0)
-        raise InputError(f"{log.path}: no row has three numbers; the first: {why}")
-    layout, gravity = log.layout, calibration.gravity
-    check_size(f"{log.path}", forces, gravity, layout.unit, log.conversion)
 
 
 def _of_calibration(calibration: SensorCalibration, readings: Readings) -> Iterator[str]:
