@@ -8,11 +8,9 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import contextmanager
-from io import TextIOWrapper
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +33,7 @@ GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
-_LONGEST = 2**20  # characters of a line
-_BLOCK = 2**23  # bytes that hold any such line
+_BLOCK = 2**23  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
 _SEPARATORS = {"tab": "\t", "blank": None}
@@ -155,17 +152,11 @@ class TextSource(Source):
 
     def __init__(self, path: Path, delimiter: str | None = None) -> None:
         self.path, self.repeated = path, 0
-        self._encoding = "utf-8-sig"
-        with self._readable():
-            with self._open_binary() as start:
-                self._encoding = _encoding_of(start.read(4096))
-            with self._open() as file:
-                text = file.read(_PREVIEW)
-                more = bool(file.read(1))
-        lines = text.split("\n")
-        if more and len(lines) == 1:  # it would be read as a whole
-            raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
-        if more:
+        self._text: str | None = self._read_text()
+        lines = self._text[:_PREVIEW].split("\n")
+        if len(self._text) > _PREVIEW:
+            if len(lines) == 1:
+                raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
         layouts = _LAYOUTS
         if delimiter is not None:
@@ -262,12 +253,12 @@ class TextSource(Source):
             return "skip"
 
         kinds = {names[place]: kind for place, kind in types.items()}
-        with self._readable(), stage(f"reading {self.path.name}"):
+        with stage(f"reading {self.path.name}"):
             content = self._rows_as_text()
             if not content:
                 return pa.schema(kinds).empty_table(), ragged
             table = arrow_csv.read_csv(
-                pa.BufferReader(content),
+                pa.BufferReader(pa.py_buffer(content)),
                 # Of several threads none knows the number of its row.
                 arrow_csv.ReadOptions(column_names=names, use_threads=False, block_size=_BLOCK),
                 arrow_csv.ParseOptions(
@@ -314,25 +305,20 @@ class TextSource(Source):
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Lines of data with their numbers, counted from 1."""
-        with self._readable(), self._open() as file:
-            for number, line in enumerate(file, 1):
-                if number > self.first and (row := self._row(line.rstrip("\n"))) is not None:
-                    yield number, row
+        for number, line in enumerate(self._read_text().split("\n"), 1):
+            if number > self.first and (row := self._row(line)) is not None:
+                yield number, row
 
-    def _rows_as_text(self) -> bytes:
+    def _rows_as_text(self) -> bytearray:
         """Rows of the table, each in a line of its own, in UTF-8."""
-        self.repeated = 0
-        parts = []
-        with self._open(self.first) as file:
-            while text := file.read(_BLOCK // 8):
-                if not text.endswith("\n"):
-                    text += (end := file.readline(_LONGEST))
-                    if len(end) == _LONGEST:
-                        raise InputError(
-                            f"{self.path}: a line of more than {_LONGEST} characters; is it text?"
-                        )
-                parts.append(self._of_table(text).encode())
-        return b"".join(parts)
+        text, self._text = self._text or self._read_text(), None
+        self.repeated, rows, end = 0, bytearray(), 0
+        for _ in range(self.first):
+            end = text.find("\n", end) + 1
+        while end < len(text):
+            start, end = end, text.find("\n", end + _BLOCK // 8) + 1 or len(text)
+            rows += self._of_table(text[start:end]).encode()
+        return rows
 
     def _of_table(self, text: str) -> str:
         """Lines of a text without those that are no rows."""
@@ -367,29 +353,16 @@ class TextSource(Source):
             return self._blanks.sub("" if self.delimiter else " ", row.strip(" "))
         return row if self.delimiter else " ".join(row.split())
 
-    def _open_binary(self) -> BinaryIO:
-        with self.path.open("rb") as start:
-            packed = start.read(len(GZIP)) == GZIP
-        return cast(BinaryIO, gzip.open(self.path)) if packed else self.path.open("rb")
-
-    def _open(self, skipped: int = 0) -> TextIO:
-        """Open the file and skip some lines; quotation marks in a header have no meaning."""
-        file = TextIOWrapper(self._open_binary(), encoding=self._encoding, errors="replace")
-        try:
-            for _ in range(skipped):
-                file.readline()
-        except BaseException:
-            file.close()
-            raise
-        return file
-
-    @contextmanager
-    def _readable(self) -> Iterator[None]:
+    def _read_text(self) -> str:
+        """All of the file, with line ends as in Python."""
         try:
             with readable(self.path):
-                yield
+                content = self.path.read_bytes()
+                content = gzip.decompress(content) if content.startswith(GZIP) else content
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{self.path}: not a whole gzip file") from None
+        text = content.decode(_encoding_of(content[:4096]), errors="replace")
+        return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
 class _Table:
