@@ -12,10 +12,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -27,9 +28,6 @@ from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 Array = NDArray[np.float64]
 
@@ -294,8 +292,6 @@ class Log:
     @cached_property
     def table(self) -> pa.Table:
         """Rows as they are in the file, with all their columns; by unique names."""
-        import pyarrow as pa
-
         names = unique_names(self.source)
         return pa.table(self.source.columns(range(len(names))), names=names)
 

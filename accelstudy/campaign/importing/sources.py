@@ -10,10 +10,14 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
+from pyarrow import csv as arrow_csv
 
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
 from accelstudy.basics.progress import stage
@@ -21,11 +25,6 @@ from accelstudy.basics.wording import counted, one_line
 from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
-
-# Slow to import, so where a file needs it: what calibrates a campaign reads no log.
-if TYPE_CHECKING:
-    import pandas as pd
-    import pyarrow as pa
 
 Array = NDArray[np.float64]
 
@@ -91,8 +90,6 @@ class Source:
 
         A time in ns since 1970 has more digits than a float. The columns are read unless they were.
         """
-        import pyarrow as pa
-
         left = self._cells_of_numbers(places) if columns is None else [*columns]
         # A text takes more memory than its numbers, so it goes as these come.
         numbers = [self._numbers(left.pop(0), place) for place in places]
@@ -108,8 +105,6 @@ class Source:
         return self.columns(places)
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        import pyarrow as pa
-
         kind = column.type
         if place in self.dates:
             return nanoseconds(column.to_pandas())
@@ -200,9 +195,6 @@ class TextSource(Source):
 
         Nobody knows which of its cells are right.
         """
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         try:
             table, ragged = self._read(dict.fromkeys(places, pa.string()))
         except pa.ArrowInvalid as error:
@@ -221,8 +213,6 @@ class TextSource(Source):
 
     def _cells_of_numbers(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
         """Columns as numbers where all cells are, which saves time and memory."""
-        import pyarrow as pa
-
         if self.decimal == "." and not self.dates & {*places}:
             types = {p: pa.int64() if p in self._long else pa.float64() for p in places}
             try:
@@ -234,17 +224,12 @@ class TextSource(Source):
         return self.columns(places)
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        import pyarrow as pa
-
         if place not in self.dates and pa.types.is_string(column.type):
             return _numbers_of_text(column)
         return super()._numbers(column, place)
 
     def _read(self, types: Mapping[int, pa.DataType]) -> tuple[pa.Table, list[tuple[int, str]]]:
         """Columns of these places and types, and the rows with fewer or more cells than others."""
-        import pyarrow as pa
-        from pyarrow import csv as arrow_csv
-
         names = [str(place) for place in range(self.width)]
         ragged: list[tuple[int, str]] = []
 
@@ -272,8 +257,6 @@ class TextSource(Source):
 
     def _with_ragged(self, table: pa.Table, ragged: Sequence[tuple[int, str]]) -> pa.Table:
         """Rows with those that have fewer or more cells, by their places, where they belong."""
-        import pyarrow as pa
-
         rows: list[Sequence[str | None]] = []
         for _, text in ragged:
             cells = split_line(text, self.delimiter)
@@ -510,9 +493,6 @@ def _most_frequent(counts: Iterable[int]) -> int:
 
 def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
     """Numbers of cells, NaN where there is none; whole numbers as integers."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     if pc.all(pc.match_substring_regex(column[:9], "^-?[0-9]+$")).as_py():
         try:
             return column.cast(pa.int64()).to_numpy()
@@ -539,8 +519,6 @@ class TableSource(Source):
         warnings: Sequence[str] = (),
         named: bool = True,
     ) -> None:
-        import pyarrow as pa
-
         self.path, self.table, self.warnings, self.named = Path(path), table, warnings, named
         self.names = [printable(" ".join(name.split())) for name in table.column_names]
         self.layout = layout_by_names(self.names) if layout is None else layout
@@ -566,8 +544,6 @@ class TableSource(Source):
 
 def table_of(values: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
     """Array (n, c) as a table; its columns have their places as names if they have no others."""
-    import pyarrow as pa
-
     names = names or [str(place) for place in range(values.shape[1])]
     return pa.table([*map(pa.array, values.T)], names=[*names])
 
@@ -640,8 +616,6 @@ def nanoseconds(column: pd.Series) -> NDArray[Any]:
     One without a zone is in UTC, so that all of a column go together. Years that do not fit into
     ns (before 1678 and after 2261) are no dates of a log.
     """
-    import pandas as pd
-
     dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
     if dates.isna().any() and not pd.api.types.is_datetime64_any_dtype(column):
         text = column.astype("str").str.strip()
