@@ -23,20 +23,13 @@ from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, spans
-from accelstudy.diagnosis.space.shapes import (
-    SURVIVES,
-    Place,
-    function_rows,
-    less_its_mean,
-)
+from accelstudy.diagnosis.space.residuals import Residuals, spans
+from accelstudy.diagnosis.space.shapes import Place, function_rows, less_its_mean
 from accelstudy.effects.learned import OF_EACH, WAVES, Learned
 
 Array = NDArray[np.float64]
 
 OTHER = "as another smooth function"
-TAKES_PART = 0.01
-"""Level of the test whether a component takes part."""
 WORTH = 0.01
 """Posterior from which on a formula is worth a line."""
 AT_ONCE = 20
@@ -166,8 +159,8 @@ class _Functions:
             columns = left.reshape(*left.shape[:2], -1)
             norms = np.linalg.norm(columns, axis=1)
             sizes = np.broadcast_to(norms.max(axis=1, keepdims=True), norms.shape)
-            _, basis, rank = spans(columns, sizes, VISIBLE)
-            dims = np.where(share > SURVIVES, rank, 0)
+            _, basis, rank = spans(columns, sizes, RULES.visible)
+            dims = np.where(share > RULES.visible_shape, rank, 0)
             parts = np.sum((z @ basis) ** 2, axis=1)
             density = evidence.of_spaces(parts, np.maximum(dims, 1), float(z @ z))
             logs.append(np.where(dims > 0, density, -np.inf))
@@ -197,7 +190,7 @@ class _Functions:
         """
         z, left = self.residuals.z, self._left(form, np.array([setting]))[0][0][:, [*components]]
         m, count, k = left.shape
-        inverse = np.linalg.pinv(left.reshape(m, -1), rcond=VISIBLE)
+        inverse = np.linalg.pinv(left.reshape(m, -1), rcond=RULES.visible)
         values = inverse @ z
         rest = z - left.reshape(m, -1) @ values
         freedom = max(self.residuals.redundancy - len(values), 1)
@@ -207,7 +200,7 @@ class _Functions:
             own, slope = cofactors[i, :, i], self._slope(form, setting, a, components[i])
             sizes[i], variances[i] = slope @ a, slope @ own @ slope
             squares[i] = a @ np.linalg.pinv(own) @ a / k
-        least = min(f_distribution.isf(TAKES_PART, k, freedom), squares.max())
+        least = min(f_distribution.isf(RULES.level_component, k, freedom), squares.max())
         taking = tuple(components[i] for i in np.flatnonzero(squares >= least))
         return sizes, np.sqrt(variances), taking
 

@@ -33,7 +33,6 @@ from accelstudy.diagnosis.evidence.hypotheses import (
 )
 from accelstudy.diagnosis.held_out_threshold import threshold
 from accelstudy.diagnosis.prediction import (
-    HELD_OUT,
     HeldOutGap,
     LinearSplit,
     held_out_gap,
@@ -44,12 +43,6 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.shapes import Place
 
 Array = NDArray[np.float64]
-
-
-LEAST = 3
-"""Least number of positions to predict."""
-BESIDE = 3
-"""Other explanations with which a name is compared."""
 
 
 @dataclass(frozen=True)
@@ -114,11 +107,11 @@ def predicted_gap(
     n, c = len(first.misclosures), first.approach.n_conditions
     k = sum(choice.best.dim for choice in finding.chosen)
     needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
-    count = min(round(n * HELD_OUT), n - needed)
-    if count < LEAST:
+    count, fewest = min(round(n * RULES.held_out), n - needed), RULES.held_out_least
+    if count < fewest:
         reason = (
             f"no held-out positions: choosing and fitting needs {needed} positions and at least "
-            f"{LEAST} are to be predicted, {needed + LEAST} in all; there are {n}"
+            f"{fewest} are to be predicted, {needed + fewest} in all; there are {n}"
         )
         return replace(gap, reason=reason)
     rng = np.random.default_rng(seeds[0])
@@ -238,7 +231,7 @@ def _is_of(
     left, missed = split.beside(problem.residuals.errors[None])
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
-    for one in finding.posterior.told[: BESIDE + 1]:
+    for one in finding.posterior.told[: RULES.held_out_rivals + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
             ((fit, rest),) = split.predictors(one.best)
             logs.append(-float(np.sum((missed - left @ fit @ rest) ** 2)) / (2 * variance))

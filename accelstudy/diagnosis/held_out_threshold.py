@@ -23,18 +23,13 @@ from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import total_odds
 from accelstudy.diagnosis.evidence.field import Seen, log_ratio, simulated
 from accelstudy.diagnosis.evidence.hypotheses import Class
-from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit
+from accelstudy.diagnosis.prediction import LinearSplit
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
 from accelstudy.diagnosis.space.shapes import Place
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int_]
-
-SETS = 800
-"""Simulated sets of residuals."""
-LEVEL = 0.05
-"""Probability that something is confirmed though nothing is missing."""
 
 
 def threshold(
@@ -62,11 +57,11 @@ def threshold(
     drawn = list[Shapes](field.candidates.values())
     if place is not None:
         if field.unknown is None or part.field.unknown is None:
-            return SIGNIFICANT
+            return RULES.z_significant
         drawn = [field.unknown.at([place])]
         if not len(drawn[0].dims):
-            return SIGNIFICANT
-    added = simulated(drawn, len(residuals.design), SETS, rng)
+            return RULES.z_significant
+    added = simulated(drawn, len(residuals.design), RULES.threshold_sets, rng)
     noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
     z = residuals.project(noise.T).T
     seen = field.seen(z)
@@ -74,7 +69,7 @@ def threshold(
     claimed = learned(problem, seen, place) if place else named(odds, field.names, label)
     sets = np.flatnonzero((claimed >= 0) & (total_odds(odds) > beyond))
     if not len(sets):
-        return SIGNIFICANT
+        return RULES.z_significant
     weights = np.exp(-log_ratio(drawn, [shapes.parts(z[sets]) for shapes in drawn]))
     noise = noise[sets]
     found, change = (
@@ -84,8 +79,8 @@ def threshold(
     order = np.argsort(-values)
     confirmed = np.where(found == claimed[sets], weights, 0.0)
     rate = np.cumsum(confirmed[order]) / weights.sum()
-    at = min(int(np.searchsorted(rate, LEVEL)), len(order) - 1)
-    return max(SIGNIFICANT, float(values[order[at]]))
+    at = min(int(np.searchsorted(rate, RULES.level_confirmed)), len(order) - 1)
+    return max(RULES.z_significant, float(values[order[at]]))
 
 
 def labels(classes: Sequence[Class]) -> dict[str, int]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -31,14 +32,7 @@ from accelstudy.effects import HoldConditions
 Array = NDArray[np.float64]
 
 
-HELD_OUT = 1 / 3
-"""Share of the positions that is held out."""
-SPLITS = 300
 RESAMPLES = 1000
-SIGNIFICANT = 1.645
-"""One-sided 5 % of the standard normal distribution."""
-REFUTES = 2.576
-"""Shortfall of a correction, over its sigma, that a right model has in 0.5 % of cases."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +59,7 @@ class HeldOutGap:
     z: float
     held: tuple[int, ...]
     misses: tuple[tuple[float, ...], tuple[float, ...]]
-    needed: float = SIGNIFICANT
+    needed: float = RULES.z_significant
     short: float = 0.0
 
     @property
@@ -76,7 +70,7 @@ class HeldOutGap:
     @property
     def refutes(self) -> bool:
         """Whether the residuals do not shrink, and would have to if the model were right."""
-        return self.after >= self.before and self.short < -REFUTES
+        return self.after >= self.before and self.short < -RULES.z_refuted
 
 
 def split_positions(
@@ -105,7 +99,7 @@ def split_positions(
     scale = features.std(axis=0)
     features = (features - features.mean(axis=0)) / np.where(scale > 0, scale, 1.0)
     best, least = np.arange(n), np.inf
-    for _ in range(SPLITS):
+    for _ in range(RULES.splits):
         order = rng.permutation(n)
         # The means of the two parts differ in proportion to the sum over either.
         imbalance = float(np.sum(features[order[:count]].sum(axis=0) ** 2))

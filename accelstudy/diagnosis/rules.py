@@ -1,8 +1,7 @@
 """The rules by which a diagnosis decides: each prior, level and threshold, with its reason.
 
 Prior weights are relative to "one effect is missing", which weighs 1; the classes of effects and a
-bumped position share it evenly. The probability that a given sigma is wrong is in `evidence.size`.
-Each diagnosis.json quotes the rules that it was made by.
+bumped position share it evenly. Each diagnosis.json quotes the rules that it was made by.
 """
 
 from dataclasses import dataclass
@@ -34,6 +33,28 @@ class Rules:
     """An effect beside something unknown only imitates a part of that; in simulations without any
     such effect as many seem certain as in those with one."""
 
+    prior_sigma_wrong: float = 0.15
+    """A sigma that is given is wrong."""
+    prior_more_than_within: float = 0.5
+    """Means scatter more than white noise within the holds explains, where the holds alone say how
+    large the noise is."""
+
+    # --- how well the noise is known before, by degrees of freedom or a standard deviation --------
+
+    freedom_given: float = 200.0
+    """Of a sigma that is right: people know it to 5 %."""
+    freedom_doubted: float = 3.0
+    """Of one that is wrong: anything from half to twice is usual then."""
+    freedom_not_given: float = 1e-3
+    """Of one that is not given: its size says nothing."""
+    spread_axes: float = 0.7
+    """Sd of log κ about equal axes: a factor of two in variance is usual."""
+    spread_within: float = 0.35
+    """Sd of log κ about the ratios within the holds."""
+    beyond_white: float = 5.0
+    """Ratio of variances up to which white noise within the holds may explain the scatter of
+    means."""
+
     # --- levels of tests, which make 5 % false alarms together ----------------------------------
 
     level_effects: float = 0.04
@@ -42,6 +63,14 @@ class Rules:
     """Family-wise, of all tests of the noise but that of its level."""
     level_sigma: float = REFUTED
     """Of the test of the noise level, and of any fit that is accepted."""
+    level_confirmed: float = 0.05
+    """Something is confirmed on held-out positions though nothing is missing."""
+    level_component: float = 0.01
+    """Of the test whether a component takes part in a formula."""
+    z_significant: float = 1.645
+    """One-sided 5 % of the standard normal distribution: a correction of held-out positions."""
+    z_refuted: float = 2.576
+    """Shortfall of a correction, over its sigma, that a right model has in 0.5 % of cases."""
 
     # --- posterior probabilities from which on something is said --------------------------------
 
@@ -63,8 +92,69 @@ class Rules:
     """Noncentrality beyond which first order is not enough, and a refit judges an effect."""
     larger_tilt: float = 1.02
     """Ratio of tilt errors from which on one counts as larger."""
+
+    # --- what can be seen, and what is the same --------------------------------------------------
+
     rival: float = 0.5
     """Canonical cosine from which on an effect is listed as a rival."""
+    imitates: float = 0.9995
+    """Canonical cosine from which on two signatures are the same in what is confirmed."""
+    alike: float = 0.9999
+    """Canonical cosine above which two signatures are the same."""
+    visible: float = 3e-3
+    """Share of its signature that the model must leave, or an effect is invisible."""
+    visible_shape: float = 3e-3
+    """Share of a shape that the model must leave, or the shape is not seen."""
+    absorbed: float = 1e-2
+    """A direction counts as absorbed by the model if less than this share of it is left."""
+    same_attitude: float = 0.05
+    """Positions closer than this (chord of unit vectors) repeat each other, as those do that a
+    person turns back to by eye. What the model says of them may differ; of what it lacks, such as a
+    square or a cube of the force, they differ by some percent of it, which the test of lack of fit
+    can bear."""
+    same_fit: float = 0.5
+    """Difference of Ω within which two fits are equally good."""
+    same_evidence: float = 0.25
+    """Log evidence within which two effects are equally good."""
+    collinear: float = 0.05
+    """Two effects are tried together only if this share of the second is left beside the first."""
+
+    # --- how far is searched ---------------------------------------------------------------------
+
+    simulations: int = 1000
+    """Sets of noise that are simulated for the p-value of anything that is missing."""
+    enough: int = 10
+    """Simulated values beyond the observed one that are enough to take their share as its
+    p-value."""
+    threshold_sets: int = 800
+    """Sets of residuals that are simulated for the threshold of a confirmation."""
+    held_out: float = 1 / 3
+    """Share of the positions that is held out."""
+    held_out_least: int = 3
+    """Least number of positions to predict."""
+    held_out_rivals: int = 3
+    """Other explanations with which a name is compared on held-out positions."""
+    splits: int = 300
+    """Random splits of the positions, of which the best balanced one is taken."""
+    refinements: int = 3
+    """How often shapes are added about the best one."""
+    refined_shapes: int = 5
+    """Shapes that are added between its neighbours."""
+    refined_within: float = 12.0
+    """An effect whose log evidence is this far below the strongest needs no further shapes."""
+    undecided: float = 2.0
+    """Log evidence by which a shape may fall short of the best and still be the true one."""
+    unknown_beside: int = 3
+    """Effects beside which something unknown is looked for."""
+    refitted_pairs: int = 5
+    """Pairs that are refitted where the best explanation leaves a misfit."""
+    pair_shapes: int = 5
+    """Shapes of a pair of which bounds are evaluated."""
+    pair_within: float = 6.0
+    """Log evidence by which a pair may be weaker than the strongest one and still get its
+    bounds."""
+    paired_positions: int = 100
+    """Bumped positions that are tried in pairs, at most."""
 
     def level(self, sigma_known: bool) -> float:
         """Level of the test for anything that is missing."""

@@ -16,8 +16,9 @@ from accelstudy.basics.units import display_unit
 from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
-from accelstudy.diagnosis.space.hypotheses import ALIKE, OUTLIER, Hypothesis, cosines
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme
 from accelstudy.sensors.sensor import SensorModel
@@ -143,7 +144,7 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
         rivals = [
             max(examined.candidates[other], key=lambda h: float(cosines(best.ideal, h.ideal)[0]))
             for other, cosine in near
-            if cosine <= ALIKE
+            if cosine <= RULES.alike
         ]
         left = sizes[easiest]
         for rival in rivals:

@@ -19,7 +19,8 @@ from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Evidence, Level, log_mean
+from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect
 from accelstudy.lots.noise import LEAST_SIGMA, SensorNoise, with_noise
 from accelstudy.lots.sizes import visible
@@ -181,7 +182,8 @@ def sensor_evidence(
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
     if noise is not None and noise.said:
-        any_level = Evidence(Level((1.0,), (DOUBTED,), known=True), problem.evidence.redundancy)
+        doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
+        any_level = Evidence(doubted, problem.evidence.redundancy)
         odds[LEVEL_OF_NOISE] = float(any_level.of_noise(z @ z)[0]) - nothing
     if unknown is not None:
         odds |= {
@@ -267,7 +269,7 @@ def mean_sensor(
         first, name="mean of the lot", sd=None, n_samples=None,
         sigma_force=sigma, sigma_angle=angle, **columns,
     )  # fmt: skip
-    return mean, SensorNoise(sigma, min(float(freedom), AS_GIVEN), doubt=0.0)
+    return mean, SensorNoise(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
 
 
 @dataclass(frozen=True)
@@ -294,7 +296,7 @@ def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
     used : of the sensors that count
     """
     redundancy = sum(each.redundancy for each in used)
-    evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), redundancy)
+    evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), redundancy)
     squares = sum(each.square for each in used)
     nothing = float(evidence.of_noise(squares)[0])
     joint = {}

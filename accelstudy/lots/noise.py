@@ -22,13 +22,14 @@ from scipy import optimize, stats
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
-from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Level
+from accelstudy.diagnosis.evidence.size import Level
+from accelstudy.diagnosis.rules import RULES
 
 Array = NDArray[np.float64]
 
 LEAST_SIGMA = 1e-9
 """m/s², of readings that are their own model."""
-FREEDOMS = (AS_GIVEN, 60.0, 20.0, 8.0, DOUBTED)
+FREEDOMS = (RULES.freedom_given, 60.0, 20.0, 8.0, RULES.freedom_doubted)
 """ν of a lot, the most first; with the last one sensors have nothing in common."""
 ALIKE = 1.0
 """Difference of log likelihoods that says nothing."""
@@ -66,7 +67,8 @@ class SensorNoise:
         """What a campaign knows of its noise by that of the others."""
         if not self.doubt:
             return Level((1.0,), (self.freedom,), known=True)
-        return Level((1 - self.doubt, self.doubt), (self.freedom, DOUBTED), known=True)
+        weights = 1 - self.doubt, self.doubt
+        return Level(weights, (self.freedom, RULES.freedom_doubted), known=True)
 
 
 def with_noise(campaign: Campaign, noise: SensorNoise | None) -> Campaign:
@@ -172,7 +174,7 @@ def noises_of_lot(
         if len(group) < FEWEST:
             continue
         agreement, said = _agreement(group, source, refit)
-        if agreement.freedom > DOUBTED:
+        if agreement.freedom > RULES.freedom_doubted:
             for i, u in zip(group, said.tolist(), strict=True):
                 noises[i] = SensorNoise(
                     agreement.factor * u, agreement.freedom, said=source is not Source.NOTHING

@@ -24,8 +24,8 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.residuals import VISIBLE
 from accelstudy.effects import get_effect
 from accelstudy.lots.noise import SensorNoise, with_noise
 from accelstudy.sensors.sensor import SensorModel
@@ -111,7 +111,7 @@ def visible(normal: Array, squares: Array) -> tuple[Array, Array]:
     """
     scale = np.sqrt(np.where(squares > 0, squares, 1.0))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    seen = values > VISIBLE**2
+    seen = values > RULES.visible**2
     return vectors[:, seen] / scale[:, None], values[seen]
 
 

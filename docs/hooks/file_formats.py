@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import griffe
 import yaml
-from markdown_text import code, table
+from markdown_text import code, plain, table
 from schemas import blocks
 
 from accelstudy.campaign.header import ANY, COLUMNS, HEADER, Header
+from accelstudy.diagnosis.rules import RULES
 
 SCHEMA = Path(__file__).parent.parent / "reference/diagnosis.schema.yaml"
 
@@ -38,3 +40,14 @@ def diagnosis():
     """Keys of a diagnosis."""
     schema = yaml.safe_load(SCHEMA.read_text("utf-8"))
     return blocks(schema, "Diagnosis: `diagnosis.json`", "diagnosis: ")
+
+
+def rules(priors):
+    """Rules by which a diagnosis decides, with their reasons: its prior weights, or all others."""
+    each = griffe.load("accelstudy.diagnosis.rules")["Rules"].attributes.items()
+    rows = (
+        (code(name), f"{getattr(RULES, name):g}", plain(one.docstring.value))
+        for name, one in each
+        if name.startswith("prior_") == priors
+    )
+    return table(("rule", "value", "what it is"), rows)

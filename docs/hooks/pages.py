@@ -39,6 +39,8 @@ PARTS = {
     "header of a campaign": file_formats.header,
     "positions of a campaign": file_formats.positions,
     "keys of a diagnosis": file_formats.diagnosis,
+    "priors of a diagnosis": partial(file_formats.rules, priors=True),
+    "other rules of a diagnosis": partial(file_formats.rules, priors=False),
     "terms": terms,
     "figures of a study": gallery.study_figures,
 }

@@ -14,7 +14,7 @@ from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equivalents, weigh_singles
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.prediction import SIGNIFICANT, LinearSplit, held_out_gap, split_positions
+from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
 from accelstudy.diagnosis.report.words import said
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.simulation.sessions import Noise, session
@@ -49,7 +49,7 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     classes = classes_of(singles, equivalents(problem.examined, singles))
     rng = np.random.default_rng(3)
     needed = held_out_threshold.threshold(problem, classes, None, beyond, part, split, rng)
-    assert needed > SIGNIFICANT + 0.3
+    assert needed > RULES.z_significant + 0.3
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
@@ -66,7 +66,7 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     # Both the simulation of the bound and that of the rate err.
     assert rate == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 * (1 / n + 1 / 300)))
     # Without regard to the name, as if it were independent, far more would be confirmed.
-    assert np.mean(same & (values > SIGNIFICANT)) > 0.12
+    assert np.mean(same & (values > RULES.z_significant)) > 0.12
 
 
 def test_prediction_to_first_order_is_that_of_refits(parts):

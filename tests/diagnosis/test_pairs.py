@@ -1,5 +1,6 @@
 """The evidence for all pairs, beside every two shapes taken together one by one."""
 
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
@@ -9,6 +10,7 @@ from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 from accelstudy.diagnosis.evidence import hypotheses
 from accelstudy.diagnosis.evidence.hypotheses import all_pairs
 from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 APART = 0.05
@@ -91,7 +93,7 @@ def test_all_pairs_are_those_of_all_shapes_together(problem):
 def test_of_many_positions_those_that_explain_most_are_paired(problem, monkeypatch):
     """The others keep their share of the prior, as if they explained nothing."""
     shapes, residuals, evidence = problem
-    monkeypatch.setattr(hypotheses, "POSITIONS", 4)
+    monkeypatch.setattr(hypotheses, "RULES", replace(RULES, paired_positions=4))
     alone = [np.sum((h.basis.T @ residuals.z) ** 2) for h in shapes[OUTLIER]]
     places = sorted(np.argsort(alone)[-4:].tolist())
     assert_same(all_pairs(*problem), one_by_one(shapes, residuals, evidence, places))

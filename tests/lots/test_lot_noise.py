@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.evidence.size import AS_GIVEN, DOUBTED, Level
+from accelstudy.diagnosis.evidence.size import Level
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import SensorEvidence, mean_sensor
 from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
 
@@ -83,7 +84,7 @@ def test_of_several_maxima_the_highest_is_found():
     for few in (3, 13):
         sigmas = np.where(np.arange(N) < few, QUIET, ROUGH)
         found = Agreement.of(sigmas, np.full(N, REDUNDANCY), np.ones(N))
-        assert found.freedom == DOUBTED or found.factor == pytest.approx(
+        assert found.freedom == RULES.freedom_doubted or found.factor == pytest.approx(
             QUIET if few > N / 2 else ROUGH, rel=0.1
         )
 
@@ -107,7 +108,7 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
         squares = 30 * np.sum((sigmas * signs - shift) ** 2 / variances) / 90
         return shift, np.sqrt(squares / np.sum(1 / variances)), weights
 
-    known = [SensorNoise(s, AS_GIVEN) for s in sigmas]
+    known = [SensorNoise(s, RULES.freedom_given) for s in sigmas]
     alone = np.append(sigmas[:2] ** 2, np.full(2, np.mean(sigmas[2:] ** 2)))
     for noises, variances in ((known, sigmas**2), ([*known[:2], None, None], alone)):
         shift, sigma, weights = expected(variances)

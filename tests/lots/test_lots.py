@@ -13,7 +13,8 @@ from scipy import integrate, stats
 
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.evidence.size import AS_GIVEN, Evidence, Level
+from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.calibrated import TypeParameter
 from accelstudy.lots.evidence import (
     DRAWS,
@@ -166,7 +167,7 @@ def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     joint = together(sensors)["effect"]
     d, one = derivatives.reshape(-1, 2), z.ravel()
     fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
-    evidence = Evidence(Level((1.0,), (AS_GIVEN,), known=True), 120)
+    evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 120)
     part = evidence.of_spaces(np.array([fitted @ fitted]), [2], one @ one)[0]
     assert joint.odds == pytest.approx(part - evidence.of_noise(one @ one)[0], rel=1e-6)
     assert joint.spec == "effect"

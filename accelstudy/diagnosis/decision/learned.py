@@ -26,7 +26,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.shapes import SURVIVES, Place
+from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import get_effect
 from accelstudy.effects.learned import ANGLES, LEARNED, UNITS, Learned
 from accelstudy.effects.smooth import CYCLES, LENGTHS
@@ -221,7 +221,7 @@ class Weighted:
         rows = residuals.whitened(frame.signature(effect)) * effect.deviations
         left = residuals.project(rows)
         trace = float(np.sum(left**2))
-        if not trace > SURVIVES * float(np.sum(rows**2)):
+        if not trace > RULES.visible_shape * float(np.sum(rows**2)):
             return None
         values, turned = np.linalg.eigh(left.T @ left)
         kept = values > 1e-6 * trace

@@ -47,8 +47,6 @@ from accelstudy.effects import effect_names
 
 SLOW = (("time", "bias"), ("time", "scale"))
 """Places of what follows something that was not recorded, and that slow noise may be, too."""
-FIRST = 3
-"""Effects beside which something unknown is looked for."""
 
 
 @dataclass(frozen=True)
@@ -292,7 +290,7 @@ def weigh_beside(problem: Problem, singles: Singles, classes: Sequence[Class]) -
     k, unknown, weighed = len(classes), problem.field.unknown, []
     if unknown is None or k < 2:
         return []
-    for first, same in classes[:FIRST]:
+    for first, same in classes[: RULES.unknown_beside]:
         beside = unknown_beside(first, unknown, problem.residuals, problem.evidence)
         if beside is not None:
             total = singles.densities[first.name] + beside - np.log(k)

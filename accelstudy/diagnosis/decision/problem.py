@@ -24,8 +24,6 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-BEYOND_WHITE = 5.0
-"""Ratio of variances up to which white noise within the holds may explain the scatter of means."""
 ROUNDING = 1e-10
 """Residuals below this share of gravity are rounding errors, and no measurement."""
 
@@ -87,7 +85,8 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
         return BaseFit(solution, Level.given(solution.sigma_dof), within)
     if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
         return BaseFit(solution, Level.unknown(), within)
-    if not 1 / BEYOND_WHITE < fit.sigma_position_posteriori**2 / np.mean(within) < BEYOND_WHITE:
+    most, ratio = RULES.beyond_white, fit.sigma_position_posteriori**2 / np.mean(within)
+    if not 1 / most < ratio < most:
         return BaseFit(solution, Level.unknown(), within)
     observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(within))))
     return BaseFit(solve(fit.model, fit.approach, observed), Level.within_holds(), within)

@@ -13,13 +13,12 @@ from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.hypotheses import Class, Singles, shaped
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.sensors.models import composition_name
 from accelstudy.sensors.sensor import SensorModel
 
-SAME = 0.5
-"""Difference of Ω within which two fits are equally good."""
 EDGE = 0.1
 """Part of what is searched within which the least is at its end."""
 BEYOND = 1.6
@@ -81,7 +80,7 @@ def best_refit(
         return None
     least = min(fit.omega for _, fit in solved)
     # Fits that differ by less count as equal: rounding errors must not choose the name.
-    best, fit = next(item for item in solved if item[1].omega <= least + SAME)
+    best, fit = next(item for item in solved if item[1].omega <= least + RULES.same_fit)
     u = len(fit.parameters)
     return best, replace(fit, cofactors=with_settings(examined, fit, best)[:u, :u])
 

@@ -32,9 +32,6 @@ from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.plausibility import impossible_parameters
 
-PAIRS = 5
-"""Pairs that are refitted where the best explanation leaves a misfit."""
-
 
 class Reason(NamedTuple):
     """Why a verdict is what it is.
@@ -135,7 +132,7 @@ def find(case: Case) -> Finding:
     finding = _judged(case, posterior)
     if finding.code == "misfit" and single is not None:
         # To first order the best explanation was enough; the others were not asked by their refits.
-        posterior = _judged_by_refits(case.problem, case.weighing, single, PAIRS)
+        posterior = _judged_by_refits(case.problem, case.weighing, single, RULES.refitted_pairs)
         finding = _judged(case, posterior)
     return finding
 

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.field import Field, log_ratio, simulated
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
 
 
-SIMULATIONS = 1000
 AT_ONCE = 500_000
 """Numbers that are drawn at once; all sets of very many positions would not fit in memory."""
 
@@ -50,7 +50,7 @@ class Chance:
 
     seed: np.random.SeedSequence
     conditions: int
-    simulations: int = SIMULATIONS
+    simulations: int = RULES.simulations
 
     def noise(self) -> Iterator[Array]:
         """Draw white noise of unit weight, (b, conditions) each."""
@@ -90,10 +90,6 @@ class Chance:
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
         """Return a statistic of all simulated residuals (b, m); its first axis is the set."""
         return np.concatenate([function(errors) for errors in self.errors(residuals)])
-
-
-ENOUGH = 10
-"""Simulated values beyond the observed one that are enough to take their share as its p-value."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +180,7 @@ def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:
     """Probability that log odds, or the largest of `count` of them, reach a value by chance."""
     beyond = values >= value
     bound = float(count * np.exp(min(-value, 0.0)))
-    if np.count_nonzero(beyond) >= ENOUGH:
+    if np.count_nonzero(beyond) >= RULES.enough:
         return float(min(np.sum(weights[beyond]) / len(weights), 1.0))
-    least = np.sum(weights[values >= np.sort(values)[-ENOUGH]]) / len(weights)
+    least = np.sum(weights[values >= np.sort(values)[-RULES.enough]]) / len(weights)
     return float(min(least, bound, 1.0))

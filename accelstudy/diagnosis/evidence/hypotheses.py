@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
@@ -27,24 +28,6 @@ from accelstudy.diagnosis.space.shapes import LearnedShapes
 Array = NDArray[np.float64]
 
 
-ROUNDS = 3
-"""How often shapes are added about the best one."""
-BETWEEN = 5
-"""Shapes that are added between its neighbours."""
-WORTH = 12.0
-"""A candidate whose log evidence is this far below the strongest needs no further shapes."""
-UNDECIDED = 2.0
-"""Log evidence by which a shape may fall short of the best and still be the true one."""
-SAME = 0.25
-"""Log evidence within which two effects are equally good."""
-COLLINEAR = 0.05
-"""Two spaces are tried together only if this share of the second is left beside the first."""
-BOUNDED = 5
-"""Shapes of a pair of which bounds are evaluated."""
-WEIGHTY = 6.0
-"""Log evidence by which a pair may be weaker than the strongest one and still get its bounds."""
-POSITIONS = 100
-"""Bumped positions that are tried in pairs, at most."""
 ROWS = 4096
 """Conditions in one block of work."""
 
@@ -85,7 +68,7 @@ def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Si
     named = field.named
     densities = named.densities(evidence, named.seen(z))
     first = dict(zip(named.names, densities.tolist(), strict=True))
-    least = max(first.values()) - WORTH
+    least = max(first.values()) - RULES.refined_within
     shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
     for name, tried in examined.candidates.items():
         worth = first[name] > least
@@ -112,7 +95,7 @@ def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str,
             members[name] = (name,)
             continue
         logs = singles.logs[name]
-        probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - UNDECIDED)]
+        probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - RULES.undecided)]
         members[name] = tuple(sorted({*examined.alike(probable), name}))
     return members
 
@@ -128,7 +111,7 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
         alike = [other for other in left if other in same]
         left = [other for other in left if other not in same]
         # Rounding errors must not choose among equally good names: the first one is taken.
-        least = densities[name] - SAME
+        least = densities[name] - RULES.same_evidence
         name = min(other for other in (name, *alike) if densities[other] >= least)
         classes.append((singles.best[name], same))
     return classes
@@ -141,10 +124,12 @@ def refined(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
         return shapes
     if shapes[0].smooth is None:
         return _completed(examined, shapes)
-    for _ in range(ROUNDS):
+    for _ in range(RULES.refinements):
         best = int(np.argmax(shapes.parts(z)))
         around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
-        tried = _all_shaped(examined, shapes[best], np.geomspace(*around, BETWEEN + 2)[1:-1])
+        tried = _all_shaped(
+            examined, shapes[best], np.geomspace(*around, RULES.refined_shapes + 2)[1:-1]
+        )
         fine = [*shapes, *(h for h in tried if h is not None)]
         shapes = EffectShapes.of(sorted(fine, key=lambda h: h.value))
     return shapes
@@ -222,8 +207,8 @@ def all_pairs(
 ) -> list[Together]:
     """Evidence for all pairs of candidates, over all shapes of both.
 
-    Of the bumped positions only the `POSITIONS` that explain most by themselves are tried; pairs
-    with the others count as pairs without any evidence.
+    Of the bumped positions only the `paired_positions` of the rules that explain most by themselves
+    are tried; pairs with the others count as pairs without any evidence.
 
     Parameters
     ----------
@@ -270,7 +255,7 @@ def all_pairs(
         a, b = one[alike], other[alike]
         for some, beside in ((a, b), (b, a)):
             # What bounds do to pairs of no weight does not matter.
-            if tried[some[0]].estimates is not None and totals[k] > top - WEIGHTY:
+            if tried[some[0]].estimates is not None and totals[k] > top - RULES.pair_within:
                 within = _within_bounds(tried, some, beside, weighted[alike], z, evidence)
                 logs[alike] += within
                 weighted[alike] += within
@@ -294,7 +279,7 @@ def _within_bounds(
 
     They are those of the pairs with the most evidence; for all others the least of these stands.
     """
-    most = np.argsort(-weighted, kind="stable")[:BOUNDED]
+    most = np.argsort(-weighted, kind="stable")[: RULES.pair_shapes]
     found = within_bounds(
         [tried[i] for i in some[most]], z, evidence, [tried[i].basis for i in beside[most]]
     )
@@ -309,8 +294,8 @@ def _tried(candidates: Mapping[str, Hypotheses], z: Array) -> tuple[list[Hypothe
     weights: list[Array] = []
     for name, shapes in candidates.items():
         places = np.arange(len(shapes))
-        if name == OUTLIER and len(places) > POSITIONS:
-            places = np.sort(np.argsort(-shapes.parts(z), kind="stable")[:POSITIONS])
+        if name == OUTLIER and len(places) > RULES.paired_positions:
+            places = np.sort(np.argsort(-shapes.parts(z), kind="stable")[: RULES.paired_positions])
         tried += [shapes[int(k)] for k in places]
         weights.append(shapes.prior[places])
     return tried, np.concatenate(weights) if weights else np.zeros(0)
@@ -366,5 +351,5 @@ class _Products:
         rest = self.seen[b] - np.einsum("jab,ja->jb", cross, self.seen[a])
         along = np.einsum("jab,ja->jb", vectors, rest) ** 2
         part = np.sum(self.seen[a] ** 2, axis=1)
-        part += np.sum(along / np.maximum(values, COLLINEAR), axis=1)
-        return part, values[:, 0] > COLLINEAR
+        part += np.sum(along / np.maximum(values, RULES.collinear), axis=1)
+        return part, values[:, 0] > RULES.collinear

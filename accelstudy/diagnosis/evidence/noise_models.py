@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.noise_effects.coloured_noise import memory, renewed
 
@@ -47,10 +48,6 @@ def restricted_to_residuals(determinant: Array, normal: Array) -> tuple[Array, A
     )
 
 
-SPREAD = 0.7
-"""Prior standard deviation of log κ about equal axes: a factor of two in variance is usual."""
-AS_WITHIN = 0.35
-"""Prior standard deviation of log κ about the ratios within the holds."""
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
 GRID = np.linspace(-2.5, 2.5, 9)
@@ -84,10 +81,10 @@ class UnequalAxes:
         logs = np.column_stack([x, y]) @ CONTRASTS
         determinant, squares = _restricted(residuals, np.exp(logs))
         densities = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
-        prior = _normal(x, y, np.zeros(3), SPREAD)
+        prior = _normal(x, y, np.zeros(3), RULES.spread_axes)
         if within is not None and np.all(within > 0):
             centre = np.log(within) - np.mean(np.log(within))
-            prior = (prior + _normal(x, y, centre, AS_WITHIN)) / 2
+            prior = (prior + _normal(x, y, centre, RULES.spread_within)) / 2
         posterior = prior * np.exp(densities - densities.max())
         mean = posterior @ logs / posterior.sum()
         z = residuals.z

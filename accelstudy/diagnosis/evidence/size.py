@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammaln
 
+from accelstudy.diagnosis.rules import RULES
+
 Array = NDArray[np.float64]
 
 SIZES = np.geomspace(4.0, 4e6, 13)
@@ -34,17 +36,6 @@ SHAPE_WEIGHTS = np.where(SHAPE_SIZES < 1500, 0.9 / 3, 0.1 / 4)
 SIMULATED = 4
 """The first of them, which are all that simulated residuals can have."""
 
-DOUBT = 0.15
-"""Prior probability that a sigma that is given is wrong."""
-AS_GIVEN = 200.0
-"""ν of a sigma that is right: people know it to 5 %."""
-DOUBTED = 3.0
-"""ν of one that is wrong: anything from half to twice is usual then."""
-NOT_GIVEN = 1e-3
-"""ν of one that is not given: its size says nothing."""
-MORE_THAN_WITHIN = 0.5
-"""Prior probability that means scatter more than white noise within the holds explains, where the
-holds alone say how large the noise is."""
 
 _EVEN = np.linspace(0.0, 60.0, 241)
 _LOGS = np.concatenate([_EVEN, np.geomspace(61.0, 1e5, 120)])
@@ -66,20 +57,21 @@ class Level:
     known: bool
 
     @classmethod
-    def given(cls, dof: float = AS_GIVEN) -> Level:
+    def given(cls, dof: float = RULES.freedom_given) -> Level:
         """Of a sigma that is given, which has so many degrees of freedom if it is right."""
-        return cls((1 - DOUBT, DOUBT), (min(dof, AS_GIVEN), DOUBTED), known=True)
+        wrong, freedom = RULES.prior_sigma_wrong, min(dof, RULES.freedom_given)
+        return cls((1 - wrong, wrong), (freedom, RULES.freedom_doubted), known=True)
 
     @classmethod
     def within_holds(cls) -> Level:
         """Of a sigma that is not given, where the noise within the holds may be all there is."""
-        more = MORE_THAN_WITHIN
-        return cls((1 - more, more), (AS_GIVEN, DOUBTED), known=False)
+        more = RULES.prior_more_than_within
+        return cls((1 - more, more), (RULES.freedom_given, RULES.freedom_doubted), known=False)
 
     @classmethod
     def unknown(cls) -> Level:
         """Of a sigma of which nothing is known."""
-        return cls((1.0,), (NOT_GIVEN,), known=False)
+        return cls((1.0,), (RULES.freedom_not_given,), known=False)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,6 @@ from accelstudy.diagnosis.report.document import (
 from accelstudy.diagnosis.report.figures import diagnosis_figures, hardly_shown
 from accelstudy.diagnosis.result import MISSING, Diagnosis
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import IMITATES
 from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_frame
@@ -89,7 +88,6 @@ def write_diagnosis(
         calibration=calibration,
         rules=RULES,
         missing=MISSING,
-        imitates=IMITATES,
         next_steps=next_steps(diagnosis, calibration, source, place),
     )
     write_json(folder / "diagnosis.json", document)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import (
-    ALIKE,
     OUTLIER,
     BumpedPositions,
     EffectShapes,
@@ -20,7 +20,7 @@ from accelstudy.diagnosis.space.hypotheses import (
     Hypothesis,
     same_space,
 )
-from accelstudy.diagnosis.space.residuals import VISIBLE, Residuals, ideal_residuals, spans
+from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, spans
 from accelstudy.diagnosis.space.signatures import Columns, Signature, signatures
 from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
 from accelstudy.leveling.angles import angles_of
@@ -109,7 +109,7 @@ class Frame:
         shown = self.signatures(shapes, ideal=True)
         projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
         sizes = self.ideal.size(shown, self.solution.gravity).reshape(len(shapes), -1)
-        directions, ideal, seen = spans(projected, sizes, VISIBLE)
+        directions, ideal, seen = spans(projected, sizes, RULES.visible)
         columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
         sizes = np.linalg.norm(projected @ directions, axis=1)
@@ -161,8 +161,6 @@ def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
     return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
 
 
-IMITATES = 0.9995
-"""Canonical cosine from which on two signatures are held to be the same in what is confirmed."""
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
 
@@ -234,7 +232,7 @@ class ExaminedFit:
         # The squared cosines sum to the squares of all products, so most need no decomposition.
         squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
         same: set[str] = set()
-        for i, k in np.argwhere(squares > dims[:, None] * ALIKE**2).tolist():
+        for i, k in np.argwhere(squares > dims[:, None] * RULES.alike**2).tolist():
             shape = self._shapes[k]
             if shape.name not in same and same_space(others[i], shape):
                 same.add(shape.name)
@@ -251,7 +249,7 @@ class ExaminedFit:
     def imitators(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Other effects that could leave all that a hypothesis does, and perhaps more."""
         smallest = self._cosines(hypothesis, hypothesis.dim)
-        names = {self._shapes[k].name for k in np.flatnonzero(smallest >= IMITATES)}
+        names = {self._shapes[k].name for k in np.flatnonzero(smallest >= RULES.imitates)}
         return tuple(sorted(names - {hypothesis.name}))
 
     def _cosines(self, hypothesis: Hypothesis, rank: int) -> Array:

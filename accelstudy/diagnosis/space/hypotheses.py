@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import root_of
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals, position_products
 from accelstudy.effects import Effect
 
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from accelstudy.diagnosis.evidence.size import Evidence
 
 Array = NDArray[np.float64]
-ALIKE = 0.9999
-"""Canonical cosine above which two signatures are the same."""
 
 OUTLIER = "outlier_position"
 
@@ -304,4 +303,4 @@ def same_space(a: Hypothesis, b: Hypothesis) -> bool:
     """Whether two hypotheses cannot be told apart in these positions."""
     if a.dim != b.dim:
         return False
-    return bool(cosines(a.ideal, b.ideal)[-1] > ALIKE)
+    return bool(cosines(a.ideal, b.ideal)[-1] > RULES.alike)

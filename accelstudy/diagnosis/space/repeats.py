@@ -7,15 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Spaces, even
-from accelstudy.diagnosis.space.residuals import ABSORBED, Residuals
+from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
-
-SAME_ATTITUDE = 0.05
-"""Positions closer than this (chord of unit vectors) repeat each other, as those do that a person
-turns back to by eye. What the model says of them may differ; of what it lacks, such as a square or
-a cube of the force, they differ by some percent of it, which the test of lack of fit can bear."""
 
 
 def lack_of_fit(residuals: Residuals, forces: Array) -> LackOfFit | None:
@@ -70,7 +66,7 @@ class LackOfFit(Spaces):
         weights = np.repeat(inverse, counts, axis=0) @ whitening
         same = cls(order, starts, weights, np.empty((0, 0)), ())
         left, values, _ = np.linalg.svd(same._means(residuals.absorbed.T).T, full_matrices=False)
-        absorbed = left[:, values > ABSORBED]
+        absorbed = left[:, values > RULES.absorbed]
         shares = (even(absorbed.shape[0] - absorbed.shape[1]),)
         return replace(same, absorbed=absorbed, shares=shares)
 
@@ -96,11 +92,11 @@ def clusters(forces: NDArray[np.float64]) -> NDArray[np.int_]:
     # Only positions alike in one coordinate need to be compared.
     order = np.argsort(unit[:, 0], kind="stable")
     x = unit[order, 0]
-    first = np.searchsorted(x, unit[:, 0] - SAME_ATTITUDE)
-    last = np.searchsorted(x, unit[:, 0] + SAME_ATTITUDE, side="right")
+    first = np.searchsorted(x, unit[:, 0] - RULES.same_attitude)
+    last = np.searchsorted(x, unit[:, 0] + RULES.same_attitude, side="right")
     for i in range(len(unit)):
         if labels[i] < 0:
             near = order[first[i] : last[i]]
             near = near[labels[near] < 0]
-            labels[near[np.linalg.norm(unit[near] - unit[i], axis=1) < SAME_ATTITUDE]] = i
+            labels[near[np.linalg.norm(unit[near] - unit[i], axis=1) < RULES.same_attitude]] = i
     return labels

@@ -28,12 +28,6 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-VISIBLE = 3e-3
-"""An effect is invisible where the model absorbs all but this share of its signature."""
-
-ABSORBED = 1e-2
-"""A direction counts as absorbed by the model if less than this share of it is left."""
-
 
 @dataclass(frozen=True)
 class Residuals:

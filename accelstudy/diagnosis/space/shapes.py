@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.diagnosis.space.signatures import Columns
@@ -41,8 +42,6 @@ Array = NDArray[np.float64]
 
 DIRECTIONS, SOME = 12, 60
 """Functions of the direction of gravity for each axis, and directions that they are made of."""
-SURVIVES = 3e-3
-"""Share of a shape that the model must leave, or the shape is not seen."""
 KEPT, LEAST = 24, 2e-3
 """Directions of a shape that are kept at most, and the least share of the trace of each."""
 
@@ -93,7 +92,7 @@ class LearnedShapes(Shapes):
         for kind, (place, rows, priors) in enumerate(_functions(frame, only)):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
-            for prior in priors[priors @ left > SURVIVES * (priors @ whole)]:
+            for prior in priors[priors @ left > RULES.visible_shape * (priors @ whole)]:
                 used = prior > LEAST * prior.max()
                 places.append(place)
                 kinds.append(kind)
@@ -136,7 +135,7 @@ class LearnedShapes(Shapes):
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
         left = self.vectors - basis @ (basis.T @ self.vectors)
         roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
-        seen = [i for i, root in enumerate(roots) if np.sum(root**2) > SURVIVES]
+        seen = [i for i, root in enumerate(roots) if np.sum(root**2) > RULES.visible_shape]
         places, weights = [self.places[i] for i in seen], self.prior[seen]
         return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
 
