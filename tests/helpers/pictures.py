@@ -43,7 +43,7 @@ REPORTS = {
 BATCH = ("report-batch", (1000, 680))
 OF_STUDIES = {
     "report-claims": ("claims.html", (1000, 890)),
-    "report-explorer": ("explorer.html", (1100, 1085)),
+    "report-explorer": ("explorer.html", (1100, 1360)),
 }
 """Pictures of the pages of a study."""
 DRAWN = {
@@ -165,6 +165,9 @@ def photograph(browser, page, picture, size):
     """Take the top of a page as a picture of few colours."""
     tab = browser.new_page(viewport=dict(zip(("width", "height"), size, strict=True)))
     tab.goto(page.resolve().as_uri())
+    if tab.locator("#parameters").count():  # the table that a script of the page fills last
+        tab.wait_for_selector("#parameters tbody tr")
+        tab.wait_for_timeout(1000)
     tab.screenshot(path=picture)
     tab.close()
     Image.open(picture).convert("RGB").quantize(128).save(picture, optimize=True)

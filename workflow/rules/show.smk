@@ -41,7 +41,6 @@ rule page:
     conda:
         "../envs/accelstudy.yaml"
     params:
-        figures=FIGURES,
         study=SHOWN,
         angle_unit=UNIT,
         version=VERSION,
