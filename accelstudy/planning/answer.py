@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
 from accelstudy.planning.candidates import Candidate, candidates
-from accelstudy.planning.optimised import Sought, cheapest
-from accelstudy.planning.question import ROBOT, Equipment, Question
+from accelstudy.planning.optimised import Sought, by_time, cheapest, effort
+from accelstudy.planning.question import ROBOT, Question
 from accelstudy.planning.simulated import Simulated, simulate, study_of
 
 SHOWN = 8
@@ -88,16 +88,16 @@ class Answer:
 
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
-    compared = candidates(question)
-    for equipment in question.equipment:
-        compared += _largest(question, equipment, compared, question.confidence)
-    simulation = Simulation(question, question.confidence, seed, replicates)
+    confidence = question.confidence
+    compared = _with_most_positions(question, candidates(question), confidence)
     kinds: dict[tuple[str, str], list[Candidate]] = {}
-    for c in _good(question, compared, question.confidence):
+    for c in compared:
         kinds.setdefault(c.kind, []).append(c)
-    best = by_time(cheapest(question, kind, question.confidence) for kind in kinds.values())
+    quickest = (cheapest(question, kind, confidence) for kind in kinds.values())
+    simulation = Simulation(question, confidence, seed, replicates)
     ranked: list[Ranked] = []
-    for candidate in track(_in_front(best), "simulated calibrations"):
+    in_front = _in_front(by_time(c for c in quickest if c is not None))
+    for candidate in track(in_front, "simulated calibrations"):
         checked = [r.candidate.equipment.name for r in ranked if r.simulated]
         if len(checked) >= SIMULATED and candidate.equipment.name in checked:
             ranked.append(Ranked(candidate))
@@ -110,40 +110,36 @@ def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     compared += [r.candidate for r in ranked if r.candidate not in compared]
     plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates, beside)
     same = replace(question, equipment=(plan.first.candidate.equipment,))
-    other = OTHER_CONFIDENCE if question.confidence is None else None
-    stricter = [c for c in compared if c.equipment in same.equipment]
-    stricter += _largest(same, same.equipment[0], stricter, other)
-    reaching = _good(same, stricter, other)
-    simulation = Simulation(same, other, seed, replicates)
-    confirmed = simulation.confirmed(cheapest(same, reaching, other)) if reaching else None
-    return replace(plan, stricter=confirmed)
+    other = OTHER_CONFIDENCE if confidence is None else None
+    alike = _with_most_positions(
+        same, [c for c in compared if c.equipment in same.equipment], other
+    )
+    stricter = cheapest(same, alike, other)
+    if stricter is None:
+        return plan
+    return replace(plan, stricter=Simulation(same, other, seed, replicates).confirmed(stricter))
 
 
-def _good(
-    question: Question, compared: Iterable[Candidate], confidence: float | None
+def _with_most_positions(
+    question: Question, compared: Sequence[Candidate], confidence: float | None
 ) -> list[Candidate]:
-    """Candidates that reach the target by linear theory, by time."""
-    return by_time(c for c in compared if c.reaches(question.target, confidence))
+    """Candidates, and calibrations in as many of the best positions as are allowed.
 
-
-def _largest(
-    question: Question,
-    equipment: Equipment,
-    compared: Iterable[Candidate],
-    confidence: float | None,
-) -> list[Candidate]:
-    """Calibration in as many of the best positions as are allowed, if no known scheme suffices."""
-    possible = [c for c in compared if c.equipment == equipment]
-    if not possible or any(c.reaches(question.target, confidence) for c in possible):
-        return []
-    best = min(possible, key=lambda c: c.accuracy(confidence))
-    sought = Sought(question, equipment, best.model.name, best.hold)
-    return list(filter(None, [sought.candidate(sought.most)]))
+    There is one for each equipment with which no candidate reaches the target.
+    """
+    more: list[Candidate | None] = []
+    for equipment in question.equipment:
+        possible = [c for c in compared if c.equipment == equipment]
+        if possible and not any(c.reaches(question.target, confidence) for c in possible):
+            best = min(possible, key=lambda c: c.accuracy(confidence))
+            sought = Sought(question, equipment, best.model.name, best.hold)
+            more.append(sought.candidate(sought.most))
+    return [*compared, *(c for c in more if c is not None)]
 
 
 def _shown(ranked: list[Ranked]) -> list[Ranked]:
     """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
-    ranked = sorted(ranked, key=lambda r: _effort(r.candidate))
+    ranked = sorted(ranked, key=lambda r: effort(r.candidate))
     others = [r for r in ranked if r.simulated is None]
     left_out = others[max(0, SHOWN - len(ranked) + len(others)) :]
     return [r for r in ranked if r not in left_out]
@@ -154,29 +150,17 @@ def _with_a_robot(question: Question) -> Candidate | None:
     if any(equipment.name != "gravity" for equipment in question.equipment):
         return None
     robot = replace(question, equipment=(ROBOT,))
-    good = _good(robot, candidates(robot), question.confidence)
-    return cheapest(robot, good, question.confidence) if good else None
+    return cheapest(robot, candidates(robot), question.confidence)
 
 
 def _beside(question: Question) -> Candidate | None:
     """Calibration with a sensor beside it, by linear theory; see `Answer`."""
     if question.beside is None:
         return None
-    alone = replace(question, equipment=(question.beside,))
-    compared = candidates(alone)
-    compared += _largest(alone, question.beside, compared, question.confidence)
-    if good := _good(alone, compared, question.confidence):
-        return cheapest(alone, good, question.confidence)
-    return min(compared, key=lambda c: c.accuracy(question.confidence), default=None)
-
-
-def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
-    """Candidates by the time they take."""
-    return sorted(unsorted, key=_effort)
-
-
-def _effort(candidate: Candidate) -> tuple[float, float, int]:
-    return candidate.seconds, candidate.rms, candidate.model.n_parameters
+    alone, confidence = replace(question, equipment=(question.beside,)), question.confidence
+    compared = _with_most_positions(alone, candidates(alone), confidence)
+    most_accurate = min(compared, key=lambda c: c.accuracy(confidence), default=None)
+    return cheapest(alone, compared, confidence) or most_accurate
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from accelstudy.drawing.style import (
     log_ticks,
     new_figure,
 )
-from accelstudy.planning.answer import Answer, Ranked, by_time
+from accelstudy.planning.answer import Answer, Ranked
 from accelstudy.planning.candidates import Candidate
+from accelstudy.planning.optimised import by_time
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 

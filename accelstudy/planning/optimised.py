@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -117,28 +117,48 @@ class Sought:
         return found
 
 
-def cheapest(question: Question, good: Sequence[Candidate], confidence: float | None) -> Candidate:
+def cheapest(
+    question: Question, compared: Iterable[Candidate], confidence: float | None
+) -> Candidate | None:
     """Cheapest calibration: a known one, or one in the fewest of the best positions.
 
     Parameters
     ----------
     question : Question
-    good : candidates with one equipment that reach the target, by time; their models are tried
+    compared : candidates with one equipment; models and holds of those that reach the target by
+        linear theory are tried
     confidence : float, optional, see `Question`
+
+    Returns
+    -------
+    Candidate, or None if none reaches the target
     """
-    best, hopes = good[0], []
-    for model, hold in dict.fromkeys((c.model.name, c.hold) for c in good):
-        first = next(c for c in good if (c.model.name, c.hold) == (model, hold))
-        sought = Sought(question, first.equipment, model, hold)
-        n = first.scheme.n_positions * (first.accuracy(confidence) / question.target) ** 2
+    first: dict[tuple[str, float], Candidate] = {}
+    for c in by_time(c for c in compared if c.reaches(question.target, confidence)):
+        first.setdefault((c.model.name, c.hold), c)
+    best, hopes = next(iter(first.values()), None), []
+    for (model, hold), c in first.items():
+        sought = Sought(question, c.equipment, model, hold)
+        n = c.scheme.n_positions * (c.accuracy(confidence) / question.target) ** 2
         likely, least = (max(sought.least, math.ceil(part * n)) for part in (USUALLY, AT_LEAST))
-        hopes.append((first.equipment.seconds(likely, hold), least, likely, sought))
+        hopes.append((c.equipment.seconds(likely, hold), least, likely, sought))
     for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
+        assert best is not None
         if sought.equipment.seconds(least, sought.hold) <= best.seconds:
             no_longer = replace(question, most_seconds=best.seconds)  # else it is not the cheapest
             fewest = replace(sought, question=no_longer).fewest(confidence, likely)
-            best = min(filter(None, [best, fewest]), key=lambda c: (c.seconds, c.rms))
+            best = by_time(filter(None, [best, fewest]))[0]
     return best
+
+
+def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates by the time they take."""
+    return sorted(unsorted, key=effort)
+
+
+def effort(candidate: Candidate) -> tuple[float, float, int]:
+    """What to sort candidates by: the time they take, and what they leave after it."""
+    return candidate.seconds, candidate.rms, candidate.model.n_parameters
 
 
 def is_best(scheme: Scheme) -> bool:

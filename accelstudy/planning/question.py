@@ -8,19 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
-from accelstudy.adjustment import whitened_jacobian
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
+from accelstudy.design.estimability import estimability
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import Noise
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
@@ -178,16 +175,13 @@ def _of_calibration(path: Path) -> ReferenceSensor:
 def _alike(sheet: DataSheet) -> ReferenceSensor:
     model, scheme = get_model(OF_ALIKE[0]), get_scheme(OF_ALIKE[1])
     noise = Noise(sheet.sigma_mean(USUAL_HOLD))
-    ideal = np.zeros(model.n_parameters)
-    observed = session(model, ideal, scheme.directions, STANDARD_GRAVITY).observations(noise)
-    rows = whitened_jacobian(model, get_approach("gravity"), observed, ideal)
     return ReferenceSensor(
         calibration=ALIKE,
         frame="frd",
         sigma_mps2=noise.sigma_force,
         effects=[effect.spec for effect in model.effects],
-        parameters=ideal.tolist(),
-        covariance=np.linalg.inv(rows.T @ rows).tolist(),
+        parameters=[0.0] * model.n_parameters,
+        covariance=estimability(scheme, model, get_approach("gravity"), noise).cofactors.tolist(),
     )
 
 

@@ -1,16 +1,16 @@
-"""Reasons of a plan: what the model needs, what would spoil it, and what use adds."""
+"""Reasons of a plan: what limits it, what would spoil it, and what use adds."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from accelstudy.effects import get_effect
 from accelstudy.planning.candidates import Candidate, information_of, names_of
-from accelstudy.planning.question import Question, Size
+from accelstudy.planning.question import Question
 from accelstudy.planning.theory import NOISE, OF_RIG, Expected, theory_of
 
 PLAIN = {
@@ -25,28 +25,6 @@ PLAIN = {
     "gravity_error": "wrong value of gravity",
 }
 """Effects in plain words."""
-
-
-@dataclass(frozen=True)
-class Need:
-    """Whether an effect of the sensor must be in the model.
-
-    Attributes
-    ----------
-    effect : str
-    size : Size
-    in_model : bool
-    left : float, rad, rms that neglecting the effect adds; NaN if the positions cannot show it
-    cost : float, rad, rms that noise adds if the effect is estimated; NaN if it cannot be
-    verdict : "needed", "worth it", "of no use" or "not needed"
-    """
-
-    effect: str
-    size: Size
-    in_model: bool
-    left: float
-    cost: float
-    verdict: str
 
 
 @dataclass(frozen=True)
@@ -106,8 +84,7 @@ def limits(question: Question, candidate: Candidate) -> str:
     noise = parts.pop(NOISE)
     by_words = {f"neglected {PLAIN[effect]}": square for effect, square in parts.items()}
     if candidate.equipment.name == "robot":
-        perfect = replace(question, sigma_angle=1e-12)
-        quiet = _expected(perfect, candidate, names_of(candidate.model))
+        quiet = _expected(replace(question, sigma_angle=1e-12), candidate, {})
         robot = noise - (0.0 if quiet is None else quiet.squares[NOISE][worse])
         by_words["noise of the robot's angles"], noise = robot, noise - robot
     walk = question.sheet.velocity_random_walk
@@ -116,31 +93,6 @@ def limits(question: Question, candidate: Candidate) -> str:
         by_words["wander of the sensor's bias"], noise = noise * (1 - white), noise * white
     by_words["noise of the sensor"] = noise
     return max(by_words, key=lambda words: by_words[words])
-
-
-def needs(question: Question, candidate: Candidate) -> list[Need]:
-    """Say for each effect of the sensor whether the model needs it to reach the target."""
-    effects, judged = names_of(candidate.model), []
-    for effect, size in question.sizes.items():
-        if size.value == 0:
-            continue
-        others = [name for name in effects if name != effect]
-        alone = _expected(question, candidate, others)
-        more = _expected(question, candidate, [*others, effect])
-        left = cost = math.nan
-        if alone is not None:
-            left = float(np.sqrt(alone.squares[effect].max()))
-        if more is not None:
-            quieter = np.zeros(2) if alone is None else alone.squares[NOISE]
-            cost = float(np.sqrt(np.maximum(more.squares[NOISE] - quieter, 0.0).max()))
-        verdict = "worth it" if left > cost else "not needed"
-        if effect in effects:
-            fails = alone is None or not replace(candidate, expected=alone).reaches(
-                question.target, question.confidence
-            )
-            verdict = "needed" if fails else "worth it" if left > cost else "of no use"
-        judged.append(Need(effect, size, effect in effects, left, cost, verdict))
-    return judged
 
 
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
@@ -153,7 +105,7 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects += OF_RIG
     else:
         effects.append("gravity_error")
-    expected = _expected(question, candidate, inside, dict.fromkeys(effects, 1.0))
+    expected = _expected(question, candidate, dict.fromkeys(effects, 1.0))
     assert expected is not None
     sizes = []
     for effect in effects:
@@ -169,16 +121,12 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
 
 
 def _expected(
-    question: Question,
-    candidate: Candidate,
-    effects: Iterable[str],
-    sizes: Mapping[str, float] | None = None,
+    question: Question, candidate: Candidate, sizes: Mapping[str, float]
 ) -> Expected | None:
-    """Errors in the positions of a candidate with other effects; see `Theory.expected`."""
-    theory = theory_of(question.tilt_range)
-    directions = candidate.scheme.directions
+    """Errors in the positions of a candidate beside effects of other sizes."""
+    theory, directions = theory_of(question.tilt_range), candidate.scheme.directions
     told = information_of(question, candidate.equipment, theory, directions, candidate.sigma)
-    return theory.expected(told, effects, question.neglectable if sizes is None else sizes)
+    return theory.expected(told, names_of(candidate.model), sizes)
 
 
 def in_use(

@@ -8,13 +8,13 @@ from __future__ import annotations
 import shlex
 
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display
-from accelstudy.basics.wording import amount, interval, number, words
+from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.pages import lines
 from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.planning.candidates import Candidate, shortest
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.question import Question
-from accelstudy.planning.reasons import PLAIN, in_use, limits, needs, spoilers, unit_of
+from accelstudy.planning.reasons import PLAIN, in_use, limits, spoilers, unit_of
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
@@ -57,14 +57,13 @@ def how_to(answer: Answer) -> list[str]:
 
 
 def reason_lines(answer: Answer) -> list[str]:
-    """What the model of the first candidate needs, what would spoil it, and what use adds."""
+    """What would spoil a calibration of the first candidate, and what use adds."""
     question, candidate = answer.question, answer.first.candidate
     return lines(
         SENTENCES,
         "reasons",
         answer,
         angle_note(),
-        needs(question, candidate),
         spoilers(question, candidate),
         in_use(question),
         PLAIN,
@@ -74,7 +73,11 @@ def reason_lines(answer: Answer) -> list[str]:
 
 def assumption_lines(question: Question) -> list[str]:
     """Assumptions of the plan."""
-    typical = [PLAIN[e] for e, size in question.sizes.items() if size.source == "typical"]
+    typical = [
+        f"{PLAIN[effect]} ({quantity_text(size.value, unit_of(effect))})"
+        for effect, size in question.sizes.items()
+        if size.source == "typical"
+    ]
     return lines(SENTENCES, "assumptions", question, typical)
 
 

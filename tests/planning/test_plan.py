@@ -30,14 +30,13 @@ from accelstudy.planning.answer import answer
 from accelstudy.planning.candidates import NINE, candidates, names_of
 from accelstudy.planning.optimised import Sought
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
-from accelstudy.planning.reasons import in_use, limits, needs, spoilers
+from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
 from accelstudy.planning.theory import theory_of
 from accelstudy.planning.wording import (
     answer_lines,
     effort,
     positions_command,
-    reason_lines,
     table_lines,
     unreachable,
 )
@@ -232,8 +231,6 @@ def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipm
     assert best.equipment == equipment
     assert 0 < best.rms < 100 * MGON
     assert limits(question, best)
-    for need in needs(question, best):
-        assert need.verdict
     assert all(spoiler.size > 0 for spoiler in spoilers(question, best))
     assert in_use(question).reading > 0
 
@@ -256,14 +253,6 @@ def test_neglected_effects_decide_the_model():
     result = answer(asked(bent, equipment=(BY_HAND,)), replicates=500)
     names = [effect.name for effect in result.first.candidate.model.effects]
     assert {"quadratic_scale", "cubic_scale"} <= set(names)
-    verdicts = {n.effect: n.verdict for n in needs(result.question, result.first.candidate)}
-    assert verdicts["quadratic_scale"] == "needed"
-    text = "\n".join(reason_lines(result))
-    assert "quadratic nonlinearity (3536 ppm, data sheet): must be in the model" in text
-    straight = replace(bent, nonlinearity=1e-6)
-    small = {n.effect: n for n in needs(asked(straight), _candidate(asked(straight)))}
-    assert small["quadratic_scale"].verdict == "not needed"
-    assert small["quadratic_scale"].cost > small["quadratic_scale"].left
 
 
 def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
