@@ -11,10 +11,9 @@ calibration are correlated, which `accelstudy.leveling.shares` takes into accoun
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -180,38 +179,51 @@ def leveling_sensitivity(
         output, roll_gon, pitch_gon, input, total_effect, ci95, sd_output_mgon, defined; where the
         output has no variance the total effect is NaN and `defined` False.
     """
-    names, u = list(FORCES), 0
-    if model is not None:
-        names += model.parameter_names
-        u = model.n_parameters
-    x = np.zeros(u) if parameters is None else parameters
-    sigma = np.concatenate(
-        [np.full(3, sigma_force), np.zeros(u) if sigma_parameters is None else sigma_parameters]
-    )
-    rows: list[pd.DataFrame] = []
+    names = [*FORCES, *(() if model is None else model.parameter_names)]
+    x = np.zeros(len(names) - 3) if parameters is None else parameters
+    no_sigma = np.zeros_like(x) if sigma_parameters is None else sigma_parameters
+    sigma = np.concatenate([np.full(3, sigma_force), no_sigma])
+    effects = []
     for roll, pitch in product(roll_gon, pitch_gon):
         attitude = np.array([roll * GON, pitch * GON])
         f_s = np.array(specific_force(attitude[0], attitude[1], g))
         if model is not None:
             f_s = model.sense(f_s[None], x, g)[0]
-        total, ci95, sd = total_effects(
-            leveled(attitude, model, g),
-            np.concatenate([f_s, x]),
-            sigma,
-            base_samples,
-            resamples,
-            seed,
-        )
-        for k, output in enumerate(OUTPUTS):
-            columns: dict[str, Any] = {
-                "output": output,
-                "roll_gon": float(roll),
-                "pitch_gon": float(pitch),
-                "input": names,
-                "total_effect": total[k],
-                "ci95": ci95[k],
-                "sd_output_mgon": sd[k] / MGON,
-                "defined": bool(np.isfinite(total[k]).all()),
-            }
-            rows.append(pd.DataFrame(columns))
-    return pd.concat(rows, ignore_index=True)
+        of_inputs, mean = leveled(attitude, model, g), np.concatenate([f_s, x])
+        effects.append(total_effects(of_inputs, mean, sigma, base_samples, resamples, seed))
+    total, ci95, sd = (np.array(each) for each in zip(*effects, strict=True))
+    return effects_table(roll_gon, pitch_gon, names, sd, {"total_effect": total, "ci95": ci95})
+
+
+def effects_table(
+    roll_gon: Sequence[float],
+    pitch_gon: Sequence[float],
+    names: Sequence[str],
+    sd: Array,
+    effects: Mapping[str, Array],
+) -> pd.DataFrame:
+    """Effects of d inputs on roll and pitch over a grid of a attitudes, a row each.
+
+    Parameters
+    ----------
+    roll_gon, pitch_gon : the grid
+    names : of the inputs
+    sd : (a, 2) array, rad, of roll and of pitch
+    effects : mapping of column to (a, 2, d) array; NaN where they are not defined
+    """
+    grid = pd.MultiIndex.from_product(
+        [[*product(map(float, roll_gon), map(float, pitch_gon))], OUTPUTS, names],
+        names=["attitude", "output", "input"],
+    ).to_frame(index=False)
+    defined = np.isfinite(next(iter(effects.values()))).all(axis=2)
+    return pd.DataFrame(
+        {
+            "output": grid["output"],
+            "roll_gon": grid["attitude"].str[0],
+            "pitch_gon": grid["attitude"].str[1],
+            "input": grid["input"],
+            **{column: each.ravel() for column, each in effects.items()},
+            "sd_output_mgon": np.repeat(sd.ravel() / MGON, len(names)),
+            "defined": np.repeat(defined.ravel(), len(names)),
+        }
+    )

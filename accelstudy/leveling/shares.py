@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force, tilt_by_output, tilt_slope
-from accelstudy.leveling.sensitivity import FORCES, NEGLIGIBLE_VARIANCE, OUTPUTS
+from accelstudy.leveling.sensitivity import FORCES, NEGLIGIBLE_VARIANCE, effects_table
 from accelstudy.leveling.shapley import linear_shapley
 from accelstudy.sensors.sensor import SensorModel
 
@@ -96,22 +96,8 @@ def leveling_shares(
     linear = (variance <= LINEAR_UP_TO**2).all(axis=1, keepdims=True)
     defined = linear & (variance > NEGLIGIBLE_VARIANCE)
     shares[~defined] = total[~defined] = np.nan
-    labels = pd.MultiIndex.from_product(
-        [list(product(map(float, roll_gon), map(float, pitch_gon))), OUTPUTS, names],
-        names=["attitude", "output", "input"],
-    ).to_frame(index=False)
-    return pd.DataFrame(
-        {
-            "output": labels["output"],
-            "roll_gon": labels["attitude"].str[0],
-            "pitch_gon": labels["attitude"].str[1],
-            "input": labels["input"],
-            "shapley_effect": shares.ravel(),
-            "total_effect": total.ravel(),
-            "sd_output_mgon": np.repeat(np.sqrt(variance).ravel() / MGON, len(names)),
-            "defined": np.repeat(defined.ravel(), len(names)),
-        }
-    )
+    effects = {"shapley_effect": shares, "total_effect": total}
+    return effects_table(roll_gon, pitch_gon, names, np.sqrt(variance), effects)
 
 
 def overtaken(table: pd.DataFrame) -> pd.DataFrame:
