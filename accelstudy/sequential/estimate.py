@@ -100,7 +100,6 @@ def estimate(
     observed: Observations,
     prior: Prior = NOTHING_KNOWN,
     initial: Array | None = None,
-    before: Estimate | None = None,
 ) -> Estimate:
     """Estimate the parameters of sessions from their positions so far.
 
@@ -114,8 +113,6 @@ def estimate(
         What is known before the first position.
     initial : (u,) array, SI, optional
         First values of the parameters; the mean of the prior by default.
-    before : Estimate, optional
-        The same sessions with fewer positions. It saves time, and changes nothing.
 
     Raises
     ------
@@ -135,15 +132,11 @@ def estimate(
 
     rows = np.zeros((sessions, 0, u)) if n == 0 else problem.rows(start)
     information = weights + np.swapaxes(rows, 1, 2) @ rows
-    solved = np.zeros(sessions, dtype=bool) if before is None else before.solved.copy()
-    if redundancy >= 0:
-        solved |= has_full_rank(information)
+    solved = has_full_rank(information) & (redundancy >= 0)
     parameters, omega = np.full((sessions, u), np.nan), np.full(sessions, np.nan)
     if n == 0:
         parameters[solved], omega[solved] = direct[solved], 0.0
     elif solved.any():
-        if before is not None:
-            start = np.where(before.solved[:, None], before.parameters, start)
         result = replace(
             problem,
             observed=tuple(each[solved] for each in problem.observed),

@@ -101,8 +101,8 @@ def simulate(
     -------
     DataFrame
         A row for each session, angles in rad: the number of positions; the rms of roll and pitch
-        by the true noise, and the actual error of its calibration; the shares of intervals that
-        contain the truth.
+        that it claims, the one by the true noise, and the actual error of its calibration; the
+        shares of intervals that contain the truth.
     """
     cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
     error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
@@ -131,7 +131,7 @@ def _simulate(
     truth = np.exp(rng.uniform(low, high, (sessions, len(low))))
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
-    so_far, last = _estimate(approach, forces, angles, None), None
+    so_far, last = _estimate(approach, forces, angles), None
     rms, going, ended = np.full((sessions, 2), np.inf), np.ones(sessions, dtype=bool), []
     for n in range(1, most + 1):
         chosen = chooser.choose(so_far.information, so_far.solved, rms, last)
@@ -144,13 +144,14 @@ def _simulate(
         angle = angle + MODEL.reading_errors(angle, truth) + NOISE.sigma_angle * noise[1]
         forces = np.concatenate([forces, force], axis=1)
         angles = np.concatenate([angles, angle], axis=1)
-        so_far = _estimate(approach, forces, angles, so_far)
+        so_far = _estimate(approach, forces, angles)
         ok, rms = so_far.solved, np.full((sessions, 2), np.inf)
         rms[ok] = chooser.rms(so_far.cofactors[ok], so_far.omega[ok], so_far.redundancy)
         kept = chooser.promise.reached(rms)
         over = np.flatnonzero(going & (kept | (n == most)))
         if len(over):
             outcome = _outcome(chooser, rule, so_far, truth, over)
+            outcome[["claimed_roll", "claimed_pitch"]] = rms[over]
             ended.append(outcome.assign(kept=kept[over]))
             going[over] = False
             if not going.any():
@@ -158,10 +159,10 @@ def _simulate(
     return pd.concat(ended).sort_index()
 
 
-def _estimate(approach: str, forces: Array, angles: Array, before: Estimate | None) -> Estimate:
+def _estimate(approach: str, forces: Array, angles: Array) -> Estimate:
     sigmas = NOISE.sigma_force, NOISE.sigma_angle
     observed = Observations(forces, sigmas[0], angles, sigmas[1], STANDARD_GRAVITY)
-    return estimate(MODEL, get_approach(approach), observed, before=before)
+    return estimate(MODEL, get_approach(approach), observed)
 
 
 def _outcome(

@@ -40,10 +40,10 @@ def test_each_position_gives_the_calibration_of_all_positions_so_far(case):
     name, approach, noise = CASES[case]
     model, approach = get_model(name), get_approach(approach)
     sessions = observed(model, Noise(**noise))
-    so_far, compared = None, 0
+    compared = 0
     for n in range(N + 1):
         part = sessions.take(np.arange(n))
-        so_far = estimate(model, approach, part, before=so_far)
+        so_far = estimate(model, approach, part)
         assert so_far.n_positions == n
         if so_far.redundancy < 0:
             assert not so_far.solved.any()
