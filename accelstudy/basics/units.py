@@ -27,6 +27,20 @@ MGON = 1e-3 * GON
 STANDARD_GRAVITY = 9.80665
 """m/s²"""
 
+_FORCES = {
+    "mm/s^2": 1e-3,
+    "m/s^2": 1.0,
+    "mg": 1e-3 * STANDARD_GRAVITY,
+    "ug": 1e-6 * STANDARD_GRAVITY,
+    "g": STANDARD_GRAVITY,
+}
+
+
+def _per(unit: str, *forces: str) -> dict[str, float]:
+    """Sizes of units of a specific force per another unit, which is the SI unit."""
+    return {f"{force}/{unit}": _FORCES[force] for force in forces}
+
+
 UNITS: dict[str, dict[str, float]] = {
     "rad": {
         "mgon": MGON,
@@ -49,24 +63,9 @@ UNITS: dict[str, dict[str, float]] = {
         "d": 86400.0,
     },
     "kg": {"kg": 1.0, "g": 1e-3},
-    "m/s^2": {
-        "mm/s^2": 1e-3,
-        "m/s^2": 1.0,
-        "mg": 1e-3 * STANDARD_GRAVITY,
-        "ug": 1e-6 * STANDARD_GRAVITY,
-        "g": STANDARD_GRAVITY,
-    },
-    "m/s^2/K": {
-        "mm/s^2/K": 1e-3,
-        "m/s^2/K": 1.0,
-        "mg/K": 1e-3 * STANDARD_GRAVITY,
-        "ug/K": 1e-6 * STANDARD_GRAVITY,
-    },
-    "m/s^2/K^2": {
-        "mm/s^2/K^2": 1e-3,
-        "m/s^2/K^2": 1.0,
-        "mg/K^2": 1e-3 * STANDARD_GRAVITY,
-    },
+    "m/s^2": _FORCES,
+    "m/s^2/K": _per("K", "mm/s^2", "m/s^2", "mg", "ug"),
+    "m/s^2/K^2": _per("K^2", "mm/s^2", "m/s^2", "mg"),
     "1/K": {"ppm/K": 1e-6, "%/K": 1e-2, "1/K": 1.0},
     "m/s^2/s": {
         "mm/s^2/h": 1e-3 / 3600,
@@ -79,17 +78,12 @@ UNITS: dict[str, dict[str, float]] = {
         "mg/g^2": 1e-3 / STANDARD_GRAVITY,
     },
     "m/s^2/sqrt(Hz)": {
-        "ug/sqrt(Hz)": 1e-6 * STANDARD_GRAVITY,
-        "mg/sqrt(Hz)": 1e-3 * STANDARD_GRAVITY,
-        "mm/s^2/sqrt(Hz)": 1e-3,
-        "m/s^2/sqrt(Hz)": 1.0,
+        **_per("sqrt(Hz)", "ug", "mg", "mm/s^2", "m/s^2"),
         "m/s/sqrt(h)": 1.0 / 60,
         "mm/s/sqrt(h)": 1e-3 / 60,
     },
     "m/s^2/sqrt(s)": {
-        "ug/sqrt(s)": 1e-6 * STANDARD_GRAVITY,
-        "mm/s^2/sqrt(s)": 1e-3,
-        "m/s^2/sqrt(s)": 1.0,
+        **_per("sqrt(s)", "ug", "mm/s^2", "m/s^2"),
         "mm/s^2/sqrt(h)": 1e-3 / 60,
     },
     "K": {"K": 1.0, "degC": 1.0},

@@ -221,13 +221,11 @@ class Exclusion(Block):
     reason: Annotated[str, Field(min_length=1)] = Field(description="why it is left out")
 
 
-def _iso(value: Any) -> Any:
+def _date(value: Any) -> Any:
     """Date as text; YAML makes dates of what looks like one."""
-    return value.isoformat() if isinstance(value, calendar_date) else value
-
-
-def _is_date(text: str) -> str:
-    read_date(text)
+    text = value.isoformat() if isinstance(value, calendar_date) else value
+    if isinstance(text, str):
+        read_date(text)
     return text
 
 
@@ -237,7 +235,7 @@ class Header(Block):
     schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
     name: Annotated[str, Field(min_length=1)] = Field(description="of the campaign, any text")
     sensor: str | None = Field(None, description="what was calibrated, any text")
-    date: Annotated[str, BeforeValidator(_iso), AfterValidator(_is_date)] | None = Field(
+    date: Annotated[str, BeforeValidator(_date)] | None = Field(
         None, description="when it was measured, as 2026-03-01 or 2026-03-01T14:00"
     )
     unit: Literal["m/s^2", "g", "mg", "counts"] = Field(

@@ -233,16 +233,6 @@ def test_bad_files(tmp_path):
         open_log(tmp_path / "new.mat")
 
 
-def test_a_matlab_file_that_does_not_fit(tmp_path, monkeypatch):
-    def full(*arguments, **options):
-        raise MemoryError
-
-    savemat(tmp_path / "log.mat", {"log": TABLE})
-    monkeypatch.setattr("scipy.io.loadmat", full)
-    with pytest.raises(InputError, match="too large, as a MATLAB file is held in memory"):
-        open_log(tmp_path / "log.mat", **BY_PLACE)
-
-
 def test_only_the_chosen_array_is_read(tmp_path, monkeypatch):
     savemat(tmp_path / "log.mat", {"log": TABLE, "other": 1j * FORCES, "name": "x", "none": []})
     with pytest.raises(InputError, match="which array"):

@@ -49,10 +49,8 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
         return path
     path = Path(path)
     with readable(path):
-        is_bag = (path / BAG_OF_FOLDER).is_file()
-    if is_bag:
-        return open_bag(path, variable)
-    with readable(path):
+        if (path / BAG_OF_FOLDER).is_file():
+            return open_bag(path, variable)
         if not (path.is_file() or path.is_dir()) and path.stat():
             raise InputError(
                 f"{path}: a pipe or a device, and a log is read more than once; save it in a file"

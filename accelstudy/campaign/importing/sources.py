@@ -608,10 +608,6 @@ def open_matlab(path: Path, variable: str | None = None) -> TableSource:
         raise
     except NotImplementedError:
         raise InputError(f"{path}: a MATLAB 7.3 (HDF5) file; save it with -v7") from None
-    except MemoryError:
-        raise InputError(
-            f"{path}: too large, as a MATLAB file is held in memory; save it as text or Parquet"
-        ) from None
     except Exception as error:  # SciPy's reader fails in many ways on a damaged file
         raise InputError(f"{path}: not a whole MATLAB file ({one_line(error)})") from None
 
@@ -643,17 +639,15 @@ LogFile: TypeAlias = str | Path | TableSource
 """Where a log is: the path of a file, or a table in memory."""
 
 
-def since(values: NDArray[Any], zero: Any) -> Array:
-    """Numbers as floats, counted from `zero`, one of them; whole numbers as integers."""
-    if values.dtype.kind in "iu" and isinstance(zero, np.integer):
-        return (values.astype(np.int64) - zero.astype(np.int64)).astype(float)
-    return values.astype(float) - float(zero)
-
-
 def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
-    """Numbers counted from the first of them, and that first one; NaN if there is none."""
+    """Numbers counted from the first of them, and that first one; NaN if there is none.
+
+    Whole numbers, such as times in ns, are counted as integers.
+    """
     zero = next(iter(values[np.isfinite(values)]), np.nan)
-    return since(values, zero), float(zero)
+    if values.dtype.kind in "iu" and isinstance(zero, np.integer):
+        return (values.astype(np.int64) - zero.astype(np.int64)).astype(float), float(zero)
+    return values.astype(float) - float(zero), float(zero)
 
 
 def is_stamp(text: str) -> bool:
