@@ -213,24 +213,10 @@ def written(folder, name):
 
 @pytest.mark.parametrize("name", ["log.csv", "log.txt", "log.mat", "packed.mat", "log.parquet"])
 @settings(max_examples=20)
-@given(damage=damages(), means=st.booleans())
-def test_damaged_log(name, damage, means):
-    columns = "fx=0,fy=1,fz=2"
-    with TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        path = written(folder, name)
-        path.write_bytes(damage(path.read_bytes()))
-        one_line_at_most(
-            folder,
-            *("import", path, "--out", folder / "out", "--no-figure", "--columns", columns),
-            *(["--means"] if means else ["--rate", 10, "--threshold", 10]),
-        )
-
-
-@pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
-@settings(max_examples=30)
-@given(damage=damages() | edits(), wanted=st.sampled_from(["out.csv", "out.parquet"]))
-def test_damaged_log_to_be_leveled(calibration, name, damage, wanted):
+@given(
+    damage=damages() | edits(), means=st.booleans(), wanted=st.sampled_from(["a.csv", "a.parquet"])
+)
+def test_damaged_log(calibration, name, damage, means, wanted):
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "calibration.json").write_text(json.dumps(calibration), encoding="utf-8")
@@ -240,6 +226,12 @@ def test_damaged_log_to_be_leveled(calibration, name, damage, wanted):
             path.write_bytes(damage(content))
         except UnicodeDecodeError:  # words of a binary file
             return
+        one_line_at_most(
+            folder,
+            *("import", path, "--out", folder / "out", "--no-figure"),
+            *("--columns", "fx=0,fy=1,fz=2"),
+            *(["--means"] if means else ["--rate", 10, "--threshold", 10]),
+        )
         one_line_at_most(
             folder, *("apply", folder / "calibration.json", path, "--out", folder / wanted)
         )
