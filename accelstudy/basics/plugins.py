@@ -34,6 +34,7 @@ LARGEST = 1_000_000
 """Bytes of the largest file of code."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
+_warn_once = cache(warn)
 _files: dict[str, str] = {}
 """Digest by name, of the files that are loaded."""
 _loading: list[str] = []
@@ -123,11 +124,6 @@ def _missing(content: Mapping[str, Any], source: str | Path) -> list[str]:
                 f"{digest}, and is {there} now"
             )
     return missing
-
-
-@cache
-def _warn_once(text: str) -> None:
-    warn(text)
 
 
 def _load_file(path: Path) -> None:
