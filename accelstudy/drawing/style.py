@@ -47,6 +47,7 @@ STYLE: Style = {
     "axes.titley": 1,
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.03,
+    "figure.labelsize": 8,
     "figure.titlesize": 9,
     "font.family": "DejaVu Sans",
     "font.size": 8,
@@ -204,16 +205,16 @@ def new_figure(width: float, height_mm: float) -> Figure:
     return Figure(figsize=(width, height_mm * MM), layout="constrained")
 
 
-def log_ticks(axis: Axis, low: float, high: float) -> None:
-    """Ticks of a logarithmic axis from `low` to `high`: a few, all of them labelled."""
+def log_ticks(axis: Axis, low: float, high: float, *, few: bool = False) -> None:
+    """Ticks of a logarithmic axis from `low` to `high`: some or very few, all of them labelled."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
     if high / low > 100:
-        locator: Locator = LogLocator()
-    elif high / low > 4:
-        locator = LogLocator(subs=(1, 2, 5))
+        locator: Locator = LogLocator(numticks=9)
+    elif high / low > (10 if few else 4):
+        locator = LogLocator(subs=(1, 3) if few else (1, 2, 5))
     else:
-        locator = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+        locator = MaxNLocator(2 if few else 4, steps=[1, 2, 2.5, 5, 10])
     axis.set_major_locator(locator)
     axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
@@ -228,14 +229,16 @@ def spread(places: NDArray[np.float64], apart: float) -> list[int]:
     return chosen
 
 
-def legend_columns(labels: Iterable[str]) -> int:
-    """Number of columns in which the longest label of a legend fits the width of a figure."""
+def legend_columns(labels: Iterable[str], width: float = FULL) -> int:
+    """Number of columns of a legend that fit the width of a figure, inches."""
     from matplotlib.textpath import TextPath
 
     size = STYLE["legend.fontsize"]
-    longest = max(TextPath((0, 0), label, size=size).get_extents().width for label in labels)
     # Handle and spaces take about as much as seven letters m.
-    return max(1, int(170.0 / (longest * 25.4 / 72 + 7 * size * 25.4 / 72)))
+    extents = [TextPath((0, 0), label, size=size).get_extents().width for label in labels]
+    columns = [extent + 7 * size for extent in extents]
+    room = 72 * (width - 5 * MM)
+    return len(columns) if sum(columns) < room else max(1, int(room / max(columns)))
 
 
 def say_empty(ax: Axes, text: str = "no estimable cell") -> None:

@@ -20,7 +20,7 @@ import json
 import sys
 
 from accelstudy.study.config import read_study
-from accelstudy.study.figures import captions, draw, figure_names, figure_tables
+from accelstudy.study.figures import caption, draw, figure_names, get_figure
 
 study = read_study("config/config.yaml")
 found = {"figures": figure_names(study)}
@@ -33,8 +33,8 @@ from accelstudy.commands.main import main
 from accelstudy.study.claims.verdicts import claim_table, judge_claim
 from accelstudy.study.claims.quantities import Evidence
 
-found["captions"] = captions(found["figures"], study)
-found["tables"] = figure_tables("tilt-over-condition")
+found["captions"] = {name: caption(name, study) for name in found["figures"]}
+found["tables"] = get_figure("tilt-over-condition").tables
 cells = pd.DataFrame({"cell": ["a", "b"], "approach": "gravity", "condition": [2.0, 3.0]})
 leveling = pd.DataFrame({"cell": ["a"], "roll_rms_mgon": [10.0]})
 (ax,) = draw("tilt-over-condition", {"cells": cells, "leveling": leveling}, study).axes

@@ -47,9 +47,12 @@ def test_what_differs_from_zero_is_a_number_and_the_rest_a_limit(empirical):
     assert at_most == pytest.approx(0.02638 / min(empirical, 10), rel=1e-3)
     assert limit == pytest.approx(2.638 * 2e-3, rel=1e-3)
     assert least == pytest.approx(2 * np.sqrt(0.01 / limit))
-    figure = draw(NAME, made, make_study())
-    whites = [line for line in figure.axes[1].get_lines() if line.get_markerfacecolor() == "white"]
-    assert sum(len(line.get_xdata()) for line in whites) == (empirical < 10)
+    axes = draw(NAME, made, make_study()).axes
+    assert [ax.get_xlabel() for ax in axes] == [
+        *("|bias| / sd", "|variance / linear theory − 1|", "sensor noise for 1 % / mm/s²")
+    ]
+    marks = [line.get_marker() for line in axes[2].get_lines() if len(line.get_xdata()) == 1]
+    assert marks == ["o", ">"]
 
 
 def test_it_is_drawn_where_linear_theory_knows_what_is_simulated():

@@ -1,6 +1,6 @@
 rule figure:
     input:
-        unpack(lambda w: {name: f"{RESULTS}/{name}.parquet" for name in figure_tables(w.figure)}),
+        unpack(lambda w: {t: f"{RESULTS}/{t}.parquet" for t in get_figure(w.figure).tables}),
     output:
         svg=report(
             f"{RESULTS}/figures/{{figure}}.svg",
@@ -16,7 +16,7 @@ rule figure:
     conda:
         "../envs/accelstudy.yaml"
     params:
-        caption=lambda wildcards: captions([wildcards.figure], STUDY)[wildcards.figure],
+        caption=lambda wildcards: caption(wildcards.figure, STUDY),
         study=SHOWN,
         angle_unit=UNIT,
         version=VERSION,

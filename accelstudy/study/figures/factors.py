@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
-from accelstudy.basics.units import MGON, display_unit, to_display, unit_label
+from accelstudy.basics.units import MGON, shown_unit, to_display
 from accelstudy.schemes import scheme_names
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from accelstudy.study.config import Study
+from accelstudy.study.figures.registry import DataFrame, Study
 
 
 @dataclass(frozen=True)
@@ -42,6 +36,17 @@ class Factor:
         values = np.asarray(values, dtype=float)
         return values if self.unit == "1" else to_display(values * self.size, self.unit)
 
+    @property
+    def shown_unit(self) -> str:
+        """Unit shown to people; empty for a number."""
+        return "" if self.unit == "1" else shown_unit(self.unit)
+
+    @property
+    def label(self) -> str:
+        """Label of an axis."""
+        unit = f"/ {self.shown_unit}" if self.shown_unit else ""
+        return " ".join(filter(None, [self.title, self.symbol, unit]))
+
 
 NOISES = (
     Factor("sensor-noise", "sensor_sigma_mps2", "sensor noise", "$\\sigma_f$", 1.0, "m/s^2"),
@@ -53,163 +58,63 @@ POSITIONS = Factor("positions", "n_positions", "number of positions", "$n$")
 FACTORS = (*NOISES, POSITIONS)
 
 
-@dataclass(frozen=True)
-class Level:
-    """The value at which a block holds a factor, of those that the study has.
-
-    Attributes
-    ----------
-    value : float, as in the tables
-    others : tuple of float, the other values of the study
-    usual : bool, whether it is the study's default; else it is the middle value
-    """
-
-    value: float
-    others: tuple[float, ...] = ()
-    usual: bool = True
-
-
-@dataclass(frozen=True)
-class Block:
-    """Cells that differ in one factor, and in model, scheme and approach.
-
-    Attributes
-    ----------
-    levels : dict of column to `Level`, of all other factors
-    cells : DataFrame, one row per cell, with `x` (as in the tables) and `subject` (its scheme, or
-        its family of schemes where the number of positions varies)
-    """
-
-    levels: dict[str, Level]
-    cells: pd.DataFrame = field(repr=False)
-
-    @property
-    def series_of_cells(self) -> list[tuple[str, str]]:
-        """Model and subject of each cell; each pair is a line."""
-        return list(zip(self.cells["model"], self.cells["subject"], strict=True))
-
-    @property
-    def series(self) -> list[tuple[str, str]]:
-        """All different series, in order."""
-        return list(dict.fromkeys(self.series_of_cells))
-
-
-def cell_table(study: Study) -> pd.DataFrame:
-    """One row per cell of a study; the robot's noise is NaN where no robot is used."""
-    import pandas as pd  # slow, and not needed by studies that vary nothing
-
-    table = pd.DataFrame([cell.labels for cell in study.cells])
-    uses_robot = np.array([cell.conditions.uses_angles for cell in study.cells])
-    robot = table["robot_sigma_mgon"].where(uses_robot)
-    return table.assign(
-        robot_sigma_mgon=robot.round(9),
-        family=table["scheme"].map(family),
-        n_positions=[cell.positions.n_positions for cell in study.cells],
-    )
-
-
 def varies(study: Study, factor: Factor) -> bool:
     """Whether a study has cells that differ in one factor alone."""
-    return bool(blocks(study, factor))
+    return _may_vary(study, factor) and not swept(study, factor).empty
 
 
-def blocks(study: Study, factor: Factor) -> list[Block]:
-    """Cells over one factor, in blocks that hold all others at the same levels.
+def swept(study: Study, factor: Factor) -> DataFrame:
+    """Cells that differ in one factor, and in model, scheme and approach.
 
-    For each model and scheme, another factor is held at the study's default. If this factor does
-    not vary at the default, the middle level is taken (of an even number the lower middle one).
+    For each model and scheme, another factor is held at the level at which this one takes the most
+    values; of several such levels, at the one nearest to the study's default.
+
+    Returns
+    -------
+    DataFrame
+        A row per cell: `cell`, `model`, `approach`, `subject` (the scheme, or its family where the
+        number of positions varies), `held` (the levels of the other factors, as a text) and `x`,
+        the factor as in the tables; NaN where the approach does not use it.
     """
-    if not (_names_sizes(study) if factor is POSITIONS else _lists_values(study, factor)):
-        return []
     import pandas as pd
 
-    table = cell_table(study)
-    by = "family" if factor is POSITIONS else "scheme"
-    usual = {
-        "sensor_sigma_mps2": study.sigma_force,
-        "robot_sigma_mgon": study.noise.robot.sigma_mgon,
-        "gravity_sigma_mps2": study.noise.gravity.sigma_mps2,
-        "gravity_error_mps2": study.noise.gravity.error_mps2,
-    }
-    parts_of: dict[tuple[tuple[str, Level], ...], list[pd.DataFrame]] = {}
-    for (_, subject), rows in table.groupby(["model", by], sort=False):
-        if not _several(rows[factor.column]):
-            continue
-        levels: dict[str, Level] = {}
+    parts = [pd.DataFrame(columns=["cell", "model", "approach", "subject", "held", "x"])]
+    usual = {**study.noise.settings, "sensor_sigma_mps2": study.sigma_force}
+    table = pd.DataFrame([cell.labels for cell in study.cells])
+    uses_robot = np.array([cell.conditions.uses_angles for cell in study.cells])
+    table = table.assign(
+        robot_sigma_mgon=table["robot_sigma_mgon"].where(uses_robot).round(9),
+        n_positions=[cell.positions.n_positions for cell in study.cells],
+        subject=table["scheme"].map(family) if factor is POSITIONS else table["scheme"],
+    )
+    for _, rows in table.groupby(["model", "subject"], sort=False):
+        held = []
         for other in NOISES:
-            if other is not factor:
-                rows = _hold(rows, other, factor, usual[other.column], levels)
-        if _several(rows[factor.column]):
-            rows = rows.assign(x=rows[factor.column], subject=str(subject))
-            parts_of.setdefault(tuple(levels.items()), []).append(rows)
-    return [Block(dict(levels), pd.concat(parts)) for levels, parts in parts_of.items()]
+            counts = rows.groupby(other.column)[factor.column].nunique()
+            if other is factor or counts.empty:  # the robot's noise, where there is no robot
+                continue
+            best = counts.index[counts == counts.max()].to_numpy()
+            level = best[np.abs(best - usual[other.column]).argmin()]
+            rows = rows[(rows[other.column] == level) | rows[other.column].isna()]
+            if level or len(counts) > 1:
+                among = f" (one of {len(counts)})" if len(counts) > 1 else ""
+                held.append(f"{other.title} {other.shown(level):.4g} {other.shown_unit}{among}")
+        if len(set(rows[factor.column].dropna())) > 1:
+            parts.append(rows.assign(x=rows[factor.column], held="\n".join(held)))
+    return pd.concat(parts, ignore_index=True)
 
 
-def _lists_values(study: Study, factor: Factor) -> bool:
-    """Whether the grids list different values of a noise setting; quicker than all cells."""
+def _may_vary(study: Study, factor: Factor) -> bool:
+    """Whether grids name several levels of a factor, which most studies do not: this is quick."""
+    if factor is POSITIONS:  # that all schemes have some of one family does not count
+        named = [[scheme.name for scheme in grid.schemes] for grid in study.grids]
+        chosen = [names for names in named if names != [*scheme_names()]]
+        return any(len(names) > len({*map(family, names)}) for names in chosen)
     values = [getattr(grid, factor.column) for grid in study.all_grids]
     listed = {value for each in values if each is not None for value in each}
     return len(listed) + (None in values) > 1
 
 
-def _names_sizes(study: Study) -> bool:
-    """Whether a grid names schemes of one family; `all` does not count."""
-    named = [[scheme.name for scheme in grid.schemes] for grid in study.grids]
-    return any(
-        len(names) > len(set(map(family, names))) for names in named if names != [*scheme_names()]
-    )
-
-
 def family(scheme: str) -> str:
     """Return the name of a scheme without its number: "fibonacci" of "fibonacci-24"."""
     return re.sub(r"-\d+", "", scheme, count=1)
-
-
-def _several(values: pd.Series) -> bool:
-    return len(values.dropna().unique()) > 1
-
-
-def _hold(
-    rows: pd.DataFrame, other: Factor, factor: Factor, usual: float, levels: dict[str, Level]
-) -> pd.DataFrame:
-    """Rows with `other` at one level, which is added to `levels`."""
-    counts = rows.groupby(other.column)[factor.column].nunique()
-    if counts.empty:  # no robot
-        return rows
-    useful = counts.index[counts > 1] if (counts > 1).any() else counts.index
-    at = np.isclose(useful, usual, rtol=1e-6, atol=0)
-    chosen = float(useful[at][0] if at.any() else useful[(len(useful) - 1) // 2])
-    rest = tuple(float(value) for value in counts.index if value != chosen)
-    levels[other.column] = Level(chosen, rest, usual=bool(at.any()))
-    return rows[(rows[other.column] == chosen) | rows[other.column].isna()]
-
-
-def factor_note(study: Study, factor: Factor) -> str:
-    """Say in a caption what a study holds fixed where it varies a factor."""
-    swept = blocks(study, factor)
-    held = list(dict.fromkeys(text for block in swept if (text := levels_text(block.levels))))
-    return f"Over the {factor.title}, held fixed: " + "; or ".join(held) + "."
-
-
-def levels_text(levels: Mapping[str, Level]) -> str:
-    """Say at which levels a block holds the other factors, and which other levels there are."""
-    return ", ".join(
-        _level_text(factor, levels[factor.column]) for factor in NOISES if factor.column in levels
-    )
-
-
-def _level_text(factor: Factor, level: Level) -> str:
-    def number(value: float) -> str:
-        return f"{factor.shown(value):.4g}"
-
-    text = f"{factor.title} {number(level.value)}"
-    if level.value or level.others:
-        text += f" {unit_label(display_unit(factor.unit))}"
-    if not level.others:
-        return text
-    ran = sorted([level.value, *level.others])
-    if len(ran) > 5:
-        values = f"{len(ran)} from {number(ran[0])} to {number(ran[-1])}"
-    else:
-        values = ", ".join(map(number, ran))
-    return f"{text} ({'default, ' if level.usual else ''}of {values})"

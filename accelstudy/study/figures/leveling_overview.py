@@ -6,34 +6,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from accelstudy.basics.units import GON, attitude_unit, display_unit, to_attitude, to_display
-from accelstudy.drawing.style import HATCH, MISSING, Style, log_ticks, model_title, say_empty, shown
+from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
+from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
-from accelstudy.study.figures.panels import Panel, by_cell, key, matrix, panels, write_values
-from accelstudy.study.figures.registry import Tables, register
+from accelstudy.study.figures.panels import (
+    FAILED,
+    TILTS,
+    by_cell,
+    in_shown_units,
+    key,
+    matrix,
+    panels,
+)
+from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
-    from matplotlib.figure import Figure
+    from matplotlib.cm import ScalarMappable
 
-    from accelstudy.study.config import Study
-
-ANGLES = ("roll", "pitch")
 ROW_MM = 6.0
-NOT_ESTIMABLE: Style = {
-    "facecolor": MISSING,
-    "edgecolor": "#999999",
-    "hatch": HATCH,
-    "linewidth": 0,
-}
 
 
 @register(
-    "leveling-overview",
-    tables=("cells", "leveling"),
+    *("leveling-overview", "cells", "leveling"),
     when=lambda study: not any(varies(study, noise) for noise in NOISES),
 )
 def tilt_errors(tables: Tables, study: Study) -> Figure:
@@ -44,95 +39,65 @@ def tilt_errors(tables: Tables, study: Study) -> Figure:
     (left and right). The upper number is the rms over attitudes and calibrations, which also gives
     the colour; the lower one, the same for roll and pitch, is what both angles stay below in
     95 % of the calibrations: decide by it where one calibration must do. The noise of the leveled
-    reading itself comes on top. Hatched cells cannot be estimated; fields left white are not part
-    of the study. Unless the study says otherwise the simulated sensor has just the effects of the
-    model, so that a larger model faces a more difficult sensor: compare schemes and approaches
+    reading itself comes on top. Crosses are cells that cannot be estimated; empty fields are not
+    part of the study. Unless the study says otherwise the simulated sensor has just the effects of
+    the model, so that a larger model faces a more difficult sensor: compare schemes and approaches
     within a column.
     """
-    from matplotlib.colors import LogNorm
-    from matplotlib.patches import Patch, Rectangle
-
-    table = with_tilt(tables["cells"], tables["leveling"])
+    table = tilt_table(tables)
     schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
-    models = list(dict.fromkeys(table["model"]))
-    approaches = list(dict.fromkeys(table["approach"]))
-    errors = table[[f"{angle}_rms" for angle in ANGLES]].to_numpy(float)
-    errors = errors[np.isfinite(errors)]
-    norm = LogNorm(*np.quantile(errors, (0, 0.97))) if len(errors) else LogNorm(1, 10)
+    models = list(table["model"].unique())
+    titles = [get_scheme(name).title for name in schemes], [*map(style.model_title, models)]
+    low, high = table["rms"].agg(["min", "max"]).fillna(1.0)
+    look: style.Style = {"norm": "log", "vmin": low, "vmax": high, "cmap": "YlGnBu"}
 
-    def draw(ax: Axes, cells: pd.DataFrame) -> None:
-        def square(column: str) -> np.ndarray:
-            numbers = cells.pivot_table(column, "scheme", "model", dropna=False)
-            return numbers.reindex(index=schemes, columns=models).to_numpy(float)
-
-        rms, q95 = square("rms"), square("both_q95")
-        image = matrix(ax, rms, norm=norm, cmap=_light(), aspect="auto")
-        ax.spines[:].set_visible(False)
-        write_values(ax, image, rms, _short, -0.2)
-        write_values(ax, image, np.where(np.isfinite(rms), q95, np.nan), _short, 0.24, 5.8)
-        for scheme, model in cells.loc[cells["rms"].isna(), ["scheme", "model"]].to_numpy():
-            corner = models.index(model) - 0.5, schemes.index(scheme) - 0.5
-            ax.add_patch(Rectangle(corner, 1, 1, **NOT_ESTIMABLE))
-        if not np.isfinite(rms).any():
-            say_empty(ax)
-
-    grid = [
-        [
-            Panel(
-                table[table["approach"] == approach].assign(rms=table[f"{angle}_rms"]),
-                f"{angle}, {approach}",
-            )
-            for approach in approaches
-        ]
-        for angle in ANGLES
-    ]
-    height = 62 + 2 * ROW_MM * max(len(schemes), 4)
-    fig, axes = panels(grid, draw, height, sharex=True, sharey=True)
-    axes[0, 0].set_yticks(range(len(schemes)), [get_scheme(name).title for name in schemes])
-    axes[0, 0].set_xticks(range(len(models)), [model_title(name) for name in models])
-    for ax in axes[-1]:
+    def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
+        rms, both = (
+            rows.pivot_table(name, "scheme", "model", dropna=False)
+            .reindex(index=schemes, columns=models)
+            .to_numpy(float)
+            for name in ("rms", "both")
+        )
+        failed = rows[rows["rms"].isna()]
+        x, y = failed["model"].map(models.index), failed["scheme"].map(schemes.index)
+        ax.plot(x, y, color="#999999", **FAILED)
         ax.tick_params(axis="x", rotation=90)
-    unit = display_unit("rad")
-    if len(errors):
-        largest = f"{to_attitude(study.leveling.max_tilt_gon * GON):g} {attitude_unit()}"
-        label = f"tilt error (rms) at tilts up to {largest} / {unit}"
-        image = axes[0, 0].images[0]
-        bar = fig.colorbar(image, ax=axes, label=label, pad=0.02, aspect=50, extend="max")
-        log_ticks(bar.ax.yaxis, float(norm.vmin or 1), float(norm.vmax or 10))
-    one_reading = float(to_display(study.sigma_force / study.gravity_mps2, "rad"))
-    noise = f"{study.sigma_force * 1e3:.3g} mm/s² and level {one_reading:.1f} {unit}"
-    text: Style = {"linestyle": "", "marker": ""}
-    lines = [
-        f"upper number: rms / {unit}; lower: both angles stay below in 95 % of the calibrations",
-        f"not in it: the noise of a single reading, at {noise}",
+        return matrix(ax, *titles, rms, np.vectorize(_texts)(rms, both), aspect="auto", **look)
+
+    unit, noise = shown_unit("rad"), f"{study.sigma_force * 1e3:.3g} mm/s²"
+    largest = f"{to_attitude(study.leveling.max_tilt_gon * GON):g} {attitude_unit()}"
+    one_reading = f"{to_display(study.sigma_force / study.gravity_mps2, 'rad'):.1f} {unit}"
+    legend = [
+        key("upper number: rms; lower: both stay below in 95 % of the calibrations", linestyle=""),
+        key(f"not in it: a single reading, at {noise} and level {one_reading}", linestyle=""),
+        key("not estimable", **FAILED),
     ]
-    hatched = Patch(**NOT_ESTIMABLE, label="not estimable")
-    handles = [*(key(line, **text) for line in lines), hatched]
-    fig.legend(handles=handles, loc="outside lower center")
-    return fig
+    return panels(
+        table,
+        draw,
+        20 + ROW_MM * max(len(schemes), 4),
+        row="angle",
+        column="approach",
+        title="{angle}, {approach}",
+        colours=f"tilt error (rms) at tilts up to {largest} / {unit}",
+        legend=legend,
+    )
 
 
-def with_tilt(cells: pd.DataFrame, leveling: pd.DataFrame) -> pd.DataFrame:
-    """Cells with the rms of each angle, and the 95 % quantile of both, as shown; NaN if none."""
-    columns = {f"{angle}_rms": f"{angle}_rms_mgon" for angle in ANGLES}
-    columns["both_q95"] = "both_rms_q95_mgon"
-    values = {
-        name: cells["cell"].map(by_cell(leveling, column)).astype(float)
-        for name, column in columns.items()
-    }
-    return cells.assign(**{name: shown(each, "mgon")[0] for name, each in values.items()})
+def tilt_table(tables: Tables) -> DataFrame:
+    """Tilt errors of each cell and angle, as shown: `rms`, and `both`, which 95 % stay below."""
+    import pandas as pd
+
+    both, parts = by_cell(tables["leveling"], "both_rms_q95_mgon"), []
+    for angle in TILTS:
+        rms = by_cell(tables["leveling"], f"{angle}_rms_mgon")
+        cells = tables["cells"][["cell", "scheme", "model", "approach"]]
+        numbers = {"rms": cells["cell"].map(rms), "both": cells["cell"].map(both)}
+        parts.append(cells.assign(angle=angle, unit="mgon", **numbers))
+    return in_shown_units(pd.concat(parts), "rms", "both")
 
 
-def _light() -> Colormap:
-    """Make colours from light to medium, on which dark numbers can be read; dark is beyond."""
-    from matplotlib import colormaps
-    from matplotlib.colors import LinearSegmentedColormap
-
-    whole = colormaps["YlGnBu"]
-    light = LinearSegmentedColormap.from_list("light", whole(np.linspace(0, 0.55, 256)))
-    return light.with_extremes(over=whole(0.9))
-
-
-def _short(value: float) -> str:
-    """One decimal below 100."""
-    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+def _texts(*values: float) -> str:
+    """Numbers below each other, with one decimal below 100."""
+    known = [value for value in values if np.isfinite(value)]
+    return "\n".join(f"{value:.{1 if value < 100 else 0}f}" for value in known)

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from accelstudy.basics.registry import Registry
 from accelstudy.basics.units import angle_note, angles_in, attitude_unit
 from accelstudy.files.outputs import whole_file
 
 if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
     import pandas as pd
-    from matplotlib.figure import Figure
 
-    from accelstudy.study.config import Study
+    import accelstudy.study.config
 
+# What figures are made of. These are only names for type checkers, as the workflow imports all
+# figures whenever it starts: Matplotlib and pandas are imported within functions.
+Axes: TypeAlias = "matplotlib.axes.Axes"
+DataFrame: TypeAlias = "pd.DataFrame"
+Figure: TypeAlias = "matplotlib.figure.Figure"
+Study: TypeAlias = "accelstudy.study.config.Study"
 Tables: TypeAlias = "Mapping[str, pd.DataFrame]"
-Draw: TypeAlias = "Callable[[Tables, Study], Figure]"
-
-TABLES = (
-    *("cells", "summary", "correlations", "leveling", "quantiles"),
-    *("sensitivity", "shapley"),
-)
-"""Names of the tables that a figure may need."""
+Draw: TypeAlias = "Callable[..., Figure]"
 
 _REGISTRY: Registry[FigureEntry] = Registry("figure")
 
@@ -40,9 +42,8 @@ class FigureEntry:
     caption : str, in reStructuredText
     draw : callable, draws it from its tables and the study
     category : str, heading under which a report lists it
-    tables : tuple of str, those of `TABLES` that it draws
+    tables : tuple of str, names of the tables of the study that it draws
     when : callable, whether a study has this figure
-    note : callable, returns what the caption adds for this study
     angles : bool, whether it shows angles; then the caption explains their unit
     """
 
@@ -53,48 +54,36 @@ class FigureEntry:
     category: str
     tables: tuple[str, ...]
     when: Callable[[Study], bool]
-    note: Callable[[Study], str]
     angles: bool
 
 
 def register(
     name: str,
-    *,
-    title: str = "",
-    caption: str = "",
+    *tables: str,
     category: str = "Study",
-    tables: tuple[str, ...] = (),
-    when: Callable[[Study], bool] = lambda study: True,
-    note: Callable[[Study], str] = lambda study: "",
+    when: Callable[[Study], bool] | None = None,
     angles: bool = True,
+    **settings: Any,
 ) -> Callable[[Draw], Draw]:
     """Register the function that draws a figure; parameters as in `FigureEntry`.
 
-    The first line of its docstring is the title and the rest the caption, unless they are given.
-    The workflow imports all figures whenever it starts. So Matplotlib and pandas are imported
-    within functions.
-
-    Raises
-    ------
-    ValueError
-        If the name is taken, or if there is no such table.
+    The first line of its docstring is the title, the rest the caption. Unless `when` says
+    otherwise, studies of the paper have the figures of the category "Paper", and all studies have
+    the others.
+    A function that draws several figures takes `settings`, which its docstring names in braces.
     """
-    if unknown := set(tables) - set(TABLES):
-        raise ValueError(f"figure {name!r}: no such tables: {', '.join(sorted(unknown))}")
 
     def decorate(draw: Draw) -> Draw:
-        head, _, text = cleandoc(draw.__doc__ or "").partition("\n\n")
-        said = title or head.rstrip("."), cleandoc(caption) or text
-        entry = FigureEntry(name, *said, draw, category, tables, when, note, angles)
-        _REGISTRY.add(name, entry)
+        text = cleandoc(draw.__doc__ or "").format(**settings)
+        title, _, caption = text.partition(".\n\n")
+        has_it = when or (lambda study: category != "Paper" or study.paper)
+        drawn = partial(draw, **settings)
+        _REGISTRY.add(
+            name, FigureEntry(name, title, caption, drawn, category, tables, has_it, angles)
+        )
         return draw
 
     return decorate
-
-
-def of_the_paper(study: Study) -> bool:
-    """Whether a study draws the figures of the paper."""
-    return study.paper
 
 
 def get_figure(name: str) -> FigureEntry:
@@ -108,25 +97,16 @@ def figure_names(study: Study | None = None) -> tuple[str, ...]:
     return tuple(sorted(name for name in names if study is None or get_figure(name).when(study)))
 
 
-def figure_tables(*names: str) -> tuple[str, ...]:
-    """Names of the tables that some figures need."""
-    return tuple(dict.fromkeys(table for name in names for table in get_figure(name).tables))
-
-
 def angle_unit(study: Study) -> str:
     """Unit of angles in figures: that of the study or, where it names none, of the user."""
     return study.angle_unit or attitude_unit()
 
 
-def captions(names: Iterable[str], study: Study) -> dict[str, str]:
-    """Captions of figures by their names, with the notes on this study."""
-    texts = {}
+def caption(name: str, study: Study) -> str:
+    """Caption of a figure, with the unit of angles in this study."""
+    figure = get_figure(name)
     with angles_in(angle_unit(study)):
-        for figure in map(get_figure, names):
-            unit = f"{angle_note()}." if figure.angles else ""
-            notes = " ".join(filter(None, [figure.note(study), unit]))
-            texts[figure.name] = "\n".join(filter(None, [figure.caption, notes]))
-    return texts
+        return f"{figure.caption}\n{angle_note()}." if figure.angles else figure.caption
 
 
 def draw(name: str, tables: Tables, study: Study) -> Figure:
@@ -135,7 +115,7 @@ def draw(name: str, tables: Tables, study: Study) -> Figure:
     Parameters
     ----------
     name : str
-    tables : mapping of table name to table, at least those of `figure_tables`
+    tables : mapping of table name to table, at least those that the figure draws
     study : Study
     """
     import matplotlib as mpl
@@ -162,4 +142,4 @@ def write_figure(name: str, tables: Tables, study: Study, folder: str | Path) ->
         error.add_note(f"The figure {name!r} could not be drawn.")
         raise
     with whole_file(rst) as path:
-        path.write_text(f"{captions([name], study)[name]}\n", encoding="utf-8")
+        path.write_text(f"{caption(name, study)}\n", encoding="utf-8")
