@@ -64,7 +64,7 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
     rows = _rows(approaches, "row", alt.EncodingSortField("order", op="min"))
     rows = rows.transform_calculate(
         row="isValid(datum[by]) ? datum[by] : 'without robot'",
-        order="by == 'scheme' ? datum.n : isNumber(datum[by]) ? datum[by] : datum.i",
+        order="by == 'scheme' ? datum.n : isString(datum[by]) ? datum.i : datum[by] || -1",
         alike=f"{alike} && ({same_scheme})",
     )
     rows = rows.encode(
