@@ -53,10 +53,9 @@ def estimates(
 ) -> pd.DataFrame:
     """All estimates of a cell with their standard errors, as a study tabulates them."""
     cell = replace(cell, replicates=replicates, compiled=compiled)
-    replicates = simulate(cell, seed)
-    if plain:
-        replicates = Replicates(replicates.simulated, None)
-    tables = tables_of([statistics(cell, replicates, LEVELING)])
+    made = simulate(cell, seed)
+    made = Replicates.plain(made.simulated) if plain else made
+    tables = tables_of([statistics(cell, made, LEVELING)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 
 

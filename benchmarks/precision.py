@@ -58,7 +58,7 @@ def run(speeds):
 
 def _plain(cell, leveling):
     """Statistics without linear theory."""
-    return statistics(cell, Replicates(simulate(cell, 1).simulated, None), leveling)
+    return statistics(cell, Replicates.plain(simulate(cell, 1).simulated), leveling)
 
 
 def _needed(found, count):

@@ -16,12 +16,12 @@ from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.units import MGON
 from accelstudy.design.estimability import Estimability, estimability
-from accelstudy.effects import HoldConditions
+from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
-from accelstudy.simulation.sessions import BLOCK, Noise, Session, session
+from accelstudy.simulation.sessions import Noise, Session, session
 
 Array = NDArray[np.float64]
 
@@ -95,26 +95,15 @@ class Cell:
     @cached_property
     def ideal(self) -> Session:
         """A session without noise."""
-        return session(
-            self.simulated_model,
-            self.simulated_model.vector(self.truth),
-            self.positions.directions,
-            self.gravity,
-            self.hold,
-        )
+        model, directions = self.simulated_model, self.positions.directions
+        return session(model, model.vector(self.truth), directions, self.gravity, self.hold)
 
     @cached_property
     def estimability(self) -> Estimability:
         """What the positions determine."""
-        return estimability(
-            self.positions,
-            self.estimated_model,
-            self.conditions,
-            self.noise,
-            self.estimated_model.vector(self.truth),
-            self.gravity,
-            self.hold,
-        )
+        set_up = self.positions, self.estimated_model, self.conditions, self.noise
+        truth = self.estimated_model.vector(self.truth)
+        return estimability(*set_up, truth, self.gravity, self.hold)
 
     @cached_property
     def linear_theory(self) -> LinearTheory | None:
@@ -134,19 +123,10 @@ class Cell:
         units = {p.name: p.unit for p in self.estimated_model.parameters}
         return {**units, "g": "m/s^2"} if self.noise.sigma_gravity > 0 else units
 
-    @cached_property
-    def uniform_effects(self) -> dict[str, list[int]]:
-        """Estimated effects whose parameters have one unit, with the numbers of these."""
-        names, uniform = list(self.parameter_units), {}
-        for effect in self.estimated_model.effects:
-            if len({p.unit for p in effect.parameters}) == 1:
-                uniform[effect.spec] = [names.index(p.name) for p in effect.parameters]
-        return uniform
-
-    @property
-    def effect_columns(self) -> list[list[int]]:
-        """Numbers of the parameters of each of these effects."""
-        return list(self.uniform_effects.values())
+    def columns_of(self, effect: str) -> list[int]:
+        """Numbers of the parameters of an effect that is estimated."""
+        names = list(self.parameter_units)
+        return [names.index(parameter.name) for parameter in get_effect(effect).parameters]
 
     @property
     def n_unknowns(self) -> int:
@@ -166,11 +146,6 @@ class Cell:
             "gravity_sigma_mps2": self.noise.sigma_gravity,
             "gravity_error_mps2": self.noise.gravity_error,
         }
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of blocks; the last one may have fewer replicates."""
-        return -(-self.replicates // BLOCK)
 
     def seed(self, seed: int, block: int) -> np.random.SeedSequence:
         """Seed of one block of replicates.

@@ -173,6 +173,10 @@ def _noise_effects(texts: list[str]) -> list[NoiseEffect]:
     return [get_noise_effect(spec) for spec in specs]  # the same one, however it is written
 
 
+def _effects(model: SensorModel | None) -> list[str]:
+    return ["model"] if model is None else _specs(model.effects)
+
+
 def _simulated(effects: list[str]) -> SensorModel | None:
     return None if effects == ["model"] else _composed(effects, "simulated")
 
@@ -193,19 +197,18 @@ def _own_name(name: str) -> str:
 
 Models = Annotated[list[SensorModel], _several(_model, lambda: [*MODELS, *OWN_MODELS.get()])]
 Schemes = Annotated[list[Scheme], _several(get_scheme, scheme_names)]
-Approaches = Annotated[list[Approach], _several(get_approach, approach_names)]
-Composition = Annotated[
-    SensorModel, Written(OneOrMore[str], _composed, lambda model: _specs(model.effects))
-]
-"""A model that is written as a list of effects."""
-Simulated = Annotated[
-    SensorModel | None,
-    Written(
-        OneOrMore[str],
-        _simulated,
-        lambda model: _specs(model.effects) if model else ["model"],
+Approaches = Annotated[
+    list[Approach],
+    _several(get_approach, approach_names),
+    Field(
+        default=["gravity", "robot"],
+        validate_default=True,
+        description="names of approaches, or all",
     ),
 ]
+Composition = Annotated[SensorModel, Written(OneOrMore[str], _composed, _effects)]
+"""A model that is written as a list of effects."""
+Simulated = Annotated[SensorModel | None, Written(OneOrMore[str], _simulated, _effects)]
 
 # --- the blocks ----------------------------------------------------------------------------------
 
@@ -309,11 +312,7 @@ class Grid(Block):
     schemes: Schemes = Field(
         description="schemes: names, YAML files as `accelstudy design` writes them; or all"
     )
-    approaches: Approaches = Field(
-        default=["gravity", "robot"],
-        validate_default=True,
-        description="names of approaches, or all",
-    )
+    approaches: Approaches
     replicates: kinds.Replicates = Field(description="simulated calibrations per cell")
     sensor_sigma_mps2: OneOrMore[kinds.SigmaForce] | None = Field(
         None, description="noise.sensor.sigma_mps2"
@@ -344,11 +343,7 @@ class Presets(Block):
     """The rows of the paper's Table 1, each with its own model and scheme."""
 
     replicates: kinds.Replicates = Field(description="simulated calibrations per row and approach")
-    approaches: Approaches = Field(
-        default=["gravity", "robot"],
-        validate_default=True,
-        description="names of approaches, or all",
-    )
+    approaches: Approaches
 
 
 class LevelingConfig(Block):

@@ -28,10 +28,12 @@ class KnownValues:
     ----------
     cell : Cell
     theory : LinearTheory, of the cell
+    tilt : TiltError; None where its statistics are not asked for
     """
 
     cell: Cell
     theory: LinearTheory
+    tilt: TiltError | None = None
 
     @cached_property
     def bias(self) -> Array:
@@ -54,12 +56,15 @@ class KnownValues:
         root = np.sqrt(2 / r) * ratio * special.hyp1f1(-0.5, r / 2, -offset / 2)
         return np.asarray(root * self.theory.sigma)
 
-    @property
-    def effect_sigma(self) -> Array:
-        """Mean standard deviation a posteriori of the parameters of each effect, (e,)."""
-        return np.array([self.sigma_posteriori[at].mean() for at in self.cell.effect_columns])
+    @cached_property
+    def tilts(self) -> TiltDistribution:
+        """Distribution of the tilt errors."""
+        assert self.tilt is not None
+        u = len(self.tilt.reference)
+        return TiltDistribution(self.tilt, self.theory.covariance[:u, :u])
 
-    def statistics(self, tilts: TiltDistribution) -> dict[str, Array | float]:
+    @property
+    def statistics(self) -> dict[str, Array | float]:
         """Statistics by their names in `accelstudy.study.statistics.STATISTICS`."""
         theory, determined = self.theory, self._determines_factor
         correlation = theory.covariance / np.outer(self.sd, self.sd)
@@ -74,31 +79,27 @@ class KnownValues:
             "coverage": np.where(central, 0.95, np.nan),
             "correlation": correlation[np.tril_indices(len(correlation), -1)],
             "variance_factor": 1 + theory.misfit / theory.redundancy if determined else np.nan,
-            "tilt_rms": np.sqrt(tilts.mean_squares),
+            "tilt_rms": np.sqrt(self.tilts.mean_squares),
         }
 
-    def tilts(self, tilt: TiltError) -> TiltDistribution:
-        """Distribution of the tilt errors."""
-        u = len(tilt.reference)
-        return TiltDistribution(tilt, self.theory.covariance[:u, :u])
-
-    def error_quantiles(self, levels: Array) -> Array:
-        """Quantiles of the errors of the estimates, (u, k)."""
-        return np.asarray(self.bias[:, None] + self.sd[:, None] * special.ndtri(levels))
-
-    def sigma_quantiles(self, levels: Array) -> Array:
-        """Quantiles of the standard deviations a posteriori, (u, k)."""
+    def quantiles(self, levels: Array) -> dict[str, tuple[Array, Array]]:
+        """Quantiles (m, k) of each quantity of a study, and their relative errors."""
         r, factor = self.theory.redundancy, np.full(len(levels), np.nan)
         if self._determines_factor:
             factor = np.sqrt(special.chndtrix(levels, r, self.theory.misfit) / r)
-        return np.outer(self.theory.sigma, factor)
+        error = self.bias[:, None] + self.sd[:, None] * special.ndtri(levels)
+        return {
+            "error": (error, np.zeros_like(error)),
+            "sd_posteriori": (np.outer(self.theory.sigma, factor), np.zeros_like(error)),
+            "tilt": (self.tilts.quantile(levels), self.tilts.relative_error(levels)),
+        }
 
-    def effect_ratio_quantiles(self, other: KnownValues, effect: int, levels: Array) -> Array:
+    def effect_ratio_quantiles(self, other: KnownValues, effect: str, levels: Array) -> Array:
         """Quantiles of the sigma of an effect over that of another, independent cell, (k,)."""
         pair = (self, other)
         if not all(each._determines_factor and each.theory.misfit <= CENTRAL for each in pair):
             return np.full(len(levels), np.nan)
-        sigma, other_sigma = (e.theory.sigma[e.cell.effect_columns[effect]].mean() for e in pair)
+        sigma, other_sigma = (e.theory.sigma[e.cell.columns_of(effect)].mean() for e in pair)
         freedom = self.theory.redundancy, other.theory.redundancy
         return np.asarray(sigma / other_sigma * np.sqrt(special.fdtri(*freedom, levels)))
 

@@ -42,7 +42,7 @@ ESTIMATES = pa.schema(
 """One row per cell, replicate and parameter, SI. Columns that follow from these are not stored: the
 error is estimate − truth, σ̂0² = omega / redundancy, and sigma_posteriori = σ̂0 · sigma_priori
 (`read_estimates` adds them). `linear_estimate` and `linear_omega` are those of linear theory of the
-same noise; null where there is none. Columns that repeat within a replicate hardly
+same noise; NaN where there is none. Columns that repeat within a replicate hardly
 need space."""
 
 
@@ -52,28 +52,33 @@ class Replicates(NamedTuple):
     Attributes
     ----------
     simulated : Block, the calibrations
-    linear : Block, those of linear theory of the same noise; None if there is no linear theory, as
+    linear : Block, those of linear theory of the same noise; NaN if there is no linear theory, as
         the session without noise has no calibration
     """
 
     simulated: Block
-    linear: Block | None
+    linear: Block
 
     @classmethod
     def of(
         cls, simulated: Block, theory: LinearTheory | None, estimates: Array, omega: Array
     ) -> Replicates:
-        """Put estimates (R, u) and Ω (R,) of linear theory, if any, beside calibrations."""
-        if theory is None:
-            return cls(simulated, None)
+        """Put estimates (R, u) and Ω (R,) of linear theory, or NaN, beside calibrations."""
+        sigma = np.full(estimates.shape[1], np.nan) if theory is None else theory.sigma
         linear = replace(
             simulated,
             estimates=estimates,
-            sigma_priori=np.broadcast_to(theory.sigma, estimates.shape),
+            sigma_priori=np.broadcast_to(sigma, estimates.shape),
             omega=omega,
-            converged=np.ones(len(estimates), bool),
+            converged=np.ones(len(omega), bool),
         )
         return cls(simulated, linear)
+
+    @classmethod
+    def plain(cls, simulated: Block) -> Replicates:
+        """Calibrations without linear theory."""
+        nothing = np.full_like(simulated.estimates, np.nan)
+        return cls.of(simulated, None, nothing, nothing[:, 0])
 
 
 def simulate(cell: Cell, seed: int) -> Replicates:
@@ -89,12 +94,12 @@ def simulate(cell: Cell, seed: int) -> Replicates:
     drawn = cell.ideal.draw_blocks(
         cell.noise,
         cell.replicates,
-        range(cell.n_blocks),
+        range(-(-cell.replicates // BLOCK)),
         lambda block: np.random.default_rng(cell.seed(seed, block)),
         BLOCK,
         angles=angles,
     )
-    simulated, estimates, omega = [], [np.empty((0, cell.n_unknowns))], [np.empty(0)]
+    simulated, estimates, omega = [], [], []
     for errors, observed in drawn:
         simulated.append(calibrate(cell.estimated_model, cell.conditions, observed))
         if theory is not None:
@@ -104,8 +109,10 @@ def simulate(cell: Cell, seed: int) -> Replicates:
             shift, of_block = theory.errors(noise, errors.gravity)
             estimates.append(theory.reference + shift)
             omega.append(of_block)
-    both = np.concatenate(estimates), np.concatenate(omega)
-    return Replicates.of(Block.joined(simulated), theory, *both)
+    together = Block.joined(simulated)
+    if theory is None:
+        return Replicates.plain(together)
+    return Replicates.of(together, theory, np.concatenate(estimates), np.concatenate(omega))
 
 
 def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
@@ -117,7 +124,6 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     def coded(codes: Any, names: Any) -> pa.DictionaryArray:
         return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array([*names]))
 
-    nothing = pa.nulls(count * u, pa.float64())
     columns = {
         "cell": coded(np.zeros(count * u), [cell.name]),
         "replicate": np.repeat(np.arange(count), u),
@@ -125,10 +131,10 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
         "unit": coded(parameter, cell.parameter_units.values()),
         "truth": cell.true_values[parameter],
         "estimate": simulated.estimates.ravel(),
-        "linear_estimate": nothing if linear is None else linear.estimates.ravel(),
+        "linear_estimate": linear.estimates.ravel(),
         "sigma_priori": simulated.sigma_priori.ravel(),
         "omega": np.repeat(simulated.omega, u),
-        "linear_omega": nothing if linear is None else np.repeat(linear.omega, u),
+        "linear_omega": np.repeat(linear.omega, u),
         "redundancy": np.full(count * u, simulated.redundancy),
         "iterations": np.repeat(simulated.iterations, u),
         "converged": np.repeat(simulated.converged, u),

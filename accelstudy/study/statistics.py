@@ -50,8 +50,10 @@ deviation of the errors, the mean standard deviations that are stated, `sd_ratio
 posteriori and the sd, share of the nominal 95 % intervals that hold the truth, correlations below
 the diagonal, mean of σ̂0², and the rms of roll and pitch over attitudes and calibrations."""
 
-ERROR, POSTERIORI, TILT = "error", "sd_posteriori", "tilt"
-"""Quantities that have quantiles: of each parameter, and the rms over attitudes of tilt errors."""
+TILT = "tilt"
+QUANTITIES = {"error": "error", "sd_posteriori": "sigma_posteriori", TILT: "tilt"}
+"""Quantities that have quantiles, of each parameter, and of each of `TILTS` the rms over attitudes;
+and the numbers of `calibrations` that they are of."""
 ANGLES = ("roll", "pitch")
 TILTS = (*ANGLES, "both")
 """Names of the tilt errors that have quantiles: of each angle by itself, and of the larger of the
@@ -95,8 +97,9 @@ class CellStatistics:
     @property
     def control(self) -> str:
         """Which control variate the estimates have: `linear` or `none`."""
-        linear = self.replicates is not None and self.replicates.linear is not None
-        return "linear" if linear and self.simulated >= LEAST else "none"
+        if self.replicates is None or self.simulated < LEAST:
+            return "none"
+        return "none" if np.isnan(self.replicates.linear.omega).any() else "linear"
 
     def quantile(self, quantity: str, name: str, level: float) -> Estimates:
         """One quantile; NaN where there is none."""
@@ -119,64 +122,40 @@ def statistics(
     leveling : mapping with max_tilt_gon and attitudes
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
-    simulated, linear = replicates
-    good, count = simulated.converged, int(simulated.converged.sum())
+    good, count = replicates.simulated.converged, int(replicates.simulated.converged.sum())
     if not count:
         return CellStatistics(cell, replicates)
     tilt = cell_tilt_error(cell, leveling)
-    own = calibrations(cell, simulated, tilt)
+    own, theory = (calibrations(cell, block, tilt) for block in replicates)
     at = usual_levels(count) if levels is None else np.asarray(levels, dtype=float)
-    theory, known, known_quantiles = None, {}, {}
-    inexact = np.zeros((len(TILTS), len(at)))
-    if linear is not None and cell.linear_theory is not None:
-        theory, by_theory = calibrations(cell, linear, tilt), KnownValues(cell, cell.linear_theory)
-        tilts = by_theory.tilts(tilt)
-        known = by_theory.statistics(tilts)
-        if len(good) >= LEAST:
-            known_quantiles[ERROR] = by_theory.error_quantiles(at)
-            known_quantiles[POSTERIORI] = by_theory.sigma_quantiles(at)
-            known_quantiles[TILT], inexact = tilts.quantile(at), tilts.relative_error(at)
-
-    def numbers(of: dict[str, Array] | None, names: Sequence[str]) -> Any:
-        return None if of is None else np.hstack([of[name] for name in names])
-
-    def quantiles(quantity: str, column: str, i: int) -> Estimates:
-        beside = None if theory is None else theory[column][:, i]
-        expected = known_quantiles[quantity][i] if known_quantiles else None
-        error = inexact[i] if quantity == TILT else 0.0
-        return controlled_quantiles(at, own[column][:, i], beside, expected, good, error)
-
-    estimates = {
-        name: controlled(
-            statistic, numbers(own, of), numbers(theory, of), known.get(name, np.nan), good
-        )
-        for name, (statistic, of) in STATISTICS.items()
-        if name != "correlation" or count > cell.n_unknowns
-    }
-    columns = {ERROR: "error", POSTERIORI: "sigma_posteriori", TILT: "tilt"}
-    if simulated.redundancy <= 0:
-        del columns[POSTERIORI]
-    return CellStatistics(
-        cell,
-        replicates,
-        estimates,
-        (own["error"][0], own["sigma_posteriori"][0]),
-        at,
-        {
-            (quantity, name): quantiles(quantity, column, i)
-            for quantity, column in columns.items()
-            for i, name in enumerate(TILTS if quantity == TILT else cell.parameter_units)
-        },
-    )
+    known = None if cell.linear_theory is None else KnownValues(cell, cell.linear_theory, tilt)
+    expected = {} if known is None else known.statistics
+    estimates = {}
+    for name, (statistic, numbers) in STATISTICS.items():
+        if name != "correlation" or count > cell.n_unknowns:
+            x, y = (np.hstack([each[number] for number in numbers]) for each in (own, theory))
+            estimates[name] = controlled(statistic, x, y, expected.get(name, np.nan), good)
+    quantiles = {}
+    nothing = np.full((max(len(TILTS), cell.n_unknowns), len(at)), np.nan)
+    by_theory = {} if known is None else known.quantiles(at)
+    for quantity, number in QUANTITIES.items():
+        if np.isnan(own[number]).any():  # sigmas a posteriori need redundancy
+            continue
+        values, errors = by_theory.get(quantity, (nothing, nothing))
+        for i, name in enumerate(TILTS if quantity == TILT else cell.parameter_units):
+            pair = own[number][:, i], theory[number][:, i]
+            quantiles[quantity, name] = controlled_quantiles(at, *pair, values[i], good, errors[i])
+    first = own["error"][0], own["sigma_posteriori"][0]
+    return CellStatistics(cell, replicates, estimates, first, at, quantiles)
 
 
 def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dict[str, Array]:
     """Numbers of the c calibrations that converged, (c, k), SI; NaN what needs redundancy.
 
     They are `error`, `sigma_priori`, `sigma_posteriori` and `inside` of each parameter (the last
-    says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth),
-    `effect_sigma` of each effect, and `variance_factor`. With a `tilt` there are `tilt_squared` of
-    roll and pitch, and `tilt` as in `TILTS`, rms over attitudes.
+    says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth), and
+    `variance_factor`. With a `tilt` there are `tilt_squared` of roll and pitch, and `tilt` as in
+    `TILTS`, rms over attitudes.
     """
     good = block.converged
     freedom = block.redundancy if block.redundancy > 0 else np.nan
@@ -184,13 +163,11 @@ def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dic
     error = block.estimates[good] - cell.true_values
     priori = block.sigma_priori[good]
     posteriori = np.sqrt(factor) * priori
-    effects = [posteriori[:, at].mean(axis=1) for at in cell.effect_columns]
     numbers = {
         "error": error,
         "sigma_priori": priori,
         "sigma_posteriori": posteriori,
         "inside": (np.abs(error) <= sigmas_95(block.redundancy) * posteriori).astype(float),
-        "effect_sigma": np.array(effects).reshape(len(effects), -1).T,
         "variance_factor": factor,
     }
     if tilt is not None:

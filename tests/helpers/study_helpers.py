@@ -51,7 +51,7 @@ def simulated(cell, seed=1):
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, Replicates(simulated(cell, seed), None), LEVELING)
+    return statistics(cell, Replicates.plain(simulated(cell, seed)), LEVELING)
 
 
 def simulate_cells(folder, cells, seed=1, leveling=LEVELING):

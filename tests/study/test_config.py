@@ -51,12 +51,9 @@ def test_overlays_are_valid(path):
     study = read_study(CONFIG, path)
     assert study.study != "paper"
     assert study.cells
+    assert len(OVERLAYS) >= 5
     paper = read_study(CONFIG).sensor
     assert {name: study.sensor[name] for name in paper} == paper
-
-
-def test_there_are_sweeps():
-    assert len(OVERLAYS) >= 5
 
 
 def test_overlay_replaces_lists_and_merges_mappings(tmp_path):
@@ -194,19 +191,14 @@ def test_overlaid_files_are_all_named(tmp_path):
 
 
 def test_one_may_stand_for_a_list():
-    one = make_study(
-        models={"mine": "bias"},
-        simulated_effects="bias",
-        grids=[grid(models="mine", approaches="robot", robot_sigma_mgon=2)],
-    )
-    many = make_study(
-        models={"mine": ["bias"]},
-        simulated_effects=["bias"],
-        grids=[
-            grid(
-                models=["mine"], schemes=["mclaren-24"], approaches=["robot"], robot_sigma_mgon=[2]
-            )
-        ],
+    values = {"models": "mine", "schemes": "rings-24", "approaches": "robot", "robot_sigma_mgon": 2}
+    one, many = (
+        make_study(
+            models={"mine": of("bias")},
+            simulated_effects=of("bias"),
+            grids=[grid(**{key: of(value) for key, value in values.items()})],
+        )
+        for of in (lambda value: value, lambda value: [value])
     )
     assert one == many
     assert one.fingerprint == many.fingerprint

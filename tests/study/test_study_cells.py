@@ -60,11 +60,8 @@ def test_noise_of_a_grid_is_in_the_name_and_in_the_cell():
         f"sensor_sigma_mps2=0.01/robot_sigma_mgon=0/{rest}": Noise(0.01, 0.0, 1e-4, -3e-4),
         f"sensor_sigma_mps2=0.01/{rest}": Noise(0.01, 3.2 * MGON, 1e-4, -3e-4),
     }
-
-
-def test_close_numbers_are_different_cells():
-    cells = make_cells(grid(approaches="gravity", sensor_sigma_mps2=[0.001, 0.0010000001]))
-    assert [cell.noise.sigma_force for cell in cells.values()] == [0.001, 0.0010000001]
+    close = make_cells(grid(approaches="gravity", sensor_sigma_mps2=[0.001, 0.0010000001]))
+    assert [cell.noise.sigma_force for cell in close.values()] == [0.001, 0.0010000001]
 
 
 def test_noise_per_sample():
@@ -116,8 +113,6 @@ def test_presets_are_the_rows_of_table_1():
     study = make_study(grids=[], presets={"replicates": 5, "approaches": "robot"})
     names = [cell.name for cell in study.cells]
     assert sorted(names) == sorted({f"{p.model}/{p.scheme}/robot" for p in PRESETS})
-    for row in ("bias-scale/faces-6/robot", f"{NINE}-quadratic/mclaren-24/robot"):
-        assert row in names
 
 
 def test_cells_fan_out_by_what_they_have_in_common():
@@ -144,20 +139,10 @@ def test_every_cell_and_block_has_its_own_seed():
 def test_more_replicates_extend_the_fewer():
     cell = make_cells(grid(replicates=BLOCK + 30))[ROBOT]
     many = estimates(cell)
-    assert len(many) == BLOCK + 30
+    assert len(many) == len(np.unique(many[:, 0])) == BLOCK + 30
+    assert not np.any(many == estimates(cell, 2))
     for fewer in (1, 20, BLOCK, BLOCK + 1):
         np.testing.assert_array_equal(estimates(replace(cell, replicates=fewer)), many[:fewer])
-
-
-def test_no_two_replicates_are_alike():
-    many = estimates(make_cells(grid(replicates=BLOCK + 30))[GRAVITY])
-    assert len(np.unique(many[:, 0])) == BLOCK + 30
-
-
-def test_another_seed_changes_everything():
-    cell = make_cells(grid())[ROBOT]
-    assert not np.any(estimates(cell, 1) == estimates(cell, 2))
-    np.testing.assert_array_equal(estimates(cell, 1), estimates(cell, 1))
 
 
 def test_cells_are_independent():
@@ -205,9 +190,8 @@ def test_other_cells_and_another_order_change_no_number(base, tmp_path):
     )
 
 
-@pytest.mark.parametrize("pattern", ["{scheme}", "{model}/{scheme}/{approach}"])
-def test_how_cells_fan_out_changes_nothing(base, pattern, tmp_path):
-    other = run_study(tmp_path, pattern, **BASE)
+def test_how_cells_fan_out_changes_nothing(base, tmp_path):
+    other = run_study(tmp_path, "{scheme}", **BASE)
     for name, table in base.items():
         expected = table
         if name == "estimates":  # their categories are those of the file

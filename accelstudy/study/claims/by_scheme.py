@@ -74,23 +74,21 @@ def _single_reductions(
     """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
     pair = (robot, gravity)
     above, below = (_sigmas(cell, both.simulated, effect) for cell, both in pair)
-    n, linear, known = min(len(above), len(below)), None, None
+    n, known = min(len(above), len(below)), None
+    of_theory, of_other = (
+        _sigmas(cell, both.linear, effect)[both.simulated.converged][:n] for cell, both in pair
+    )
     theories = [KnownValues(cell, theory) for cell, _ in pair if (theory := cell.linear_theory)]
     if len(theories) == len(pair):
-        of_theory, of_other = (
-            _sigmas(cell, both.linear, effect)[both.simulated.converged][:n] for cell, both in pair
-        )
-        linear, at = of_theory / of_other, list(robot[0].uniform_effects).index(effect)
-        known = theories[0].effect_ratio_quantiles(theories[1], at, LEVELS)
-    ratio = above[:n] / below[:n]
+        known = theories[0].effect_ratio_quantiles(theories[1], effect, LEVELS)
+    ratio, linear = above[:n] / below[:n], of_theory / of_other
     quantiles = controlled_quantiles(LEVELS, ratio, linear, known)
     high, median, low = 100 * (1 - quantiles.value[[*CENTRAL]])
     share = share_below(1 - paper / 100, ratio, quantiles)
     return {**_ends((low, median, high)), "percentile": float(100 * (1 - share))}
 
 
-def _sigmas(cell: Cell, block: Block | None, effect: str) -> Array:
+def _sigmas(cell: Cell, block: Block, effect: str) -> Array:
     """Mean sigma a posteriori of an effect in each calibration that converged, (c,)."""
-    assert block is not None
-    sigmas = numbers_of(cell, block)["sigma_posteriori"][:, cell.uniform_effects[effect]]
+    sigmas = numbers_of(cell, block)["sigma_posteriori"][:, cell.columns_of(effect)]
     return np.asarray(sigmas.mean(axis=1))
