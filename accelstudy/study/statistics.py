@@ -34,16 +34,16 @@ Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Quantity, and the name of what it is of."""
 
-STATISTICS: dict[str, tuple[Statistic, tuple[str, ...]]] = {
-    "bias": (MEAN, ("error",)),
-    "sd": (SD, ("error",)),
-    "sigma_priori": (MEAN, ("sigma_priori",)),
-    "sigma_posteriori": (MEAN, ("sigma_posteriori",)),
-    "sd_ratio": (RATIO, ("sigma_posteriori", "error")),
-    "coverage": (MEAN, ("inside",)),
-    "correlation": (CORRELATION, ("error",)),
-    "variance_factor": (MEAN, ("variance_factor",)),
-    "tilt_rms": (ROOT_MEAN, ("tilt_squared",)),
+STATISTICS: dict[str, tuple[Statistic, str]] = {
+    "bias": (MEAN, "error"),
+    "sd": (SD, "error"),
+    "sigma_priori": (MEAN, "sigma_priori"),
+    "sigma_posteriori": (MEAN, "sigma_posteriori"),
+    "sd_ratio": (RATIO, "sigma_and_error"),
+    "coverage": (MEAN, "inside"),
+    "correlation": (CORRELATION, "error"),
+    "variance_factor": (MEAN, "variance_factor"),
+    "tilt_rms": (ROOT_MEAN, "tilt_squared"),
 }
 """Each statistic of a cell, and the numbers of `calibrations` that it is of: bias and standard
 deviation of the errors, the mean standard deviations that are stated, `sd_ratio` of those a
@@ -131,10 +131,10 @@ def statistics(
     known = None if cell.linear_theory is None else KnownValues(cell, cell.linear_theory, tilt)
     expected = {} if known is None else known.statistics
     estimates = {}
-    for name, (statistic, numbers) in STATISTICS.items():
+    for name, (statistic, number) in STATISTICS.items():
         if name != "correlation" or count > cell.n_unknowns:
-            x, y = (np.hstack([each[number] for number in numbers]) for each in (own, theory))
-            estimates[name] = controlled(statistic, x, y, expected.get(name, np.nan), good)
+            by = expected.get(name, np.nan)
+            estimates[name] = controlled(statistic, own[number], theory[number], by, good)
     quantiles = {}
     nothing = np.full((max(len(TILTS), cell.n_unknowns), len(at)), np.nan)
     by_theory = {} if known is None else known.quantiles(at)
@@ -153,9 +153,9 @@ def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dic
     """Numbers of the c calibrations that converged, (c, k), SI; NaN what needs redundancy.
 
     They are `error`, `sigma_priori`, `sigma_posteriori` and `inside` of each parameter (the last
-    says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth), and
-    `variance_factor`. With a `tilt` there are `tilt_squared` of roll and pitch, and `tilt` as in
-    `TILTS`, rms over attitudes.
+    says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth),
+    `sigma_and_error` of all parameters after each other, and `variance_factor`. With a `tilt`
+    there are `tilt_squared` of roll and pitch, and `tilt` as in `TILTS`, rms over attitudes.
     """
     good = block.converged
     freedom = block.redundancy if block.redundancy > 0 else np.nan
@@ -167,6 +167,7 @@ def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dic
         "error": error,
         "sigma_priori": priori,
         "sigma_posteriori": posteriori,
+        "sigma_and_error": np.hstack([posteriori, error]),
         "inside": (np.abs(error) <= sigmas_95(block.redundancy) * posteriori).astype(float),
         "variance_factor": factor,
     }
