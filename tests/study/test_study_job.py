@@ -49,17 +49,8 @@ def test_a_job(log, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_bad_input_ends_with_one_line(log, capsys):
-    with pytest.raises(SystemExit) as ended, a_job(log):
-        raise InputError("table.parquet: no such file")
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == "error: table.parquet: no such file\n"
-    text = log.read_text()
-    assert text.rstrip().endswith("ERROR table.parquet: no such file")
-    assert "Traceback" not in text
-
-
 @pytest.mark.parametrize(("error", "message"), [
+    (InputError("table.parquet: no such file"), "table.parquet: no such file"),
     (MemoryError(), "simulate: not enough memory; run fewer jobs at once (--cores 1, or"),
     (OSError(errno.ENOSPC, "Error writing. Detail: [errno 28] No space left on device"),
      "results/tiny/summary.parquet: cannot be written: No space left on device; free some "
@@ -67,12 +58,13 @@ def test_bad_input_ends_with_one_line(log, capsys):
     (OSError(errno.EROFS, "Read-only file system", "results/tiny/.accelstudy-1.part"),
      "results/tiny/summary.parquet: cannot be written: Read-only file system; make it"),
 ])  # fmt: skip
-def test_what_the_machine_lacks_is_one_line(error, message, log, capsys):
+def test_bad_input_and_what_the_machine_lacks_are_one_line(error, message, log, capsys):
     with pytest.raises(SystemExit) as ended, a_job(log):
         raise error
     assert ended.value.code == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"error: {message}")
+    assert f"ERROR {message}" in log.read_text()
     assert "Traceback" not in log.read_text()
 
 
