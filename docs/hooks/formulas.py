@@ -36,27 +36,19 @@ def svg(tex):
     )
 
 
+MARKED = re.compile(r'<(span|div) class="arithmatex">\s*\\[\[(](.*?)\\[\])]\s*</\1>', re.DOTALL)
+"""What arithmatex made of a formula within a line, or of one on lines of its own."""
+
+
 def on_page_content(content, page, **_):
     """Replace the formulas that arithmatex marked; one that cannot be drawn ends the build."""
 
-    def inline(found):
-        return f'<span class="formula">{drawn(found[1])}</span>'
-
-    def block(found):
-        lines = re.split(r"\\\\", html.unescape(found[1]).strip())
-        rows = "".join(f"<span>{drawn(line)}</span>" for line in lines if line.strip())
-        return f'<div class="formula">{rows}</div>'
-
-    def drawn(tex):
-        tex = " ".join(html.unescape(tex).split())
+    def drawn(found):
+        lines = (" ".join(line.split()) for line in html.unescape(found[2]).split(r"\\"))
         try:
-            return svg(tex)
+            rows = "".join(f"<span>{svg(line)}</span>" for line in lines if line)
         except ValueError as error:
-            raise ValueError(f"{page.file.src_uri}: cannot draw ${tex}$: {error}") from None
+            raise ValueError(f"{page.file.src_uri}: cannot draw ${found[2]}$: {error}") from None
+        return f'<{found[1]} class="formula">{rows}</{found[1]}>'
 
-    content = re.sub(
-        r'<span class="arithmatex">\\\((.*?)\\\)</span>', inline, content, flags=re.DOTALL
-    )
-    return re.sub(
-        r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', block, content, flags=re.DOTALL
-    )
+    return MARKED.sub(drawn, content)

@@ -19,31 +19,29 @@ def blocks(schema, title, before=""):
     title : str, of the outermost block
     before : str, what the headings begin with, so that no two of a page are alike
     """
-    parts, seen, places, known = [], set(), {}, schema.get("$defs", {})
+    known = schema.get("$defs", {})
+    parts = [f"## {title}" if title else "", _sentence(schema.get("description", ""))]
+    places = {}
 
     def add(block, name):
         rows, inner = [], []
-        required = block.get("required", ())
         for key, value in block.get("properties", {}).items():
             links = []
-            text = _type(value, known, links)
-            path = f"{before}{name}{key}"
-            inner += [(link, path) for link in links]
+            text, path = _type(value, known, links), f"{before}{name}{key}"
             for link in links:
-                text = text.replace("block", f"[block](#{_anchor(places.setdefault(link, path))})")
+                if link not in places:
+                    places[link] = path
+                    inner.append((path, known[link]))
+                text = text.replace("block", f"[block](#{_anchor(places[link])})")
             meaning = plain(value.get("description", "")) or _about(links, known)
-            rows.append((code(key), text, _default(value, key in required), meaning))
+            default = _default(value, key in block.get("required", ()))
+            rows.append((code(key), text, default, meaning))
         parts.append(table(HEADS, rows))
-        for link, path in inner:
-            if link not in seen:
-                seen.add(link)
-                own = known[link]
-                parts.append(f"### `{path}` {{ #{_anchor(path)} }}")
-                parts.append(_sentence(own.get("description", "")))
-                add(own, f"{path.removeprefix(before)}.")
+        for path, own in inner:
+            parts.append(f"### `{path}` {{ #{_anchor(path)} }}")
+            parts.append(_sentence(own.get("description", "")))
+            add(own, f"{path.removeprefix(before)}.")
 
-    parts.append(f"## {title}" if title else "")
-    parts.append(_sentence(schema.get("description", "")))
     add(schema, "")
     return page(*parts)
 

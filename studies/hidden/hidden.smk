@@ -1,7 +1,5 @@
-# Both studies: their jobs make campaigns and diagnose them, and a score judges the answers. The simulated
-# one, and known effects in the readings of public logs:
-# snakemake --cores 2 --snakefile studies/hidden/hidden.smk --configfile studies/hidden/config/hidden-effects.yaml
-# snakemake --cores 2 --snakefile studies/hidden/hidden.smk --configfile studies/hidden/config/real-noise.yaml
+# Studies of the diagnosis: jobs make campaigns and diagnose them, and a score judges the answers. `make hidden-effects` runs the
+# one that is simulated, `make real-noise` the one with known effects in public logs.
 from studies.hidden.campaigns import parse_hidden
 
 

@@ -52,7 +52,7 @@ KINDS: Mapping[str, tuple[Sequence[str], Callable[[str, str], Collection[str]]]]
     "invisible": (tuple(EFFECTS), invisible_effects),
 }
 """Kinds that each set may have, and those that make sense in a design by an approach."""
-SETS = ("nothing", "two", *KINDS)
+SETS = ("nothing", *KINDS, "two")
 """Blocks of campaigns."""
 
 

@@ -49,7 +49,7 @@ WRONG = [
     ({"one": {"sizes": [25], "campaigns": 0}}, "one.campaigns: must be from 1 to"),
     ({"sigma": "known"}, "sigma: must be 'given' or 'not given', not 'known'"),
     ({"model": "nine"}, "model: unknown model 'nine'"),
-    ({"one": None, "removed": None}, "no campaigns; give at least one of nothing, two"),
+    ({"one": None, "removed": None}, "no campaigns; give at least one of nothing, noise"),
 ]
 
 
