@@ -178,7 +178,7 @@ def shrink(drawn, picture):
     width = Image.open(picture).width
     image = Image.open(drawn).convert("RGB")
     image = image.resize((width, round(image.height * width / image.width)), Image.LANCZOS)
-    image.quantize(128).save(picture, optimize=True)
+    image.quantize(128, method=Image.Quantize.FASTOCTREE).save(picture, optimize=True)
 
 
 def make_anew():
