@@ -172,7 +172,8 @@ class Task:
     def rms_tilt(self, directions: ArrayLike) -> Array:
         """Expected rms of roll and of pitch, rad, (2,), without the noise of the leveled reading.
 
-        Neglected effects contribute as a scatter of their given size.
+        Neglected effects contribute as a scatter of their given size. Infinite where the positions
+        do not determine the model.
         """
         columns = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
         errors = self.information(directions).errors(*columns, self.neglected_sigmas)

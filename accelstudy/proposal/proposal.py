@@ -82,10 +82,8 @@ class Proposal:
     @property
     def reference(self) -> Array | None:
         """The same with the positions of `REFERENCE`; None if these do not determine the model."""
-        directions = get_scheme(REFERENCE).directions
-        if self.request.task.missing(directions):
-            return None
-        return self.request.task.rms_tilt(directions)
+        rms = self.request.task.rms_tilt(get_scheme(REFERENCE).directions)
+        return rms if np.isfinite(rms).all() else None
 
     @property
     def placed(self) -> Array | None:
