@@ -36,7 +36,7 @@ from accelstudy.campaign.calibration.applying import (
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.leveling import level_frame
+from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.output import (
     calibration_content,
     draw_residuals,
@@ -212,7 +212,8 @@ class Calibration(Result):
         at = None if start is None else quantity("start", start, START)
         noise = None if sigma is None else quantity("sigma", sigma, SIGMA_READING)
         file, layout, given = opened.file, opened.layout, opened.table
-        table, leveled = level_frame(self.sensor, file, layout, noise, at, given)
+        leveled = level(self.sensor, file, layout, noise, at)
+        table = leveled.to_frame(given)
         table.attrs["warnings"] = list(leveled.warnings)
         return table
 

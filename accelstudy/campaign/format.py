@@ -96,7 +96,8 @@ def read_campaign(
 
 def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
     """Header of a campaign folder, overlaid key by key with `given`; errors as `read_campaign`."""
-    return _parse_header(overlay(read_layer(folder / HEADER), given or {}), folder / HEADER)
+    path = folder / HEADER
+    return checked(Header, overlay(read_layer(path), given or {}), path)
 
 
 def table_of(folder: Path) -> Path | None:
@@ -122,8 +123,22 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
     InputError
         If the file is missing or incomplete, or a column occurs twice.
     """
-    columns, odd = (_read_csv if path.suffix == ".csv" else _read_parquet)(path)
-    return columns, odd + ignored_in(columns, path)
+    if path.suffix != ".csv":
+        with whole_parquet(path) as file:
+            names = [str(name) for name in file.schema_arrow.names]
+            _check_names(names, path)
+            table = file.read(columns=[name for name in names if name in KNOWN])
+            of_parquet = {n: table[n].to_pylist() if n in KNOWN else () for n in names}
+        return of_parquet, ignored_in(of_parquet, path)
+    try:
+        text = read_text(path)
+    except UnicodeDecodeError as error:
+        raise _not_whole(path, error) from None
+    columns, warnings = columns_of(text, path), []
+    # Half a number is a number, too: if the file was cut there, only the line end is missing.
+    if not text.endswith(("\n", "\r")):
+        warnings = [f"{path}: the last line does not end; check that it is whole"]
+    return columns, warnings + ignored_in(columns, path)
 
 
 def ignored_in(columns: Columns, path: Path) -> list[str]:
@@ -132,20 +147,12 @@ def ignored_in(columns: Columns, path: Path) -> list[str]:
     if len(unknown) > MOST_NAMED:
         first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
         return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]
-    return [_ignored(path, name) for name in unknown]
-
-
-def _read_csv(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of text, and warnings."""
-    try:
-        text = read_text(path)
-    except UnicodeDecodeError as error:
-        raise _not_whole(path, error) from None
-    columns = columns_of(text, path)
-    # Half a number is a number, too: if the file was cut there, only the line end is missing.
-    whole = text.endswith(("\n", "\r"))
-    odd = [] if whole else [f"{path}: the last line does not end; check that it is whole"]
-    return columns, odd
+    said = []
+    for name in unknown:
+        near = get_close_matches(name[:100], KNOWN, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        said.append(f"{path}: column {one_line(repr(name))} is not known and ignored{hint}")
+    return said
 
 
 def columns_of(text: str, path: Path) -> Columns:
@@ -174,25 +181,10 @@ def _not_whole(path: Path, error: Exception) -> InputError:
     return InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})")
 
 
-def _read_parquet(path: Path) -> tuple[Columns, list[str]]:
-    """Columns of Python values, and no warnings; unknown columns are not read."""
-    with whole_parquet(path) as file:
-        names = [str(name) for name in file.schema_arrow.names]
-        _check_names(names, path)
-        table = file.read(columns=[name for name in names if name in KNOWN])
-        return {n: table[n].to_pylist() if n in KNOWN else () for n in names}, []
-
-
 def _check_names(names: Sequence[str], path: Path) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path}: {name!r}: the column stands twice")
-
-
-def _ignored(path: Path, name: str) -> str:
-    near = get_close_matches(name[:100], KNOWN, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"{path}: column {one_line(repr(name))} is not known and ignored{hint}"
 
 
 def write_campaign(
@@ -222,7 +214,7 @@ def write_campaign(
     """
     folder = Path(folder)
     path = folder / f"positions.{table}"
-    header = _parse_header(_content_of(campaign), folder / HEADER)
+    header = checked(Header, _content_of(campaign), folder / HEADER)
     columns = _columns_of(campaign.whole, header)
     parse_table(columns, header, path, plausible)
     try:
@@ -242,10 +234,6 @@ def write_campaign(
             temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
-
-
-def _parse_header(content: dict[str, Any], path: Path) -> Header:
-    return checked(Header, content, path)
 
 
 def parse_table(columns: Columns, header: Header, path: Path, plausible: bool = True) -> Campaign:

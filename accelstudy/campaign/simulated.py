@@ -46,13 +46,12 @@ _RANGES = {
 
 
 @dataclass(frozen=True)
-class CampaignSettings:
+class CampaignSettings(HoldPlan):
     """Settings of a simulated campaign, in SI apart from temperatures in °C.
 
     Parameters
     ----------
     name : str
-    seed : int
     scheme : str
     repeats : int, how often the whole scheme is measured
     repeat_first : int, number of first holds that are measured again at the end
@@ -68,12 +67,11 @@ class CampaignSettings:
     sigma_known : bool, whether the campaign states it
     robot_sigma : float, rad, of the robot's roll and pitch
     gravity : float, m/s²
-    interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
+    interval, temperature, temperature_order, vibration, yaw, seed : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
     """
 
     name: str = "simulated"
-    seed: int = 1
     scheme: str = "mclaren-24"
     repeats: int = 1
     repeat_first: int = 0
@@ -89,13 +87,10 @@ class CampaignSettings:
     robot_sigma: float = 3.2 * MGON
     gravity: float = STANDARD_GRAVITY
     interval: float | None = 60.0
-    temperature: tuple[float, float] | None = None
-    temperature_order: str = "linear"
-    vibration: tuple[float, float] | None = None
-    yaw: str = "none"
     n_samples: int | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.order not in ORDERS:
             raise UnknownNameError("order", self.order, ORDERS)
         for key, allowed in _RANGES.items():
@@ -104,18 +99,6 @@ class CampaignSettings:
         bounds.SIGMA_ANGLE.check_key("robot_sigma", self.robot_sigma / MGON)
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
-
-    @property
-    def holds(self) -> HoldPlan:
-        """Conditions of the holds."""
-        return HoldPlan(
-            self.interval,
-            self.temperature,
-            self.temperature_order,
-            self.vibration,
-            self.yaw,
-            self.seed,
-        )
 
 
 def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
@@ -141,19 +124,21 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
     hidden = _hidden_effects(settings, rng["effects"])
     replaced = {effect.name for effect, _ in hidden}
-    usual = [
-        (effect, _usual_parameters(effect, rng["sensor"]))
-        for effect in get_model(settings.model).effects
-    ]
+    usual = []
+    for effect in get_model(settings.model).effects:
+        # Of random sign, with sizes that are log-uniform between the typical sizes.
+        n, (low, high) = len(effect.parameters), np.log(effect.typical)
+        sizes = np.exp(rng["sensor"].uniform(low, high, n))
+        usual.append((effect, sizes * rng["sensor"].choice([-1.0, 1.0], n)))
     sensor = [(effect, values) for effect, values in usual if effect.name not in replaced]
     present = [*sensor, *hidden]
     model = compose("simulated", tuple(effect.spec for effect, _ in present))
     noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
 
     directions = _directions(settings, rng["order"])
-    hold = settings.holds.hold(len(directions))
+    hold = settings.hold(len(directions))
     for effect, _ in present:
-        if column := settings.holds.missing(effect):
+        if column := settings.missing(effect):
             raise InputError(
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"
@@ -211,13 +196,6 @@ def _hidden_effects(
                 raise InputError(f"effect {text!r}: expected {n} numbers after the colon ({names})")
         effects.append((effect, values))
     return effects
-
-
-def _usual_parameters(effect: Effect, rng: np.random.Generator) -> Array:
-    """Parameters of random sign, with sizes that are log-uniform between the typical sizes."""
-    n = len(effect.parameters)
-    low, high = np.log(effect.typical)
-    return np.asarray(np.exp(rng.uniform(low, high, n)) * rng.choice([-1.0, 1.0], n))
 
 
 def _directions(settings: CampaignSettings, rng: np.random.Generator) -> Array:

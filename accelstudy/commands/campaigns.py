@@ -159,13 +159,14 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
     """Write a log with roll and pitch."""
     from accelstudy.api.logs import layout_of
     from accelstudy.campaign.calibration.applying import read_calibration
-    from accelstudy.campaign.calibration.leveling import level_log
+    from accelstudy.campaign.calibration.leveling import level
 
     given = check(calibrations.apply, given)
     layout = layout_of(given)
     with new_file(out, [calibration, log], force) as path:
         read = read_calibration(calibration)
-        leveled = level_log(read, log, path, layout, given["sigma"], given["start"])
+        leveled = level(read, log, layout, given["sigma"], given["start"])
+        leveled.write(path)
     for warning in leveled.warnings:
         warn(warning)
     click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")

@@ -281,11 +281,7 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
         if out.exists():
             raise InputError(f"{out}: is not a folder")
         return False
-    there = sorted(
-        path.name
-        for path in out.iterdir()
-        if not (path.name.startswith(_PREFIX) and path.name.endswith(_SUFFIX))
-    )
+    there = sorted(path.name for path in out.iterdir() if not is_temporary(Path(path.name)))
     if not there:
         return False
     _check_free(out, map(Path, (kind.marker, *kind.files)), map(Path, kind.folders))

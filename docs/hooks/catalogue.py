@@ -34,43 +34,20 @@ def _equation(text):
     return re.sub(r"_([^\W_²³]+(?:,\w)?)", r"<sub>\1</sub>", text.replace("<", "&lt;"))
 
 
-def _docstring(thing):
-    """What a class says of itself."""
-    return plain(inspect.cleandoc(type(thing).__doc__ or ""))
-
-
-def _settings(thing):
-    rows = []
-    for setting, value in zip(thing.takes, thing.settings.values(), strict=True):
-        least = f"above {setting.above:g}" if math.isfinite(setting.above) else ""
-        most = f"below {setting.below:g}" if math.isfinite(setting.below) else ""
-        rows.append(
-            (
-                code(setting.name),
-                _unit(setting.unit),
-                "drawn" if math.isnan(value) else number(value),
-                ", ".join(filter(None, (least, most))),
-            )
-        )
-    return table(("setting", "unit", "default", "range"), rows) if rows else ""
-
-
-def _effect(effect):
-    unit = effect.parameters[0].unit
-    low, high = map(number, to_display(effect.typical, unit))
-    columns = compose(effect.spec, (effect.spec,)).hold_columns
-    facts = [
-        ("Adds", _equation(effect.equation)),
-        ("Parameters", ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters)),
-        ("Typical size", f"{low} … {high} {unit_label(display_unit(unit))}"),
-        ("Needs of each hold", ", ".join(column for column in columns if column in PROVIDES)),
-        ("Family", effect.family),
-    ]
+def _entry(thing, facts):
+    """What an effect, an error or an approach says of itself, facts about it, and its settings."""
+    settings = []
+    for setting in getattr(thing, "takes", ()):
+        value = thing.settings[setting.name]
+        ends = {"above": setting.above, "below": setting.below}
+        within = ", ".join(f"{w} {end:g}" for w, end in ends.items() if math.isfinite(end))
+        default = "drawn" if math.isnan(value) else number(value)
+        settings.append((code(setting.name), _unit(setting.unit), default, within))
     return page(
-        f"## `{effect.name}`",
-        _docstring(effect),
-        table(("", ""), [(f"**{name}**", value) for name, value in facts if value]),
-        _settings(effect),
+        f"## `{thing.name}`",
+        plain(inspect.cleandoc(type(thing).__doc__ or "")),
+        table(("", ""), [(f"**{name}**", value) for name, value in facts.items() if value]),
+        table(("setting", "unit", "default", "range"), settings) if settings else "",
     )
 
 
@@ -89,7 +66,20 @@ def effects(part):
 
 def each_effect():
     """All effects, one after the other."""
-    return page(*map(_effect, [*_of_part("sensor"), *_of_part("rig")]))
+    parts = []
+    for effect in (*_of_part("sensor"), *_of_part("rig")):
+        unit = effect.parameters[0].unit
+        low, high = map(number, to_display(effect.typical, unit))
+        columns = compose(effect.spec, (effect.spec,)).hold_columns
+        facts = {
+            "Adds": _equation(effect.equation),
+            "Parameters": ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters),
+            "Typical size": f"{low} … {high} {unit_label(display_unit(unit))}",
+            "Needs of each hold": ", ".join(column for column in columns if column in PROVIDES),
+            "Family": effect.family,
+        }
+        parts.append(_entry(effect, facts))
+    return page(*parts)
 
 
 def noise_effects():
@@ -99,25 +89,24 @@ def noise_effects():
         low, high = map(number, effect.typical)
         first = effect.takes[0]
         typical = f"{code(first.name)} is typically {low} … {high} {_unit(first.unit)}".strip()
-        facts = [("**Noise**", _equation(effect.equation)), ("**Typical size**", typical)]
-        text = [_docstring(effect), table(("", ""), facts), _settings(effect)]
-        parts.append(page(f"## `{effect.name}`", *text))
+        parts.append(_entry(effect, {"Noise": _equation(effect.equation), "Typical size": typical}))
     return page(*parts)
 
 
 def gross_errors():
     """Gross errors."""
-    return page(
-        *(
-            page(
-                f"## `{error.name}`",
-                _docstring(error),
-                table(("", ""), [("**Data**", _equation(error.equation))]),
-                _settings(error),
-            )
-            for error in map(get_gross_error, gross_error_names())
-        )
-    )
+    errors = map(get_gross_error, gross_error_names())
+    return page(*(_entry(error, {"Data": _equation(error.equation)}) for error in errors))
+
+
+def approaches():
+    """Approaches."""
+    parts = []
+    for approach in map(get_approach, approach_names()):
+        outside = "roll and pitch" if approach.uses_angles else "none"
+        facts = {"Conditions per position": approach.n_conditions, "Angles from outside": outside}
+        parts.append(_entry(approach, facts))
+    return page(*parts)
 
 
 def models():
@@ -141,27 +130,18 @@ def presets():
 
 def schemes():
     """Schemes."""
-    rows = []
-    for scheme in map(get_scheme, scheme_names()):
-        rows.append(
-            (
-                code(scheme.name),
-                _positions(scheme.directions),
-                scheme.n_positions,
-                scheme.status,
-                f"{scheme.fourth_moment:.4f}",
-                f"{to_attitude(scheme.pole_distance):.1f}",
-                scheme.source,
-            )
-        )
+    rows = [
+        (code(scheme.name), _positions(scheme.directions), scheme.n_positions, scheme.status,
+         f"{scheme.fourth_moment:.4f}", f"{to_attitude(scheme.pole_distance):.1f}", scheme.source)
+        for scheme in map(get_scheme, scheme_names())
+    ]  # fmt: skip
     return table(("scheme", "positions", "n", "status", "m", "pole [gon]", "source"), rows)
 
 
 def families():
     """Families of schemes, each with a member."""
-    return table(
-        ("family", "for example"), [(code(f), code(_member(f))) for f in scheme_families()]
-    )
+    members = {name: name.replace("-N", "-24").replace("-SEED", "-7") for name in scheme_families()}
+    return table(("family", "for example"), [(*map(code, pair),) for pair in members.items()])
 
 
 def _positions(directions):
@@ -178,23 +158,6 @@ def _positions(directions):
         f'<svg class="positions" viewBox="0 0 90 44" role="img" '
         f'aria-label="{len(directions)} positions">{edges}{"".join(dots)}</svg>'
     )
-
-
-def _member(family):
-    name = family.replace("-N", "-24").replace("-SEED", "-7")
-    return get_scheme(name).name
-
-
-def approaches():
-    """Approaches."""
-    parts = []
-    for approach in map(get_approach, approach_names()):
-        facts = [
-            ("**Conditions per position**", approach.n_conditions),
-            ("**Angles from outside**", "roll and pitch" if approach.uses_angles else "none"),
-        ]
-        parts.append(page(f"## `{approach.name}`", _docstring(approach), table(("", ""), facts)))
-    return page(*parts)
 
 
 def data_sheets():

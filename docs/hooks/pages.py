@@ -3,7 +3,6 @@
 import re
 from functools import partial
 
-import architecture
 import catalogue
 import command_pages
 import configuration_page
@@ -35,7 +34,6 @@ PARTS = {
     "approaches": catalogue.approaches,
     "data sheets": catalogue.data_sheets,
     "public data": catalogue.public,
-    "accelstudy and its options": command_pages.own_options,
     "commands": command_pages.commands,
     "configuration": configuration_page.configuration,
     "header of a campaign": file_formats.header,
@@ -45,18 +43,13 @@ PARTS = {
     "other rules of a diagnosis": partial(file_formats.rules, priors=False),
     "terms": terms,
     "figures of a study": gallery.study_figures,
-    "all figures, small": gallery.overview,
-    "drawing of the rooms": architecture.rooms_drawing,
-    "drawing of the rules": architecture.rules_drawing,
-    "table of the rooms": architecture.rooms_table,
 }
 PLACE = re.compile(rf"^<!-- ({'|'.join(PARTS)}) -->$", re.MULTILINE)
 
 
 def on_files(files, config):
     """Add the drawing of a session."""
-    drawn = drawings.svg(drawings.session)
-    files.append(File.generated(config, "drawings/session.svg", content=drawn))
+    files.append(File.generated(config, "drawings/session.svg", content=drawings.session()))
     return files
 
 

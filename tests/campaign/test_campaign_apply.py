@@ -19,7 +19,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.leveling import level_log
+from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import HoldConditions
@@ -49,6 +49,13 @@ def plain(tmp_path_factory):
 def log(tmp_path):
     """Path of a log to be written."""
     return tmp_path / "log.csv"
+
+
+def level_log(calibration, log, out, *given, **options):
+    """Level a log, and write it."""
+    leveled = level(calibration, log, *given, **options)
+    leveled.write(out)
+    return leveled
 
 
 def calibrated_in(table):
@@ -412,7 +419,7 @@ def test_parquet_keeps_its_types(plain, tmp_path):
     ("log.csv", "fx,fy,fz,fz\n1,2,9,9\n", "which column is fz"),
     ("log.csv", "fx,fy,fz\n", "no line of numbers"),
     ("log.csv", "fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n",
-     "about 1.05 m.s.2: these look like g, not m.s.2; give `unit` g"),
+     "about 1.05 m/s²: these look like g, not m.s.2; give `unit` g"),
     ("log.csv", "fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", "these look like counts"),
     ("log.csv", "fx,fy,fz\n" + 2 * "0,0,-30\n" + "1,2,-9\n", "nowhere near gravity"),
     ("log.csv", "a,b,c,d\n1,2,9,9\n", "which column is fx"),

@@ -14,7 +14,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.leveling import level_log
+from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
 from accelstudy.campaign.calibration.wording import interval_words
 from accelstudy.campaign.session import Campaign
@@ -104,7 +104,7 @@ def test_the_intervals_of_a_calibration_hold_95_percent(tmp_path):
     ):  # fmt: skip
         path = tmp_path / f"{name}.json"
         path.write_text(json.dumps(calibration_document(each)), encoding="utf-8")
-        leveled = level_log(read_calibration(path), log, tmp_path / "out.csv")
+        leveled = level(read_calibration(path), log)
         warned = [warning for warning in leveled.warnings if "sigmas" in warning]
         assert len(warned) == bool(said)
         assert all(said in warning for warning in warned)

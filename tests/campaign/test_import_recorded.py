@@ -1,6 +1,5 @@
 """Logs as robots and loggers record them: bags, flight logs, dates, names of ROS, slow rates."""
 
-import bz2
 import struct
 import sys
 from datetime import UTC, datetime, timedelta, timezone
@@ -11,11 +10,9 @@ import pytest
 from calling import refusal, succeed
 from log_helpers import open_log
 from recorded import EPOCH, write_bag, write_ulog
-from rosbags.rosbag2 import storage_mcap
 
 import accelstudy as acs
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing import recorded
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import parse_settings
 
@@ -139,29 +136,11 @@ def ulog(*formats):
     [
         (["sensor_accel:float x;float y;float z;float a;float b;"], "has no field 'timestamp'"),
         (["sensor_accel:uint64_t timestamp;float y;float z;float a;"], "has no field 'x'"),
-        (["a:b[60000] b;", "b:c[60000] c;", "c:float d;", "sensor_accel:a[60000] a;"], "numbers"),
-        (["sensor_accel:sensor_accel[2] a;"], "a message has over 10000 numbers"),
     ],
 )
 def test_a_flight_log_of_odd_messages_is_refused_in_a_line(tmp_path, formats, says):
     (tmp_path / "odd.ulg").write_bytes(ulog(*formats))
     assert says in refusal("import", tmp_path / "odd.ulg", "--out", tmp_path / "out")
-
-
-@pytest.mark.parametrize("packer", ["bz2", "lz4", "zstd"])
-def test_a_packed_chunk_is_read_up_to_a_limit(packer, monkeypatch):
-    pack = {
-        "bz2": bz2.compress,
-        "lz4": pytest.importorskip("lz4.frame").compress,
-        "zstd": storage_mcap.zstd.compress,
-    }[packer]
-    monkeypatch.setattr(recorded, "LARGEST_CHUNK", 10**6)
-    content = 10**5 * b"chunk\n"
-    assert recorded._unpacked(packer)(pack(content)) == content
-    with pytest.raises(ValueError, match="a chunk is over 1 MB"):
-        recorded._unpacked(packer)(pack(10**7 * b"0"))
-    with pytest.raises(ValueError, match="a chunk is cut"):
-        recorded._unpacked(packer)(pack(content)[:-8])
 
 
 @pytest.mark.parametrize(

@@ -24,11 +24,14 @@ RENEWED = "`make hidden-docs`, which takes an hour, makes the score anew"
 SCORE = (DOCS / "guides/hidden-effects-score.md").read_text(encoding="utf-8")
 
 
-def test_the_score_is_that_of_the_study():
+@pytest.mark.parametrize("study", ["hidden-effects", "real-noise"])
+def test_the_score_is_that_of_the_study(study):
     """Of this configuration and, where the study was run here, of this very run."""
-    assert f"configuration `{CONFIG.fingerprint}`, seed {CONFIG.seed}" in SCORE
-    made = ROOT / "results/hidden-effects/score.md"
-    assert not made.exists() or made.read_text(encoding="utf-8") == SCORE
+    config = parse_hidden(read_layer(ROOT / f"studies/hidden/config/{study}.yaml"))
+    score = (DOCS / f"guides/{study}-score.md").read_text(encoding="utf-8")
+    assert f"configuration `{config.fingerprint}`, seed {config.seed}" in score
+    made = ROOT / f"results/{study}/score.md"
+    assert not made.exists() or made.read_text(encoding="utf-8") == score
 
 
 def test_the_score_is_that_of_the_code():

@@ -349,11 +349,10 @@ def test_the_noise_is_what_it_is_said_to_be(kind):
         noise = Noise.drawn(kind, own, rng)
         output = rng.uniform(-9, 9, (own.n, 3))
         error = (noise.read(output, own, rng) - output) / own.sigma
-        factor = noise.settings.get("factor", 1.0)
-        total = np.hypot(factor, noise.settings.get("ratio", 0.0))
+        total = np.hypot(noise.factor, noise.ratio)
         errors.append(error / total)
         axes.append(noise.axes)
-        rho = noise.settings.get("correlation", 0.0)
+        rho = noise.correlation
         steps.append(np.mean((error[1:] - rho * error[:-1]) ** 2) / (1 - rho**2))
         expected.append(total**2)
     scaled = np.array(errors) / np.array(axes)[:, None, :]

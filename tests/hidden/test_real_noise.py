@@ -254,14 +254,6 @@ def test_what_is_beside_a_large_effect_has_an_answer():
     assert "thermal_bias" in row["found"]
 
 
-def test_the_score_is_that_of_the_study():
-    """Of this configuration and, where the study was run here, of this very run."""
-    score = (ROOT / "docs/guides/real-noise-score.md").read_text(encoding="utf-8")
-    assert f"configuration `{CONFIG.fingerprint}`, seed {CONFIG.seed}" in score
-    made = ROOT / "results/real-noise/score.md"
-    assert not made.exists() or made.read_text(encoding="utf-8") == score
-
-
 def test_the_workflow_makes_each_log_and_the_score(tmp_path):
     words = ["--snakefile", ROOT / "studies/hidden/hidden.smk", "--dry-run"]
     given = ["--configfile", ROOT / "studies/hidden/config/real-noise.yaml"]

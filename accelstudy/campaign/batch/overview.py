@@ -42,7 +42,7 @@ _CAMPAIGNS = {
     "p_value": ("float64", "quality.global_test.p_value"),
     "accepted": ("boolean", "quality.global_test.accepted"),
     "state": ("string", "quality.state"),
-    "suspects": ("string", "quality.suspects"),
+    "suspects": ("string", "suspects"),
     "rms_norm_residual_mps2": ("float64", "rms_norm_residual_mps2"),
     "held_out_mps2": ("float64", "quality.held_out.rms_mps2"),
     "held_out_roll_rad": ("float64", "quality.held_out.rms_roll_mgon"),
@@ -93,14 +93,28 @@ def summarise_campaigns(
         The table of campaigns.
     """
     paths = [Path(folder) for folder in folders]
-    rows, values = [], []
+    documents, values = [], []
     for folder in paths:
-        status = _read(folder / BATCH_JOB.marker)
-        content = _read(folder / "calibration.json") if status["status"] == "ok" else {}
-        rows.append(_row(status, content))
-        for entry in content.get("parameters", ()):
-            values.append({"campaign": status["name"], "parameter": entry["name"], **entry})
-    table = pd.DataFrame(rows, columns=list(CAMPAIGN_COLUMNS)).astype(CAMPAIGN_COLUMNS)
+        document = _read(folder / BATCH_JOB.marker)
+        if document["status"] == "ok":
+            content = _read(folder / "calibration.json")
+            suspects = (str(suspect["position"]) for suspect in content["quality"]["suspects"])
+            values += [{"campaign": document["name"], "parameter": entry["name"], **entry}
+                       for entry in content["parameters"]]  # fmt: skip
+            document = {
+                **content,
+                **document,
+                "approach": content["approach"],  # that of the configuration may leave it open
+                "suspects": ", ".join(suspects),
+                "warnings": "\n".join(content["warnings"]),
+            }
+        documents.append(document)
+    flat = pd.json_normalize(documents)
+    table = pd.DataFrame({column: flat.get(key) for column, (_, key) in _CAMPAIGNS.items()})
+    table = table.astype(CAMPAIGN_COLUMNS)
+    table["sigma0"] = table["sigma_posteriori_mps2"] / table["sigma_priori_mps2"]
+    angles = [column for column in CAMPAIGN_COLUMNS if column.endswith("_rad")]
+    table[angles] *= MGON
     write_table(campaigns, table, provenance)
     long = pd.DataFrame(values, columns=list(PARAMETER_COLUMNS)).astype(PARAMETER_COLUMNS)
     write_table(parameters, long, provenance)
@@ -120,27 +134,6 @@ def counts(table: pd.DataFrame) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _row(status: Mapping[str, Any], content: Mapping[str, Any]) -> dict[str, Any]:
-    row = {column: _at({**content, **status}, key) for column, (_, key) in _CAMPAIGNS.items()}
-    if not content:
-        return row
-    row["approach"] = content["approach"]  # that of the configuration may leave it open
-    priori, posteriori = row["sigma_priori_mps2"], row["sigma_posteriori_mps2"]
-    if priori is not None and posteriori is not None:
-        row["sigma0"] = posteriori / priori
-    row["suspects"] = ", ".join(str(suspect["position"]) for suspect in row["suspects"])
-    row["warnings"] = "\n".join(row["warnings"])
-    return {k: v * MGON if k.endswith("_rad") and v is not None else v for k, v in row.items()}
-
-
-def _at(content: Mapping[str, Any], key: str) -> Any:
-    """Value of a key such as quality.state; None where there is none."""
-    value: Any = content
-    for part in key.split("."):
-        value = (value or {}).get(part)
-    return value
 
 
 def _links(folder: Path, start: Path) -> dict[str, str | None]:

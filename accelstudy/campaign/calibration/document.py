@@ -34,7 +34,7 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
     campaign, adjustment = fit.campaign, fit.adjustment
     covariance, sigma = fit.covariance, fit.sigma
     correlation = covariance / np.outer(sigma, sigma)
-    return {
+    content = {
         "schema_version": 1,
         "campaign": campaign.name,
         "sensor": campaign.sensor,
@@ -52,53 +52,50 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         "unit": campaign.unit,
         "nominal": None
         if (nominal := campaign.nominal) is None
-        else {"scale": nominal.scale.tolist(), "offset": nominal.offset.tolist()},
+        else {"scale": nominal.scale, "offset": nominal.offset},
         "gravity_mps2": fit.gravity,
         "n_positions": campaign.n_positions,
         "sigma_source": "a priori" if fit.trusts_sigma else "a posteriori",
-        "sigma_dof": json_number(fit.dof),
-        "sigmas_95": json_number(fit.sigmas_95),
-        "sigma_position_mps2": json_number(fit.sigma_position),
-        "sigma_position_priori_mps2": json_number(campaign.sigma_force),
-        "sigma_position_posteriori_mps2": json_number(fit.sigma_position_posteriori),
+        "sigma_dof": fit.dof,
+        "sigmas_95": fit.sigmas_95,
+        "sigma_position_mps2": fit.sigma_position,
+        "sigma_position_priori_mps2": campaign.sigma_force,
+        "sigma_position_posteriori_mps2": fit.sigma_position_posteriori,
         # of a single reading, from the samples within the holds
-        "sigma_reading_mps2": None
-        if campaign.sd is None
-        else json_number(np.sqrt(np.mean(campaign.sd**2))),
+        "sigma_reading_mps2": None if campaign.sd is None else np.sqrt(np.mean(campaign.sd**2)),
         "parameters": [
             {
                 "name": parameter.name,
-                "value": float(fit.parameters[i]),
-                "sigma": json_number(sigma[i]),
-                "ci95": json_number(fit.sigmas_95 * sigma[i]),
-                "sigma_priori": json_number(
-                    adjustment.sigma_priori[0, i] if fit.sigma_known else None
-                ),
-                "sigma_posteriori": json_number(adjustment.sigma_posteriori[0, i]),
+                "value": fit.parameters[i],
+                "sigma": sigma[i],
+                "ci95": fit.sigmas_95 * sigma[i],
+                "sigma_priori": adjustment.sigma_priori[0, i] if fit.sigma_known else None,
+                "sigma_posteriori": adjustment.sigma_posteriori[0, i],
                 "unit": parameter.unit,
                 "shown": {
                     "value": float(to_recorded(fit.parameters[i], parameter.unit)),
-                    "sigma": json_number(to_recorded(sigma[i], parameter.unit)),
+                    "sigma": to_recorded(sigma[i], parameter.unit),
                     "unit": recorded_unit(parameter.unit),
                 },
             }
             for i, parameter in enumerate(fit.model.parameters)
         ],
-        "covariance": _without_nan(covariance.tolist()),
-        "correlation": _without_nan(correlation.tolist()),
-        "condition": json_number(fit.estimability.condition),
+        "covariance": covariance,
+        "correlation": correlation,
+        "condition": fit.estimability.condition,
         "redundancy": adjustment.redundancy,
-        "variance_of_unit_weight": json_number(adjustment.variance_posteriori[0]),
+        "variance_of_unit_weight": adjustment.variance_posteriori[0],
         "iterations": int(adjustment.iterations[0]),
-        "rms_norm_residual_mps2": json_number(fit.rms_norm_residual),
+        "rms_norm_residual_mps2": fit.rms_norm_residual,
         "affine": _affine(fit),
         "mended": None,
         "excluded": campaign.exclusions,
         "range_mps2": campaign.full_range,
         "ranges": _ranges(fit),
         "log": None if campaign.log is None else campaign.log.model_dump(exclude_none=True),
-        "warnings": list(campaign.warnings),
+        "warnings": campaign.warnings,
     }
+    return json_content(content)
 
 
 def quality_document(assessment: Assessment) -> dict[str, Any]:
@@ -109,7 +106,7 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
     angles = None if held is None else held.rms_angles
     reference = (None, None) if (by := assessment.tilt_reference) is None else by / MGON
     positions = assessment.fit.campaign.positions
-    return {
+    content = {
         "state": assessment.state,
         "plausible": not assessment.warnings,
         "warnings": assessment.warnings,
@@ -120,41 +117,42 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
         else {
             "statistic": test.statistic,
             "dof": test.dof,
-            "sigma_dof": json_number(test.sigma_dof),
+            "sigma_dof": test.sigma_dof,
             "p_value": test.p_value,
             "accepted": test.accepted,
             "remark": f"{test.lacking}: the test has next to no power" if test.powerless else "",
         },
         "suspects": [
-            {"position": int(positions[s.position]), "p_value": json_number(s.p_value)}
+            {"position": int(positions[s.position]), "p_value": s.p_value}
             for s in assessment.suspects
         ],
         "held_out": None
         if held is None or held.n_predicted == 0
         else {
             "n_predicted": held.n_predicted,
-            "rms_mps2": json_number(held.rms),
-            "rms_roll_mgon": None if angles is None else json_number(angles[0] / MGON),
-            "rms_pitch_mgon": None if angles is None else json_number(angles[1] / MGON),
+            "rms_mps2": held.rms,
+            "rms_roll_mgon": None if angles is None else angles[0] / MGON,
+            "rms_pitch_mgon": None if angles is None else angles[1] / MGON,
         },
         "variance_components": None
         if components is None
         else {
-            "accelerometer": json_number(components.factors[0]),
-            "robot": json_number(components.factors[1]),
-            "sigma": [json_number(sigma) for sigma in components.sigma],
+            "accelerometer": components.factors[0],
+            "robot": components.factors[1],
+            "sigma": components.sigma,
             "converged": components.converged,
         },
         "tilt_rms_mgon": {
-            "roll": json_number(assessment.tilt[0] / MGON),
-            "pitch": json_number(assessment.tilt[1] / MGON),
-            "parameters_roll": json_number(parameters[0]),
-            "parameters_pitch": json_number(parameters[1]),
-            "reference_roll": json_number(reference[0]),
-            "reference_pitch": json_number(reference[1]),
+            "roll": assessment.tilt[0] / MGON,
+            "pitch": assessment.tilt[1] / MGON,
+            "parameters_roll": parameters[0],
+            "parameters_pitch": parameters[1],
+            "reference_roll": reference[0],
+            "reference_pitch": reference[1],
             "max_tilt_gon": MAX_TILT_GON,
         },
     }
+    return json_content(content)
 
 
 def assessed_positions(assessment: Assessment) -> pd.DataFrame:
@@ -222,7 +220,7 @@ def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
         **dict(zip(FORCES, fit.corrected.T, strict=True)),
     }
     return {
-        name: [float(np.min(values)), float(np.max(values))]
+        name: [np.min(values), np.max(values)]
         for name, values in columns.items()
         if values is not None
     }
@@ -234,9 +232,9 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
         return None
     matrix, bias = form
     return {
-        "matrix": matrix.tolist(),
-        "bias_mps2": bias.tolist(),
-        "gauges": {gauge: in_gauge(matrix, gauge).tolist() for gauge in GAUGES},
+        "matrix": matrix,
+        "bias_mps2": bias,
+        "gauges": {gauge: in_gauge(matrix, gauge) for gauge in GAUGES},
     }
 
 
@@ -245,20 +243,23 @@ def json_number(value: Any) -> float | None:
     return None if value is None or not np.isfinite(value) else float(value)
 
 
+def json_content(content: Any) -> Any:
+    """Content for JSON: arrays are lists, and what is no finite number is None."""
+    if isinstance(content, dict):
+        return {key: json_content(value) for key, value in content.items()}
+    if isinstance(content, np.ndarray):
+        return json_content(content.tolist())
+    if isinstance(content, (list, tuple)):
+        return [json_content(value) for value in content]
+    return json_number(content) if isinstance(content, float) else content
+
+
 def json_text(content: Any) -> str:
     """JSON for a file; what is no finite number is null, or the file could not be read again."""
-    return json.dumps(_without_nan(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(json_content(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_json(path: str | Path, content: Any) -> None:
     """Write a JSON file, whole or not at all."""
     with whole_file(path) as part:
         part.write_text(json_text(content), encoding="utf-8")
-
-
-def _without_nan(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {key: _without_nan(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_without_nan(value) for value in content]
-    return json_number(content) if isinstance(content, float) else content

@@ -61,22 +61,6 @@ DECIMALS = 9
 """Decimals of the added columns: far below any noise, and half the digits of a double."""
 
 
-@dataclass(frozen=True)
-class Leveled:
-    """Summary of a leveled log.
-
-    Attributes
-    ----------
-    rows : int
-    empty : int, rows without a calibrated force
-    warnings : tuple of str
-    """
-
-    rows: int
-    empty: int
-    warnings: tuple[str, ...]
-
-
 class Readings(NamedTuple):
     """The rows of a log, prepared for a calibration.
 
@@ -166,87 +150,73 @@ def readings_of(
     return Readings(opened, forces, hold, mends)
 
 
+@dataclass(frozen=True)
+class Leveled:
+    """A leveled log.
+
+    Forces and angles are in the axes of the log. A row has empty cells if a reading is missing, or
+    if no force explains it.
+
+    Attributes
+    ----------
+    readings : Readings, with the rows as they were read
+    added : mapping of columns: calibrated forces, roll and pitch and their standard deviations
+    empty : int, rows without a calibrated force
+    warnings : tuple of str
+    """
+
+    readings: Readings
+    added: Mapping[str, pa.ChunkedArray]
+    empty: int
+    warnings: tuple[str, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.readings.forces)
+
+    def to_frame(self, frame: pd.DataFrame | None = None) -> pd.DataFrame:
+        """Return the log with the added columns.
+
+        Parameters
+        ----------
+        frame : DataFrame, optional
+            The rows of the log as their owner has them, whose index and columns stay as they are;
+            as they were read if omitted.
+        """
+        log = self.readings.log
+        frame = infer_types(log.source, log.table).to_pandas() if frame is None else frame
+        return frame.assign(**{name: column.to_numpy() for name, column in self.added.items()})
+
+    def write(self, out: str | Path) -> None:
+        """Write the log with the added columns, CSV or Parquet; if that fails, there is no file."""
+        table = self.readings.log.table
+        # The row labels that pandas writes as a column are not part of the log.
+        labels = [name for name in table.column_names if name.startswith("__index_level_")]
+        table = table.drop_columns(labels)
+        if is_parquet(out):
+            table = infer_types(self.readings.log.source, table)
+        for name, column in self.added.items():
+            if name in table.column_names:
+                table = table.set_column(table.column_names.index(name), name, column)
+            else:
+                table = table.append_column(name, column)
+        write_table(out, table)
+
+
 def level(
     calibration: SensorCalibration,
     log: LogFile,
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
     start: float | None = None,
-) -> tuple[Readings, dict[str, pa.ChunkedArray], Leveled]:
-    """Level a log; see `level_log`.
-
-    Returns
-    -------
-    readings : Readings, with the rows as they were read
-    added : dict of columns, calibrated forces, roll and pitch and their standard deviations
-    leveled : Leveled
-    """
-    readings = readings_of(log, calibration, given, start or 0.0)
-    _check_forces(calibration, readings)
-    if sigma is not None:
-        bounds.SIGMA_READING.check_key("`sigma`", sigma)
-    noise = noise_of_reading(calibration) if sigma is None else sigma
-    rows = np.arange(len(readings.forces))
-    parts = []
-    for first in track(range(0, max(1, len(rows)), ROWS), "leveling"):
-        some = rows[first : first + ROWS]
-        of_rows = readings.forces[some], readings.hold.take(some)
-        parts.append(_leveled(calibration, readings.log.layout.axes, *of_rows, noise))
-    corrected = np.concatenate([part[0] for part in parts])
-    near = np.concatenate([part[1] for part in parts])
-    added = {name: pa.chunked_array([part[2][name] for part in parts]) for name in parts[0][2]}
-    empty = np.isnan(corrected[:, 0])
-    doubts = (
-        *_of_calibration(calibration, readings),
-        *(_assumptions(calibration) if start is None else ()),
-        *_of_log(calibration, readings, empty, near),
-        *_beyond_ranges(calibration.ranges, corrected, readings.hold),
-    )
-    return readings, added, Leveled(len(rows), int(empty.sum()), doubts)
-
-
-def level_frame(
-    calibration: SensorCalibration,
-    log: LogFile,
-    given: Mapping[str, Any] | None = None,
-    sigma: float | None = None,
-    start: float | None = None,
-    frame: pd.DataFrame | None = None,
-) -> tuple[pd.DataFrame, Leveled]:
-    """Return what `level_log` writes, with nothing written.
-
-    Parameters
-    ----------
-    calibration, log, given, sigma, start : as of `level_log`
-    frame : DataFrame, optional
-        The rows of the log as their owner has them, whose index and columns stay as they are; as
-        they were read if omitted.
-    """
-    readings, added, leveled = level(calibration, log, given, sigma, start)
-    if frame is None:
-        frame = infer_types(readings.log.source, readings.log.table).to_pandas()
-    values = {name: column.to_numpy() for name, column in added.items()}
-    return frame.assign(**values), leveled
-
-
-def level_log(
-    calibration: SensorCalibration,
-    log: str | Path,
-    out: str | Path,
-    given: Mapping[str, Any] | None = None,
-    sigma: float | None = None,
-    start: float | None = None,
 ) -> Leveled:
-    """Write a log with calibrated forces, roll and pitch and their standard deviations.
-
-    Forces and angles are in the axes of the log. A row gets empty cells if a reading is missing, or
-    if no force explains it.
+    """Level a log.
 
     Parameters
     ----------
     calibration : SensorCalibration
-    log : file with the raw log; see `readings_of`
-    out : CSV or Parquet file to write; if that fails, there is none
+    log : anything that `open_source` opens
     given : mapping, optional
         How to read the log; see `readings_of`.
     sigma : float, m/s², noise of a reading; see `noise_of_reading` if omitted
@@ -258,14 +228,31 @@ def level_log(
         If the log cannot be read, lacks a column that an effect of the calibration needs, or is so
         far from gravity in most rows that it must be in another unit.
     """
-    readings, added, leveled = level(calibration, log, given, sigma, start)
-    table = readings.log.table
-    # The row labels that pandas writes as a column are not part of the log.
-    table = table.drop_columns([n for n in table.column_names if n.startswith("__index_level_")])
-    if is_parquet(out):
-        table = infer_types(readings.log.source, table)
-    write_table(out, _with(table, added))
-    return leveled
+    readings = readings_of(log, calibration, given, start or 0.0)
+    read, usable = readings.log, readings.forces[np.isfinite(readings.forces).all(axis=1)]
+    if not len(usable):
+        why = _reason(calibration, readings, 0)
+        raise InputError(f"{read.path}: no row has three numbers; the first: {why}")
+    check_size(f"{read.path}", usable, calibration.gravity, read.layout.unit, read.conversion)
+    if sigma is not None:
+        bounds.SIGMA_READING.check_key("`sigma`", sigma)
+    noise = noise_of_reading(calibration) if sigma is None else sigma
+    rows = np.arange(len(readings.forces))
+    parts = []
+    for first in track(range(0, max(1, len(rows)), ROWS), "leveling"):
+        some = rows[first : first + ROWS]
+        of_rows = readings.forces[some], readings.hold.take(some)
+        parts.append(_leveled(calibration, read.layout.axes, *of_rows, noise))
+    corrected, near = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+    added = {name: pa.chunked_array([part[2][name] for part in parts]) for name in parts[0][2]}
+    empty = np.isnan(corrected[:, 0])
+    doubts = (
+        *_of_calibration(calibration, readings),
+        *(_assumptions(calibration) if start is None else ()),
+        *_of_log(calibration, readings, empty, near),
+        *_beyond_ranges(calibration.ranges, corrected, readings.hold),
+    )
+    return Leveled(readings, added, int(empty.sum()), doubts)
 
 
 def _leveled(
@@ -279,7 +266,8 @@ def _leveled(
         corrected = calibration.correct(forces, hold)
         angles, sigmas = calibration.level(forces, noise, hold)
     lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
-    lost |= clipped(calibration, forces).any(axis=1)
+    full = calibration.content.get("range_mps2") or np.inf
+    lost |= (np.abs(forces) >= CLIPPED * full).any(axis=1)
     corrected[lost] = np.nan
     shown = frame.from_frd(corrected)
     added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
@@ -292,33 +280,6 @@ def _leveled(
     }
     near = ~lost & near_pole(angles, sigmas)
     return corrected, near, {**columns, NEAR_POLE: pa.array(near, mask=lost)}
-
-
-def _with(table: pa.Table, added: Mapping[str, pa.ChunkedArray]) -> pa.Table:
-    """Table with added columns; existing columns of the same name are replaced."""
-    for name, column in added.items():
-        if name in table.column_names:
-            table = table.set_column(table.column_names.index(name), name, column)
-        else:
-            table = table.append_column(name, column)
-    return table
-
-
-def clipped(calibration: SensorCalibration, forces: Array) -> NDArray[np.bool_]:
-    """Which readings (k, 3), m/s², are at the end of the sensor's range."""
-    full = calibration.content.get("range_mps2")
-    return np.abs(forces) >= CLIPPED * (np.inf if full is None else full)
-
-
-def _check_forces(calibration: SensorCalibration, readings: Readings) -> None:
-    """Raise `InputError` if no row is usable, or most readings are far from gravity."""
-    log, forces = readings.log, readings.forces
-    forces = forces[np.isfinite(forces).all(axis=1)]
-    if not len(forces):
-        why = _reason(calibration, readings, 0)
-        raise InputError(f"{log.path}: no row has three numbers; the first: {why}")
-    layout, gravity = log.layout, calibration.gravity
-    check_size(f"{log.path}", forces, gravity, layout.unit, log.conversion)
 
 
 def _of_calibration(calibration: SensorCalibration, readings: Readings) -> Iterator[str]:

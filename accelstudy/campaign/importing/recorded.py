@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
-from importlib import import_module
 from io import BufferedReader, FileIO, StringIO
 from operator import attrgetter
 from pathlib import Path
@@ -35,12 +34,6 @@ _IMU, _TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 _BAG_COLUMNS = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
 _SENSOR = "sensor_accel"
 _LONGEST_GAP = 3600.0  # s
-LARGEST_CHUNK = 256_000_000
-"""Bytes of the largest chunk of a bag; recorders write some MB."""
-MOST_NESTED = 10
-"""Formats within each other."""
-MOST_FIELDS = 10_000
-"""Numbers of the largest message of a flight log; PX4 has some hundred."""
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
@@ -59,11 +52,7 @@ def open_bag(path: Path, topic: str | None = None) -> TableSource:
     """
     with _needed_for(path, "a bag of ROS", "rosbags", "ros"):
         from rosbags.highlevel import AnyReader
-        from rosbags.rosbag1 import reader as bag_1
-        from rosbags.rosbag2 import storage_mcap as bag_2
         from rosbags.typesys import Stores, get_typestore
-    for chunks in (bag_1.decompressors, bag_2.DECOMPRESSORS):
-        chunks.update({name: _unpacked(name) for name in chunks if name in _PACKERS})
     within = path.parent if path.suffix in (".db3", ".mcap") else path
     if path.suffix in (".db3", ".mcap") and not (within / BAG_OF_FOLDER).is_file():
         raise InputError(f"{path}: a bag of ROS 2 is a folder; {BAG_OF_FOLDER} is missing here")
@@ -76,7 +65,7 @@ def open_bag(path: Path, topic: str | None = None) -> TableSource:
             name = chosen_of(path, "topic of sensor_msgs/Imu", topics, topic)
             imu = [c for c in reader.connections if c.topic == name]
             frame = next((each.header.frame_id for _, each in _messages(reader, imu)), "")
-            rows = _rows(reader, imu, 4, lambda each: _vector(each.linear_acceleration))
+            rows = _rows(reader, imu, 4, attrgetter(*_BAG_COLUMNS.values()))
             expected = sum(connection.msgcount for connection in imu)
             heat = _thermometer(reader, name)
             measured = _rows(reader, heat, 2, lambda each: (each.temperature,))
@@ -105,29 +94,6 @@ def _source(
     si = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **si}
     return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
-
-
-_PACKERS = {
-    "bz2": ("bz2", "BZ2Decompressor"),
-    "lz4": ("lz4.frame", "LZ4FrameDecompressor"),
-    "zstd": ("rosbags.rosbag2.storage_mcap", "zstd.ZstdDecompressor"),
-}
-"""Where the library for a packed chunk is, and what unpacks step by step."""
-
-
-def _unpacked(name: str) -> Callable[..., bytes]:
-    """Return what unpacks a chunk, and not more than `LARGEST_CHUNK`."""
-    module, attribute = _PACKERS[name]
-
-    def unpack(content: bytes, *_: int) -> bytes:
-        decompressor = attrgetter(attribute)(import_module(module))()
-        chunk: bytes = decompressor.decompress(content, LARGEST_CHUNK)
-        if not decompressor.eof:
-            reason = "cut" if decompressor.needs_input else f"over {LARGEST_CHUNK // 10**6} MB"
-            raise ValueError(f"a chunk is {reason}")
-        return chunk
-
-    return unpack
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
@@ -160,10 +126,6 @@ def _rows(
     return np.fromiter(whole(), np.dtype((float, width)))
 
 
-def _vector(vector: Any) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
-
-
 def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
     """The only topic of a temperature, or the only one beside the topic of the forces."""
     found = [c for c in reader.connections if c.msgtype == _TEMPERATURE]
@@ -187,20 +149,10 @@ def open_ulog(path: Path, instance: str | None = None) -> TableSource:
     with _needed_for(path, "a flight log of PX4", "pyulog", "px4"):
         from pyulog import ULog
 
-    class Bounded(ULog):  # type: ignore[misc]  # pyulog is untyped
-        """A log whose messages have no more than `MOST_FIELDS` numbers, nested arrays included."""
-
-        class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]
-            def _parse_nested_type(self, prefix: str, name: str, formats: Any) -> None:
-                if _size(name, formats) > MOST_FIELDS:
-                    # The library takes some errors for damages, and reads on.
-                    raise RuntimeError(f"a message has over {MOST_FIELDS} numbers")
-                super()._parse_nested_type(prefix, name, formats)
-
     try:
         # It prints what it thinks of a file.
         with readable(path), _ToTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
-            log = Bounded(file, [_SENSOR])
+            log = ULog(file, [_SENSOR])
     except InputError:
         raise
     except Exception as error:  # a damaged file fails in many ways
@@ -246,20 +198,6 @@ class _ToTheEnd(BufferedReader):
         # Between two messages it may end.
         self.cut |= size is not None and len(content) < size and not (size == 3 and not content)
         return content
-
-
-def _size(name: str, formats: Mapping[str, Any], depth: int = 0) -> int:
-    """Numbers in a message of a flight log; a format that holds itself has too many."""
-    if depth > MOST_NESTED:
-        return MOST_FIELDS + 1
-    if name not in formats:
-        return 1
-    total = 0
-    for kind, count, _ in formats[name].fields:
-        total += max(count, 1) * _size(kind, formats, depth + 1)
-        if total > MOST_FIELDS:
-            break
-    return total
 
 
 @contextmanager

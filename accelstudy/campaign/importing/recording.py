@@ -12,10 +12,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -27,9 +28,6 @@ from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 Array = NDArray[np.float64]
 
@@ -113,7 +111,12 @@ def read_log(
         told = {**_units(source, places), **told}
         chosen = _laid_over(like, overlay(told, given), kind)
     conversion = conversion_of(chosen.unit, chosen.scale, chosen.offset)
-    return Log(source, chosen, places, _time_factor(source, places, chosen), conversion)
+    dated = places.get("time") in source.dates
+    if "time" in places and chosen.time_unit != "s" and (dated or "nanoseconds" in places):
+        name = source.names[places["time"]]
+        raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
+    factor = 1e-9 if dated else UNITS["s"][chosen.time_unit]
+    return Log(source, chosen, places, factor, conversion)
 
 
 def _laid_over(
@@ -152,7 +155,8 @@ def _places(
     if not places and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
     for key in (key for key in AXES if key not in places):
-        if _has_two_axes(source):
+        named = [name for i, name in enumerate(source.names) if i not in source.dates]
+        if sum(not (source.named and _TIME_OR_CONDITION.fullmatch(name)) for name in named) == 2:
             raise InputError(
                 f"{source.path}: two axes, as of an inclinometer, cannot be calibrated: the length "
                 "of the force is compared with gravity, and that takes all three axes"
@@ -179,8 +183,12 @@ def _places(
         if place is not None and (key in columns or key == "time" or place not in places.values()):
             places[key] = place
     _check_different(source, places)
-    if "time" in places and (rest := _nanoseconds(source, places["time"])) is not None:
-        places["nanoseconds"] = rest
+    if "time" in places:  # in whole seconds, "stamp.secs", it has a column of ns, "stamp.nsecs"
+        parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(source.names))
+        whole = source.names[places["time"]]
+        rest = [i for i, part in parts if part and part[1] + part[3] == whole]
+        if len(rest) == 1:
+            places["nanoseconds"] = rest[0]
     return places
 
 
@@ -236,21 +244,6 @@ def _check_different(source: Source, places: Mapping[str, int]) -> None:
         raise InputError(f"{source.path}: two of {', '.join(places)} name the same column")
 
 
-def _has_two_axes(source: Source) -> bool:
-    """Whether a log has two columns besides times and temperatures."""
-    if not source.named:
-        return len(source.names) == 2
-    names = [name for i, name in enumerate(source.names) if i not in source.dates]
-    return sum(not _TIME_OR_CONDITION.fullmatch(name) for name in names) == 2
-
-
-def _nanoseconds(source: Source, time: int) -> int | None:
-    """Column of the ns that belong to a time in whole seconds: "stamp.nsecs" to "stamp.secs"."""
-    parts = ((i, _NANOSECONDS.fullmatch(name)) for i, name in enumerate(source.names))
-    found = [i for i, part in parts if part and part[1] + part[3] == source.names[time]]
-    return found[0] if len(found) == 1 else None
-
-
 def _units(source: Source, places: Mapping[str, int]) -> dict[str, str]:
     """Units of the forces and of the time, as far as the names of their columns tell them."""
     units: dict[str, str] = {}
@@ -261,21 +254,6 @@ def _units(source: Source, places: Mapping[str, int]) -> dict[str, str]:
     if "time" in places and not dated and (unit := unit_in(source.names[places["time"]], "time")):
         units["time_unit"] = unit
     return units
-
-
-def _time_factor(source: Source, places: Mapping[str, int], layout: LogLayout) -> float:
-    """Seconds per unit of the column of time.
-
-    Raises
-    ------
-    InputError
-        If a column of dates, or of seconds beside ns, gets a unit.
-    """
-    dated = places.get("time") in source.dates
-    if "time" in places and layout.time_unit != "s" and (dated or "nanoseconds" in places):
-        name = source.names[places["time"]]
-        raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
-    return 1e-9 if dated else UNITS["s"][layout.time_unit]
 
 
 # --- Its numbers ---------------------------------------------------------------------------------
@@ -314,8 +292,6 @@ class Log:
     @cached_property
     def table(self) -> pa.Table:
         """Rows as they are in the file, with all their columns; by unique names."""
-        import pyarrow as pa
-
         names = unique_names(self.source)
         return pa.table(self.source.columns(range(len(names))), names=names)
 
@@ -351,8 +327,11 @@ class Log:
         elif self.layout.rate_hz is not None:
             columns["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
         frame, conversion = self.layout.axes, self.conversion
-        usual = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
-        limit = max(ABSURD, absurd_from(usual, conversion))
+        first_rows = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
+        read = _usable(first_rows) & ~np.isin(first_rows, SENTINELS)
+        norms = np.linalg.norm(conversion.to_si(first_rows[read.all(axis=1)]), axis=1)
+        # The unit may be wrong: it is checked by the means of the holds.
+        limit = max([ABSURD, *([1000 * np.median(norms)] if len(norms) else [])])
         for axis, sign, i in zip(AXES, frame.signs, frame.order, strict=True):
             raw = values[AXES[i]]
             force = conversion.of_axis(i).to_si(raw)
@@ -385,16 +364,6 @@ class Log:
 def _usable(values: NDArray[Any]) -> NDArray[np.bool_]:
     """Which numbers can be calculated with."""
     return np.asarray(np.abs(values) <= LARGEST)
-
-
-def absurd_from(raw: Array, conversion: Conversion) -> float:
-    """Size, m/s², a thousand times the usual one, from which on a reading is absurd.
-
-    The unit may be wrong: it is checked by the means of the holds. `raw` are the first readings of
-    a log, (n, 3).
-    """
-    raw = raw[_usable(raw).all(axis=1) & ~np.isin(raw, SENTINELS).any(axis=1)]
-    return 1000 * float(np.median(np.linalg.norm(conversion.to_si(raw), axis=1))) if len(raw) else 0
 
 
 def unique_names(source: Source) -> list[str]:

@@ -8,14 +8,16 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import contextmanager
-from io import TextIOWrapper
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO, TypeAlias, cast
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
+from pyarrow import csv as arrow_csv
 
 from accelstudy.basics.errors import InputError, UnknownNameError, printable
 from accelstudy.basics.progress import stage
@@ -24,19 +26,13 @@ from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_u
 from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import readable
 
-# Slow to import, so where a file needs it: what calibrates a campaign reads no log.
-if TYPE_CHECKING:
-    import pandas as pd
-    import pyarrow as pa
-
 Array = NDArray[np.float64]
 
 GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
-_LONGEST = 2**20  # characters of a line
-_BLOCK = 2**23  # bytes that hold any such line
+_BLOCK = 2**23  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
 _SEPARATORS = {"tab": "\t", "blank": None}
@@ -94,8 +90,6 @@ class Source:
 
         A time in ns since 1970 has more digits than a float. The columns are read unless they were.
         """
-        import pyarrow as pa
-
         left = self._cells_of_numbers(places) if columns is None else [*columns]
         # A text takes more memory than its numbers, so it goes as these come.
         numbers = [self._numbers(left.pop(0), place) for place in places]
@@ -111,8 +105,6 @@ class Source:
         return self.columns(places)
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        import pyarrow as pa
-
         kind = column.type
         if place in self.dates:
             return nanoseconds(column.to_pandas())
@@ -155,17 +147,11 @@ class TextSource(Source):
 
     def __init__(self, path: Path, delimiter: str | None = None) -> None:
         self.path, self.repeated = path, 0
-        self._encoding = "utf-8-sig"
-        with self._readable():
-            with self._open_binary() as start:
-                self._encoding = _encoding_of(start.read(4096))
-            with self._open() as file:
-                text = file.read(_PREVIEW)
-                more = bool(file.read(1))
-        lines = text.split("\n")
-        if more and len(lines) == 1:  # it would be read as a whole
-            raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
-        if more:
+        self._text: str | None = self._read_text()
+        lines = self._text[:_PREVIEW].split("\n")
+        if len(self._text) > _PREVIEW:
+            if len(lines) == 1:
+                raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
         layouts = _LAYOUTS
         if delimiter is not None:
@@ -209,9 +195,6 @@ class TextSource(Source):
 
         Nobody knows which of its cells are right.
         """
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         try:
             table, ragged = self._read(dict.fromkeys(places, pa.string()))
         except pa.ArrowInvalid as error:
@@ -230,8 +213,6 @@ class TextSource(Source):
 
     def _cells_of_numbers(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
         """Columns as numbers where all cells are, which saves time and memory."""
-        import pyarrow as pa
-
         if self.decimal == "." and not self.dates & {*places}:
             types = {p: pa.int64() if p in self._long else pa.float64() for p in places}
             try:
@@ -243,17 +224,12 @@ class TextSource(Source):
         return self.columns(places)
 
     def _numbers(self, column: pa.ChunkedArray, place: int) -> NDArray[Any]:
-        import pyarrow as pa
-
         if place not in self.dates and pa.types.is_string(column.type):
             return _numbers_of_text(column)
         return super()._numbers(column, place)
 
     def _read(self, types: Mapping[int, pa.DataType]) -> tuple[pa.Table, list[tuple[int, str]]]:
         """Columns of these places and types, and the rows with fewer or more cells than others."""
-        import pyarrow as pa
-        from pyarrow import csv as arrow_csv
-
         names = [str(place) for place in range(self.width)]
         ragged: list[tuple[int, str]] = []
 
@@ -262,12 +238,12 @@ class TextSource(Source):
             return "skip"
 
         kinds = {names[place]: kind for place, kind in types.items()}
-        with self._readable(), stage(f"reading {self.path.name}"):
+        with stage(f"reading {self.path.name}"):
             content = self._rows_as_text()
             if not content:
                 return pa.schema(kinds).empty_table(), ragged
             table = arrow_csv.read_csv(
-                pa.BufferReader(content),
+                pa.BufferReader(pa.py_buffer(content)),
                 # Of several threads none knows the number of its row.
                 arrow_csv.ReadOptions(column_names=names, use_threads=False, block_size=_BLOCK),
                 arrow_csv.ParseOptions(
@@ -281,8 +257,6 @@ class TextSource(Source):
 
     def _with_ragged(self, table: pa.Table, ragged: Sequence[tuple[int, str]]) -> pa.Table:
         """Rows with those that have fewer or more cells, by their places, where they belong."""
-        import pyarrow as pa
-
         rows: list[Sequence[str | None]] = []
         for _, text in ragged:
             cells = split_line(text, self.delimiter)
@@ -314,25 +288,20 @@ class TextSource(Source):
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Lines of data with their numbers, counted from 1."""
-        with self._readable(), self._open() as file:
-            for number, line in enumerate(file, 1):
-                if number > self.first and (row := self._row(line.rstrip("\n"))) is not None:
-                    yield number, row
+        for number, line in enumerate(self._read_text().split("\n"), 1):
+            if number > self.first and (row := self._row(line)) is not None:
+                yield number, row
 
-    def _rows_as_text(self) -> bytes:
+    def _rows_as_text(self) -> bytearray:
         """Rows of the table, each in a line of its own, in UTF-8."""
-        self.repeated = 0
-        parts = []
-        with self._open(self.first) as file:
-            while text := file.read(_BLOCK // 8):
-                if not text.endswith("\n"):
-                    text += (end := file.readline(_LONGEST))
-                    if len(end) == _LONGEST:
-                        raise InputError(
-                            f"{self.path}: a line of more than {_LONGEST} characters; is it text?"
-                        )
-                parts.append(self._of_table(text).encode())
-        return b"".join(parts)
+        text, self._text = self._text or self._read_text(), None
+        self.repeated, rows, end = 0, bytearray(), 0
+        for _ in range(self.first):
+            end = text.find("\n", end) + 1
+        while end < len(text):
+            start, end = end, text.find("\n", end + _BLOCK // 8) + 1 or len(text)
+            rows += self._of_table(text[start:end]).encode()
+        return rows
 
     def _of_table(self, text: str) -> str:
         """Lines of a text without those that are no rows."""
@@ -367,29 +336,16 @@ class TextSource(Source):
             return self._blanks.sub("" if self.delimiter else " ", row.strip(" "))
         return row if self.delimiter else " ".join(row.split())
 
-    def _open_binary(self) -> BinaryIO:
-        with self.path.open("rb") as start:
-            packed = start.read(len(GZIP)) == GZIP
-        return cast(BinaryIO, gzip.open(self.path)) if packed else self.path.open("rb")
-
-    def _open(self, skipped: int = 0) -> TextIO:
-        """Open the file and skip some lines; quotation marks in a header have no meaning."""
-        file = TextIOWrapper(self._open_binary(), encoding=self._encoding, errors="replace")
-        try:
-            for _ in range(skipped):
-                file.readline()
-        except BaseException:
-            file.close()
-            raise
-        return file
-
-    @contextmanager
-    def _readable(self) -> Iterator[None]:
+    def _read_text(self) -> str:
+        """All of the file, with line ends as in Python."""
         try:
             with readable(self.path):
-                yield
+                content = self.path.read_bytes()
+                content = gzip.decompress(content) if content.startswith(GZIP) else content
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{self.path}: not a whole gzip file") from None
+        text = content.decode(_encoding_of(content[:4096]), errors="replace")
+        return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
 class _Table:
@@ -537,9 +493,6 @@ def _most_frequent(counts: Iterable[int]) -> int:
 
 def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
     """Numbers of cells, NaN where there is none; whole numbers as integers."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     if pc.all(pc.match_substring_regex(column[:9], "^-?[0-9]+$")).as_py():
         try:
             return column.cast(pa.int64()).to_numpy()
@@ -566,8 +519,6 @@ class TableSource(Source):
         warnings: Sequence[str] = (),
         named: bool = True,
     ) -> None:
-        import pyarrow as pa
-
         self.path, self.table, self.warnings, self.named = Path(path), table, warnings, named
         self.names = [printable(" ".join(name.split())) for name in table.column_names]
         self.layout = layout_by_names(self.names) if layout is None else layout
@@ -593,8 +544,6 @@ class TableSource(Source):
 
 def table_of(values: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
     """Array (n, c) as a table; its columns have their places as names if they have no others."""
-    import pyarrow as pa
-
     names = names or [str(place) for place in range(values.shape[1])]
     return pa.table([*map(pa.array, values.T)], names=[*names])
 
@@ -661,8 +610,6 @@ def nanoseconds(column: pd.Series) -> NDArray[Any]:
     One without a zone is in UTC, so that all of a column go together. Years that do not fit into
     ns (before 1678 and after 2261) are no dates of a log.
     """
-    import pandas as pd
-
     dates = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
     if dates.isna().any() and not pd.api.types.is_datetime64_any_dtype(column):
         text = column.astype("str").str.strip()

@@ -177,22 +177,22 @@ def generate(
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
-    robot, sampled = conditions.robot, session.n_samples > 0
+    more: dict[str, Any] = {}
+    if conditions.robot:
+        more = {"angles": reading, "sigma_angle": session.sigma_angle, "yaw": session.yaw}
+    if n := session.n_samples:
+        more |= {"sd": noise.sds(session, rng), "n_samples": np.full(session.n, n)}
     campaign = Campaign(
         name=f"hidden {case.design}",
         positions=np.arange(1, session.n + 1),
         forces=forces,
         gravity=GRAVITY,
         sigma_force=session.sigma if case.sigma_known else None,
-        angles=reading if robot else None,
-        sigma_angle=session.sigma_angle if robot else None,
-        yaw=session.yaw if robot else None,
         time=session.time,
         temperature=session.temperature,
         vibration=session.vibration,
         full_range=session.full_range,
-        sd=noise.sds(session, rng) if sampled else None,
-        n_samples=np.full(session.n, session.n_samples) if sampled else None,
+        **more,
     )
     settings: dict[str, float] = {}
     if case.gross is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -80,17 +81,17 @@ COARSE_SAMPLES = 64
 """Samples that are drawn for the mean of a hold with coarse readings."""
 
 
-def _axis_factors(sigma: float, rng: np.random.Generator) -> dict[str, float]:
+def _axis_factors(sigma: float, rng: np.random.Generator) -> dict[str, Any]:
     other = float(rng.choice([1 / rng.uniform(1.5, 2.5), rng.uniform(1.5, 3)]))
     axis = rng.integers(3)
-    return {name: other if i == axis else 1.0 for i, name in enumerate("xyz")}
+    return {"axes": tuple(other if i == axis else 1.0 for i in range(3))}
 
 
-_SETTINGS: Mapping[str, Callable[[float, np.random.Generator], dict[str, float]]] = {
+_SETTINGS: Mapping[str, Callable[[float, np.random.Generator], dict[str, Any]]] = {
     # What disturbs the means may show within the holds, or not.
     "level": lambda sigma, rng: {
         "factor": rng.uniform(0.6, 0.8) if rng.random() < 0.4 else rng.uniform(1.25, 2.0),
-        "within": float(rng.random() < 0.5),
+        "within": rng.random() < 0.5,
     },
     "axes": _axis_factors,
     "tails": lambda sigma, rng: {"freedom": 4.0},
@@ -103,69 +104,63 @@ _SETTINGS: Mapping[str, Callable[[float, np.random.Generator], dict[str, float]]
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of a session.
+    """The noise of a session; where nothing is given, it is as stated.
 
     Attributes
     ----------
     kind : str, of `NOISES`; None where it is as stated
-    settings : dict of str to float
+    factor : float, of the sds of position means
+    within : bool, whether the samples within the holds show this factor
+    axes : tuple of float, factors of the sds of the axes
+    freedom : float, degrees of freedom of a t distribution; None where it is normal
+    correlation : float, of the errors of neighbouring positions
+    ratio : float, sd of an offset of each hold over that of its mean
+    step : float, m/s², of coarse readings; 0 where they are fine
     """
 
     kind: str | None = None
-    settings: dict[str, float] = field(default_factory=dict)
+    factor: float = 1.0
+    within: bool = False
+    axes: tuple[float, ...] = (1.0, 1.0, 1.0)
+    freedom: float | None = None
+    correlation: float = 0.0
+    ratio: float = 0.0
+    step: float = 0.0
 
     @classmethod
     def drawn(cls, kind: str | None, session: Session, rng: np.random.Generator) -> Noise:
         """Draw the settings of a kind of noise."""
-        return cls(kind, _SETTINGS[kind](session.sigma, rng)) if kind else cls()
-
-    @property
-    def axes(self) -> Array:
-        """Factors of the sds of the axes, (3,)."""
-        return np.array([self.settings.get(axis, 1.0) for axis in ("x", "y", "z")])
-
-    def of_means(self, session: Session, rng: np.random.Generator) -> Array:
-        """Errors of the position means, (n, 3), m/s²."""
-        shape, sigma = (session.n, 3), session.sigma
-        if self.kind == "tails":
-            freedom = self.settings["freedom"]
-            return np.asarray(
-                sigma * rng.standard_t(freedom, shape) / np.sqrt(freedom / (freedom - 2))
-            )
-        white = rng.standard_normal(shape)
-        if self.kind == "autoregressive":
-            rho = self.settings["correlation"]
-            errors = white.copy()
-            for i in range(1, session.n):
-                errors[i] = rho * errors[i - 1] + np.sqrt(1 - rho**2) * white[i]
-            return sigma * errors
-        errors = sigma * self.settings.get("factor", 1.0) * self.axes * white
-        if self.kind == "offsets":
-            errors += sigma * self.settings["ratio"] * rng.standard_normal(shape)
-        return errors
+        return cls(kind, **_SETTINGS[kind](session.sigma, rng)) if kind else cls()
 
     def read(self, output: Array, session: Session, rng: np.random.Generator) -> Array:
         """Means of the holds (n, 3) of true outputs, as they are read."""
-        if self.kind != "coarse":
-            return output + self.of_means(session, rng)
-        step = self.settings["step"]
-        shape = (COARSE_SAMPLES, *output.shape)
-        # Too little noise to carry the means from step to step.
-        samples = output + self.samples_sd(session)[0] * rng.standard_normal(shape)
-        return np.asarray(np.mean(np.round(samples / step), axis=0) * step)
+        shape, sigma, rho = output.shape, session.sigma, self.correlation
+        if self.step:
+            # Too little noise to carry the means from step to step.
+            noise = self.samples_sd(session)[0] * rng.standard_normal((COARSE_SAMPLES, *shape))
+            read = np.round((output + noise) / self.step)
+            return np.asarray(np.mean(read, axis=0) * self.step)
+        if self.freedom is not None:
+            sd = np.sqrt(self.freedom / (self.freedom - 2))
+            return np.asarray(output + sigma * rng.standard_t(self.freedom, shape) / sd)
+        errors = rng.standard_normal(shape)
+        for i in range(1, len(errors)):
+            errors[i] = rho * errors[i - 1] + np.sqrt(1 - rho**2) * errors[i]
+        errors = sigma * self.factor * np.array(self.axes) * errors
+        if self.ratio:
+            errors += sigma * self.ratio * rng.standard_normal(shape)
+        return np.asarray(output + errors)
 
     def samples_sd(self, session: Session) -> Array:
         """True sds of the samples within the holds, (3,), m/s²."""
-        if self.kind == "coarse":
-            return np.full(3, 0.15 * self.settings["step"])
-        within = self.settings.get("factor", 1.0) if self.settings.get("within") else 1.0
-        return np.asarray(session.sigma * np.sqrt(session.n_samples) * within * self.axes)
+        if self.step:
+            return np.full(3, 0.15 * self.step)
+        within = self.factor if self.within else 1.0
+        return session.sigma * np.sqrt(session.n_samples) * within * np.array(self.axes)
 
     def sds(self, session: Session, rng: np.random.Generator) -> Array:
         """Sds of the samples within the holds, as they are found, (n, 3), m/s²."""
         freedom = session.n_samples - 1
         ratio = np.sqrt(rng.chisquare(freedom, (session.n, 3)) / freedom)
         sds = self.samples_sd(session) * ratio
-        if self.kind == "coarse":
-            sds = np.hypot(sds, self.settings["step"] / np.sqrt(12))
-        return np.asarray(sds)
+        return np.asarray(np.hypot(sds, self.step / np.sqrt(12)) if self.step else sds)

@@ -30,6 +30,8 @@ DRAWS = 7
 LEVEL = 0.05
 CREDIBLE = 0.9
 """Probability with which a set of alternatives holds the truth."""
+SAME = 5e-5
+"""Largest one less the cosine of two directions of a pair that count as one."""
 SIMULATIONS = 4000
 """Misclosures without any effect, for the level of the smallest p-value."""
 
@@ -136,29 +138,27 @@ class Pairs:
         group = effect[first] * len(order) + effect[second]
         sorted_ = np.argsort(group, kind="stable")
         first, second, group = first[sorted_], second[sorted_], group[sorted_]
+        self.first, self.second = first, second
         # Bases with columns of zeros, so that all are equally wide, (s, m, d).
         d = int(atlas.dims.max())
         self._bases = np.stack([np.pad(s.basis, ((0, 0), (0, d - s.dim))) for s in atlas.shapes])
         flat = self._bases.transpose(1, 0, 2).reshape(self._bases.shape[1], -1)
         products = (flat.T @ flat).reshape(len(effect), d, len(effect), d)
-        # Of the second basis, what the first leaves.
-        self._cross = products[first, :, second, :]
-        rest = products[second, :, second, :] - np.swapaxes(self._cross, 1, 2) @ self._cross
-        values, vectors = np.linalg.eigh(rest)
-        kept = values > 1e-4
+        # With both bases B side by side the square is zᵀ B (Bᵀ B)⁺ Bᵀ z.
+        both = np.stack([first, second], axis=1)
+        normal = products[both[:, :, None], :, both[:, None, :], :].transpose(0, 1, 3, 2, 4)
+        values, vectors = np.linalg.eigh(normal.reshape(len(both), 2 * d, 2 * d))
+        kept = values > SAME
         weights = np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
         self._inverse = (vectors * weights[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-        self.first, self.second = first, second
-        self.dims = np.asarray(atlas.dims[first] + np.sum(kept, axis=1), dtype=float)
+        self.dims = np.sum(kept, axis=1, dtype=float)
         self.starts = np.flatnonzero(np.diff(group, prepend=-1))
 
     def parts(self, z: Array) -> Array:
         """Squares of what misclosures (m,) have in each pair, (q,)."""
         components = np.einsum("smd,m->sd", self._bases, z)
-        one, two = components[self.first], components[self.second]
-        rest = two - np.matmul(one[:, None, :], self._cross)[:, 0]
-        gained = np.sum(np.matmul(rest[:, None, :], self._inverse)[:, 0] * rest, axis=1)
-        return np.asarray(np.sum(one**2, axis=1) + gained)
+        both = np.concatenate([components[self.first], components[self.second]], axis=1)
+        return np.asarray(np.sum(np.matmul(both[:, None, :], self._inverse)[:, 0] * both, axis=1))
 
 
 def _most_probable(evidence: Array, starts: NDArray[np.int_]) -> tuple[Array, int]:

@@ -38,6 +38,19 @@ class Measured(NamedTuple):
     high: float
     n: int
 
+    def text(self, how: str = "share") -> str:
+        """Write it as a share, mean or median, or as its `interval`, `n`, `count`, or `of` n."""
+        count = f"{self.value * self.n:.0f}" if self.n else "0"
+        low, high = map(share_text, (self.low, self.high))
+        between = "–" if low == "–" else f"{low} … {high}"
+        texts = {
+            "interval": between if self.n else "",
+            "n": str(self.n),
+            "count": count,
+            "of": f"{count} of {self.n}" if self.n else "–",
+        }
+        return texts.get(how, share_text(self.value))
+
 
 def chosen(rows: pd.DataFrame, question: Mapping[str, Any]) -> pd.DataFrame:
     """The campaigns that a question is put to."""
@@ -79,31 +92,10 @@ def share_text(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
 
 
-def interval_text(measured: Measured) -> str:
-    """Write an interval, if there are any campaigns."""
-    low, high = map(share_text, measured[1:3])
-    return "" if not measured.n else "–" if low == "–" else f"{low} … {high}"
-
-
-def count_text(measured: Measured) -> str:
-    """Write how many campaigns there are of which it is so."""
-    return f"{measured.value * measured.n:.0f}" if measured.n else "0"
-
-
-def of_text(measured: Measured) -> str:
-    """Write of how many campaigns, of so many, it is so."""
-    return f"{count_text(measured)} of {measured.n}" if measured.n else "–"
-
-
-TEXTS = {"n": lambda measured: str(measured.n), "count": count_text, "of": of_text}
-"""How a question is answered in a cell of a table, if not by the share, the mean or the median."""
-
-
 def answer(rows: pd.DataFrame, question: Question) -> str:
     """Answer a question in a cell of a table."""
-    shown = "" if isinstance(question, str) else question.get("statistic", "")
-    measured = measure(rows, question)
-    return TEXTS[shown](measured) if shown in TEXTS else share_text(measured.value)
+    how = "share" if isinstance(question, str) else question.get("statistic", "share")
+    return measure(rows, question).text(how)
 
 
 def label(value: Any) -> str:
@@ -113,9 +105,8 @@ def label(value: Any) -> str:
     if isinstance(value, float):
         return number(value)
     if isinstance(value, list):
-        value = (
-            " + ".join(one if isinstance(one, str) else " = ".join(one) for one in value) or None
-        )
+        names = (one if isinstance(one, str) else " = ".join(one) for one in value)
+        value = " + ".join(names) or None
     if value is None or "/" in str(value):  # what identifies a campaign stays as it is
         return str(value or "–")
     return words(str(value))
@@ -172,8 +163,8 @@ def target_rows(line: Mapping[str, Any], rows: pd.DataFrame) -> Iterator[Row]:
             continue
         yield {
             **{"figure": line["figure"], "campaigns": line["campaigns"].format(size=size)},
-            **{"target": target, "measured": share_text(measured.value)},
-            **{"95 % interval": interval_text(measured), "n": measured.n, "met": met},
+            **{"target": target, "measured": measured.text()},
+            **{"95 % interval": measured.text("interval"), "n": measured.n, "met": met},
         }
 
 
