@@ -12,7 +12,6 @@ from itertools import combinations, product
 from math import ceil
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from accelstudy.basics.bounds import Range
@@ -151,8 +150,9 @@ class HiddenConfig(Study):
     def _names_exist(self) -> Self:
         _known("designs", "design", self.designs, DESIGNS)
         _known("approaches", "approach", self.approaches, APPROACHES)
-        for set_, block in self._blocks():
-            _known(f"{set_}.kinds", "kind", block.kinds, KINDS[set_][0])
+        for set_ in KINDS:
+            if block := getattr(self, set_):
+                _known(f"{set_}.kinds", "kind", block.kinds, KINDS[set_][0])
         if not self.most:
             raise InputError(f"no campaigns; give at least one of {', '.join(SETS)}")
         CAMPAIGNS.check_key("campaigns in all", self.most)
@@ -194,11 +194,9 @@ class HiddenConfig(Study):
         return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
 
     def job(self, name: str) -> Job:
-        """A job by its name: a part of all campaigns, as large as those of the others."""
-        campaigns, jobs = self.campaigns(), self.jobs
-        ends = np.linspace(0, len(campaigns), len(jobs) + 1).round().astype(int).tolist()
-        i = jobs.index(name)
-        return self.simulated(campaigns[ends[i] : ends[i + 1]])
+        """A job by its name: a part of all campaigns."""
+        start = JOB * int(name)
+        return self.simulated(self.campaigns()[start : start + JOB])
 
     def simulated(self, campaigns: Iterable[Numbered]) -> Job:
         """Campaigns by the physics of the study."""
@@ -210,37 +208,33 @@ class HiddenConfig(Study):
             self.baselines_every,
         )
 
-    def _blocks(self) -> Iterator[tuple[str, Kinds | Sized]]:
-        """Sets of one thing each that are given, and their blocks."""
-        blocks = ((name, getattr(self, name)) for name in KINDS)
-        return ((name, block) for name, block in blocks if block is not None)
-
     def _wanted(self) -> Iterator[tuple[str, str, float | None, int]]:
-        """Set, kind, size and number of the campaigns that are wanted."""
-        if self.nothing is not None:
-            yield "null", "", None, self.nothing.campaigns
-        for set_, block in self._blocks():
-            for kind in KINDS[set_][0] if block.kinds == ["all"] else block.kinds:
+        """Block, kind, size and number of the campaigns that are wanted."""
+        for name, block in ((name, getattr(self, name)) for name in SETS if getattr(self, name)):
+            kinds = getattr(block, "kinds", [""])
+            for kind in KINDS[name][0] if kinds == ["all"] else kinds:
                 for size in getattr(block, "sizes", [None]):
-                    yield set_, kind, size, block.campaigns
-        for size in self.two.sizes if self.two else ():
-            yield "two", "", size, self.two.campaigns if self.two else 0
+                    yield name, kind, size, block.campaigns
 
     def _cases(self) -> Iterator[tuple[list[Case], int]]:
         """Cases among which the campaigns of each kind and size are spread, and how many."""
-        for set_, kind, size, count in self._wanted():
-            lam = () if size is None else (size,)
-            able = [p for p in self.places if not kind or kind in KINDS[set_][1](*p[:2])]
-            if not able and getattr(self, set_).kinds != ["all"]:
-                raise InputError(f"{set_}.kinds: no session of the study can show {kind}")
-            hidden: dict[str, Any] = {"effect": (kind,) if kind else ()}
-            if set_ in ("noise", "gross"):
-                hidden = {set_: kind}
-            if set_ == "two":
-                pairs = [(place, pair) for place in able for pair in distinct_pairs(*place[:2])]
-                yield [Case(set_, *place, pair, 2 * lam) for place, pair in pairs], count
-            else:
-                yield [Case(set_, *place, lam=lam, **hidden) for place in able], count
+        for name, kind, size, count in self._wanted():
+            cases = []
+            for place, hidden in ((p, h) for p in self.places for h in _hidden(name, kind, *p[:2])):
+                lam = () if size is None else (size,) * len(hidden["effect"])
+                cases.append(Case(name.replace("nothing", "null"), *place, lam=lam, **hidden))
+            if not cases and kind and getattr(self, name).kinds != ["all"]:
+                raise InputError(f"{name}.kinds: no session of the study can show {kind}")
+            yield cases, count
+
+
+def _hidden(name: str, kind: str, design: str, approach: str) -> list[dict[str, Any]]:
+    """What is hidden in campaigns of a block and kind, if a session can show it."""
+    if name == "two":
+        return [{"effect": pair} for pair in distinct_pairs(design, approach)]
+    if kind and kind not in KINDS[name][1](design, approach):
+        return []
+    return [{name: kind} if name in ("noise", "gross") else {"effect": (kind,) if kind else ()}]
 
 
 def _spread(cases: Sequence[Case], count: int) -> Iterator[Numbered]:

@@ -101,8 +101,8 @@ def simulate(
     -------
     DataFrame
         A row for each session, angles in rad: the number of positions; the rms of roll and pitch
-        that it claims, the one by the true noise, and the actual error of its calibration; the
-        shares of intervals that contain the truth.
+        by the true noise, and the actual error of its calibration; the shares of intervals that
+        contain the truth.
     """
     cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
     error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
@@ -151,7 +151,6 @@ def _simulate(
         over = np.flatnonzero(going & (kept | (n == most)))
         if len(over):
             outcome = _outcome(chooser, rule, so_far, truth, over)
-            outcome[["claimed_roll", "claimed_pitch"]] = rms[over]
             ended.append(outcome.assign(kept=kept[over]))
             going[over] = False
             if not going.any():

@@ -119,7 +119,7 @@ def test_jobs_hold_each_campaign_once():
     parts = [config.job(name).campaigns for name in config.jobs]
     assert [one for part in parts for one in part] == config.campaigns()
     assert len(parts) == 3
-    assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    assert max(map(len, parts)) == JOB
 
 
 def test_two_effects_mean_different_things():
