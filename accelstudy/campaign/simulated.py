@@ -46,12 +46,13 @@ _RANGES = {
 
 
 @dataclass(frozen=True)
-class CampaignSettings(HoldPlan):
+class CampaignSettings:
     """Settings of a simulated campaign, in SI apart from temperatures in °C.
 
     Parameters
     ----------
     name : str
+    seed : int
     scheme : str
     repeats : int, how often the whole scheme is measured
     repeat_first : int, number of first holds that are measured again at the end
@@ -67,11 +68,12 @@ class CampaignSettings(HoldPlan):
     sigma_known : bool, whether the campaign states it
     robot_sigma : float, rad, of the robot's roll and pitch
     gravity : float, m/s²
-    interval, temperature, temperature_order, vibration, yaw, seed : as in `HoldPlan`
+    interval, temperature, temperature_order, vibration, yaw : as in `HoldPlan`
     n_samples : int, samples per hold, optional; adds their sds
     """
 
     name: str = "simulated"
+    seed: int = 1
     scheme: str = "mclaren-24"
     repeats: int = 1
     repeat_first: int = 0
@@ -87,10 +89,13 @@ class CampaignSettings(HoldPlan):
     robot_sigma: float = 3.2 * MGON
     gravity: float = STANDARD_GRAVITY
     interval: float | None = 60.0
+    temperature: tuple[float, float] | None = None
+    temperature_order: str = "linear"
+    vibration: tuple[float, float] | None = None
+    yaw: str = "none"
     n_samples: int | None = None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if self.order not in ORDERS:
             raise UnknownNameError("order", self.order, ORDERS)
         for key, allowed in _RANGES.items():
@@ -99,6 +104,18 @@ class CampaignSettings(HoldPlan):
         bounds.SIGMA_ANGLE.check_key("robot_sigma", self.robot_sigma / MGON)
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
+
+    @property
+    def holds(self) -> HoldPlan:
+        """Conditions of the holds."""
+        return HoldPlan(
+            self.interval,
+            self.temperature,
+            self.temperature_order,
+            self.vibration,
+            self.yaw,
+            self.seed,
+        )
 
 
 def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
@@ -136,9 +153,9 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
 
     directions = _directions(settings, rng["order"])
-    hold = settings.hold(len(directions))
+    hold = settings.holds.hold(len(directions))
     for effect, _ in present:
-        if column := settings.missing(effect):
+        if column := settings.holds.missing(effect):
             raise InputError(
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"

@@ -1,6 +1,5 @@
 """Files of the user: errors name the file that was read, and none is read without end."""
 
-import gzip
 import json
 import os
 from pathlib import Path
@@ -53,15 +52,6 @@ def test_texts_of_a_file_are_printable_lines(tmp_path):
     assert read_layer(path) == {"a\u00a0b": [" c d\\x1b[31m ", "\t", "C:\\ x"]}
     path.write_text(json.dumps({"a": "b\x1b\nc\ud800"}), encoding="utf-8")
     assert reading.read_json(path, "") == {"a": "b\\x1b c\\ud800"}
-
-
-def test_a_packed_line_has_an_end(tmp_path):
-    path, text = tmp_path / "log.csv.gz", b"fx,fy,fz\n" + 40_000 * b"1,2,3\n"
-    path.write_bytes(gzip.compress(text + 3_000_000 * b"1"))
-    assert path.stat().st_size < 10_000
-    source = open_source(path)
-    with pytest.raises(InputError, match=r"a line of more than 1048576 characters; is it text\?$"):
-        source.columns([0, 1, 2])
 
 
 def test_a_pipe_is_read():
