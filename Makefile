@@ -8,7 +8,8 @@ FOLDER ?= resources/public
 SHELL := bash
 ENV := .venv
 READY := $(ENV)/.ready
-TEST = pytest --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
+# One process more than cores: some wait for a browser, a job or a file of another time.
+TEST = pytest --numprocesses $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
 OLD_NUMPY := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
 
@@ -131,7 +132,7 @@ wheel: $(READY) ## build the package in dist/, with the workflow in it
 lint: $(READY) ## check style and types
 	ruff check
 	ruff format --check
-	mypy
+	mypy --num-workers $(CORES)
 	snakefmt --check Snakefile workflow studies accelstudy/study/template
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
