@@ -8,7 +8,7 @@ FOLDER ?= resources/public
 SHELL := bash
 ENV := .venv
 READY := $(ENV)/.ready
-# One process more than cores: some wait for a browser, a job or a file of another time.
+# One process more than there are cores, as some tests wait for a browser or for a job.
 TEST = pytest --numprocesses $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
 OLD_NUMPY := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
