@@ -8,8 +8,7 @@ FOLDER ?= resources/public
 SHELL := bash
 ENV := .venv
 READY := $(ENV)/.ready
-# One process more than there are cores, as some tests wait for a browser or for a job.
-TEST = pytest --numprocesses $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
+TEST = pytest --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
 OLD_NUMPY := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
 
@@ -132,7 +131,7 @@ wheel: $(READY) ## build the package in dist/, with the workflow in it
 lint: $(READY) ## check style and types
 	ruff check
 	ruff format --check
-	mypy --num-workers $(CORES)
+	mypy
 	snakefmt --check Snakefile workflow studies accelstudy/study/template
 
 lock: $(READY) ## lock the newest versions that pyproject.toml allows
