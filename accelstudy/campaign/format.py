@@ -324,11 +324,12 @@ def _check_forces(
             f"{where}: their norm is about {norm:.3g} m/s², which no unit makes gravity, "
             f"{gravity:g} m/s²; correct the columns"
         )
-    absurd = np.linalg.norm(forces, axis=1) > max(FARTHEST * gravity, FARTHEST * norm)
-    for i in np.flatnonzero(absurd)[: int(plausible)]:
+    absurd = np.linalg.norm(forces, axis=1) > FARTHEST * max(gravity, norm)
+    if plausible and absurd.any():
+        label = labels[int(np.argmax(absurd))]
         raise InputError(
-            f"{where}: {labels[i]}: more than {FARTHEST} times gravity; correct the mean, or leave "
-            "out the hold"
+            f"{where}: {label}: more than {FARTHEST} times gravity; correct the mean, or leave out "
+            "the hold"
         )
 
 

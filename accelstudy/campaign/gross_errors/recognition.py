@@ -220,8 +220,8 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     """
     conversion = campaign.nominal or conversion_of(campaign.unit)
     doubts = check_size(where, campaign.forces, campaign.gravity, campaign.unit, conversion)
-    gross = recognise(campaign, angle_unit=angle_unit) if campaign.angles is not None else None
-    for error in () if gross is None else gross.errors:
+    gross = _of_all_positions(campaign, True, angle_unit) if campaign.angles is not None else []
+    for error in gross:
         if error.name == "unit_error":
             raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
         if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
@@ -255,14 +255,9 @@ def recognise(
     InputError
         If the forces are nowhere near gravity and no unit explains it.
     """
-    errors: list[Mending] = []
-    mended = campaign
-    everywhere = (axes, partial(units, angle_unit=angle_unit))
-    # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
     attitude = attitude and campaign.angles is not None
-    for of_attitude in (False, True)[: 1 + attitude]:
-        errors += _errors(everywhere, mended, of_attitude)
-        mended = errors[-1].campaign if errors else campaign
+    errors = _of_all_positions(campaign, attitude, angle_unit)
+    mended = errors[-1].campaign if errors else campaign
     # A sensor that is mounted askew is no reason to reorder its positions.
     mounted = _is_mounted(mended, attitude)
     # A row that was not exchanged may still be wrong by itself.
@@ -272,6 +267,17 @@ def recognise(
     of_mended = conversion_of("m/s^2")
     check_size(f"{campaign.name}: fx, fy, fz", mended.forces, campaign.gravity, "m/s^2", of_mended)
     return Recognised(tuple(errors)) if errors else None
+
+
+def _of_all_positions(campaign: Campaign, attitude: bool, angle_unit: str) -> list[Mending]:
+    """Gross errors that all positions have: a wrong unit, or wrong axes."""
+    errors: list[Mending] = []
+    everywhere = (axes, partial(units, angle_unit=angle_unit))
+    # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
+    for of_attitude in (False, True)[: 1 + attitude]:
+        mended = errors[-1].campaign if errors else campaign
+        errors += _errors(everywhere, mended, of_attitude)
+    return errors
 
 
 def _errors(
