@@ -90,11 +90,9 @@ def continuous_optimum(
 
 def allowed(space: Space, constraints: Constraints, count: int) -> Array:
     """About `count` allowed attitudes, evenly spread; all of a finite set."""
-    attitudes = space.directions(count)
-    attitudes = attitudes[constraints.allow(attitudes)]
+    attitudes = constraints.keep(space.directions(count))
     if 0 < len(attitudes) < count / 2 and space.tangents(attitudes[:1]).shape[2]:
-        attitudes = space.directions(min(9999, count * count // len(attitudes)))
-        attitudes = attitudes[constraints.allow(attitudes)]
+        attitudes = constraints.keep(space.directions(min(9999, count * count // len(attitudes))))
     return attitudes
 
 

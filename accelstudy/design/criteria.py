@@ -235,9 +235,14 @@ class MeanSquare(Criterion):
         remains = np.diag(form)[part.left] - np.sum(w12 * (inverse @ w12), axis=0)
         return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * part.variance)))
 
+
+@dataclass(frozen=True)
+class Discrimination(MeanSquare):
+    """Mean square of the sizes from which two effects can be told from each other."""
+
     def blind(self, normal: Array) -> str:
-        """Whether a parameter of one of two effects looks like the other, or like nothing."""
-        hidden = self.name == DISCRIMINATE and self.squares(normal).max() > HIDDEN
+        """Whether a parameter of one of the effects looks like the other, or like nothing."""
+        hidden = self.squares(normal).max() > HIDDEN
         return "they do not tell the two effects apart" if hidden else ""
 
 
@@ -257,7 +262,7 @@ def get_criterion(name: str, task: Task) -> Criterion:
         return Determinant(places)
     if name == DISCRIMINATE:
         first, second = (task.places(effect) for effect in task.neglected)
-        return MeanSquare(
+        return Discrimination(
             name,
             "mean square of the sizes at which the two effects can be told from each other",
             tuple(

@@ -251,6 +251,10 @@ class Constraints:
             allowed &= np.arctan2(np.hypot(y, z), np.abs(x)) >= self.pole_distance - TOLERANCE
         return allowed
 
+    def keep(self, directions: Array) -> Array:
+        """Those of directions (n, 3) that meet the constraints on single positions."""
+        return directions[self.allow(directions)]
+
     def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
         """Which of k directions are far enough from all of the others, (k,)."""
         if self.least_angle is None or not len(others):

@@ -110,9 +110,12 @@ class Task:
             self.extended, self.approach, self.noise, directions, None, self.gravity, hold
         )
 
+    def _scaled_rows(self, directions: ArrayLike) -> Array:
+        return self._rows(np.asarray(directions, dtype=float)) / self.scale
+
     def informations(self, directions: ArrayLike) -> Array:
         """Scaled information of each of k positions, (k, u, u)."""
-        return information(self._rows(np.asarray(directions, dtype=float)) / self.scale)
+        return information(self._scaled_rows(directions))
 
     @cached_property
     def _before(self) -> Array:
@@ -123,7 +126,7 @@ class Task:
         known = np.diag([1 / sigmas.get(name, np.inf) for name in self.names]) / self.scale
         if self.measured is None:
             return known
-        rows = self._rows(self.measured) / self.scale
+        rows = self._scaled_rows(self.measured)
         return np.concatenate([known, rows.reshape(-1, len(self.names))])
 
     @cached_property
@@ -137,8 +140,7 @@ class Task:
 
     def information(self, directions: ArrayLike) -> Information:
         """What positions, and what was known before, tell of the scaled parameters."""
-        rows = self._rows(np.asarray(directions, dtype=float)) / self.scale
-        return Information.of(self._before, rows)
+        return Information.of(self._before, self._scaled_rows(directions))
 
     @cached_property
     def tilt(self) -> TiltError:

@@ -77,7 +77,7 @@ def candidates(
     else:
         raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
     roll, pitch = (None if most is None else (-most, most) for most in (max_roll, max_pitch))
-    left = directions[Constraints(roll, pitch, pole_distance).allow(directions)]
+    left = Constraints(roll, pitch, pole_distance).keep(directions)
     if not len(left):
         raise InputError(f"attitudes: none of {name} is within the limits that are given")
     # Simple attitudes first: with vertical axes, then with horizontal ones.
