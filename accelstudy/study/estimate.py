@@ -99,17 +99,13 @@ def _correlation_influence(x: Array, correlation: Array) -> Array:
     return np.asarray(z[:, i] * z[:, j] - correlation * (z[:, i] ** 2 + z[:, j] ** 2) / 2)
 
 
-def _halves(x: Array) -> tuple[Array, Array]:
-    return np.hsplit(x, 2)[0], np.hsplit(x, 2)[1]
-
-
 def _ratio(x: Array) -> Array:
-    sigma, error = _halves(x)
+    sigma, error = np.hsplit(x, 2)
     return np.asarray(sigma.mean(axis=0) / _sd(error))
 
 
 def _ratio_influence(x: Array, ratio: Array) -> Array:
-    sigma, error = _halves(x)
+    sigma, error = np.hsplit(x, 2)
     sd = _sd(error)
     return np.asarray(ratio * (sigma / sigma.mean(axis=0) - 1 - _sd_influence(error, sd) / sd))
 

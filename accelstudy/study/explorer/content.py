@@ -18,10 +18,9 @@ from accelstudy.approaches import get_approach
 from accelstudy.drawing.style import group_label, group_of, in_order, model_title, shown
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
-from accelstudy.study.figures.panels import by_cell
+from accelstudy.study.figures.panels import ANGLES, by_cell
 from accelstudy.study.figures.registry import Tables
 
-ANGLES = ("roll", "pitch")
 ENDS = {"low": 0.025, "high": 0.975}
 """Probabilities at the ends of the central 95 %."""
 QUANTITIES = {

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from accelstudy.basics.units import angles_in, display_unit, unit_label
+from accelstudy.basics.units import angles_in, display_unit
 from accelstudy.basics.wording import comma_list, counted
 from accelstudy.files.cache import cached
 from accelstudy.files.outputs import whole_file
@@ -31,7 +31,6 @@ from accelstudy.study.explorer.content import (
     setups,
 )
 from accelstudy.study.figures import angle_unit
-from accelstudy.study.figures.factors import Factor
 from accelstudy.study.tables import TABLES
 
 QUANTITIES = {
@@ -71,7 +70,7 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
     rows, sds = setups(cells, tables)
     details, levels = parameters(cells, tables), noise_levels(cells)
     approaches, units = list(rows["approach"].unique()), list(details["unit"].unique())
-    noises = {f.name: f"{f.title} / {_unit(f)}" for f in levels if f.name in rows}
+    noises = {f.name: f"{f.title} / {f.shown_unit}" for f in levels if f.name in rows}
     fields = {"model": "model", "scheme": "scheme", "n": "positions", **noises}
     columns = {
         **{"model": "model", "scheme": "scheme", "approach": "approach", "n": "positions"},
@@ -87,7 +86,7 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
         "charts": charts.all_charts(approaches, [*fields]),
     }
     fixed = [
-        f"{factor.title} {level.max():.4g} {_unit(factor)}"
+        f"{factor.title} {level.max():.4g} {factor.shown_unit}"
         for factor, level in levels.items()
         if level.min() == level.max() != 0
     ]
@@ -114,10 +113,6 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
             "correlations": packed(records(correlations(cells, tables))),
         },
     )
-
-
-def _unit(factor: Factor) -> str:
-    return "" if factor.unit == "1" else unit_label(display_unit(factor.unit))
 
 
 def _start(study: Study, cells: pd.DataFrame) -> int:

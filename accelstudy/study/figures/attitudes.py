@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import jacobian, sigma_roll_pitch, specific_force
-from accelstudy.study.figures.panels import TILTS, key, panels, surface
+from accelstudy.study.figures.panels import ANGLES, key, panels, surface
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 from accelstudy.study.figures.total_effects import read_shares
 
@@ -105,7 +105,7 @@ def sigma_table(roll: ArrayLike, pitch: ArrayLike, noise: ArrayLike, g: float) -
     angles = {"roll": to_attitude(roll * GON), "pitch": to_attitude(pitch * GON)}
     table = pd.DataFrame({**angles, "unit": attitude_unit(), "noise": noise * 1e3})
     return pd.concat(
-        [table.assign(angle=name, sigma=s) for name, s in zip(TILTS, sigma.T, strict=True)]
+        [table.assign(angle=name, sigma=s) for name, s in zip(ANGLES, sigma.T, strict=True)]
     )
 
 
@@ -130,7 +130,7 @@ def effects_of_forces(tables: Tables, study: Study) -> Figure:
 
     def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
         first = rows.iloc[0]
-        place = ..., TILTS.index(first["output"]), FORCES.index(first["input"])
+        place = ..., ANGLES.index(first["output"]), FORCES.index(first["input"])
         at = [
             np.linspace(max(rows[name].min() - 5, -most), min(rows[name].max() + 5, most))
             for name, most in (("roll_gon", 200), ("pitch_gon", 99.9))

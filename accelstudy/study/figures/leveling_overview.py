@@ -11,8 +11,8 @@ from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
 from accelstudy.study.figures.panels import (
+    ANGLES,
     FAILED,
-    TILTS,
     by_cell,
     in_shown_units,
     key,
@@ -89,7 +89,7 @@ def tilt_table(tables: Tables) -> DataFrame:
     import pandas as pd
 
     both, parts = by_cell(tables["leveling"], "both_rms_q95_mgon"), []
-    for angle in TILTS:
+    for angle in ANGLES:
         rms = by_cell(tables["leveling"], f"{angle}_rms_mgon")
         cells = tables["cells"][["cell", "scheme", "model", "approach"]]
         numbers = {"rms": cells["cell"].map(rms), "both": cells["cell"].map(both)}

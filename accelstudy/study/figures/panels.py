@@ -26,7 +26,7 @@ MOST = 12
 SMALLEST_BIAS = 0.01
 """Smallest bias that is drawn, as a share of the sd. Adjustments have a bias of their own, which is
 smaller and yet can be significant."""
-TILTS = ("roll", "pitch")
+ANGLES = ("roll", "pitch")
 FAILED: style.Style = {"linestyle": "", "marker": "x", "markersize": 4}
 """Mark of what cannot be estimated, or has not converged."""
 BESIDE = {"title": [(-1, 0), (0, -1)], "xlabel": [(1, 0)], "ylabel": [(0, -1)]}
@@ -170,7 +170,7 @@ def accuracies(tables: Tables) -> DataFrame:
     bias = sds["squared"].where(np.isfinite(sds["squared"])) ** 0.5
     label = sds["group"].map(style.group_label)
     parts = [in_group_order(sds.assign(bias=bias, label=label, quantity="sd"))]
-    for angle in TILTS:
+    for angle in ANGLES:
         tilt = pd.DataFrame({"cell": summary["cell"].unique(), "group": angle, "unit": "mgon"})
         rms = tilt["cell"].map(by_cell(tables["leveling"], f"{angle}_rms_mgon"))
         tilt = tilt.assign(value=rms, estimable=rms.notna(), label=f"{angle} error")

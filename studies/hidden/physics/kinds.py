@@ -199,9 +199,8 @@ class Kind:
         k, size = USUAL[target]
         self.k, self.typical, self.settings = count or k, typical or size, settings
         self.code = compile(formula, name, "eval")
-        self.needs = {COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES} - {
-            ""
-        }
+        named = (COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES)
+        self.needs = set(filter(None, named))
 
     @property
     def place(self) -> Place | None:
