@@ -42,15 +42,16 @@ class Rules:
     # --- how well the noise is known before, by degrees of freedom or a standard deviation --------
 
     freedom_given: float = 200.0
-    """Of a sigma that is right: people know it to 5 %."""
+    """Degrees of freedom of a sigma that is right: people know it to 5 %."""
     freedom_doubted: float = 3.0
-    """Of one that is wrong: anything from half to twice is usual then."""
+    """Degrees of freedom of a sigma that is wrong: anything from half to twice is usual then."""
     freedom_not_given: float = 1e-3
-    """Of one that is not given: its size says nothing."""
+    """Degrees of freedom of a sigma that is not given: its size says nothing."""
     spread_axes: float = 0.7
-    """Sd of log κ about equal axes: a factor of two in variance is usual."""
+    """Prior sd of log κ about equal axes, with κ the ratios of the variances of the axes: a factor
+    of two is usual."""
     spread_within: float = 0.35
-    """Sd of log κ about the ratios within the holds."""
+    """Prior sd of log κ about the ratios within the holds."""
     beyond_white: float = 5.0
     """Ratio of variances up to which white noise within the holds may explain the scatter of
     means."""
@@ -58,17 +59,19 @@ class Rules:
     # --- levels of tests, which make 5 % false alarms together ----------------------------------
 
     level_effects: float = 0.04
-    """Of the test for anything that is missing; where sigma is given, its test takes a part."""
+    """Level of the test for anything that is missing; where sigma is given, the test of its size
+    takes a part."""
     level_noise: float = 0.01
-    """Family-wise, of all tests of the noise but that of its level."""
+    """Family-wise level of all tests of the noise but that of its size."""
     level_sigma: float = REFUTED
-    """Of the test of the noise level, and of any fit that is accepted."""
+    """Level of the test of the size of the noise, and of any fit that is accepted."""
     level_confirmed: float = 0.05
-    """Something is confirmed on held-out positions though nothing is missing."""
+    """Probability that something is confirmed on held-out positions though nothing is missing."""
     level_component: float = 0.01
-    """Of the test whether a component takes part in a formula."""
+    """Level of the test whether a component takes part in a formula."""
     z_significant: float = 1.645
-    """One-sided 5 % of the standard normal distribution: a correction of held-out positions."""
+    """Size from which on a correction of held-out positions, over its sigma, is significant: 5 %,
+    one-sided."""
     z_refuted: float = 2.576
     """Shortfall of a correction, over its sigma, that a right model has in 0.5 % of cases."""
 
