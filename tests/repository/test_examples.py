@@ -92,6 +92,14 @@ def test_pictures_of_reports_show_what_the_reports_say(run, tmp_path):
     assert not old, f"docs/figures has {', '.join(old)} of other pages; `{MADE_BY}` makes them anew"
 
 
+def test_the_start_page_quotes_the_plan_that_the_golden_set_keeps():
+    quoted = re.search(
+        r"```\{.text .wrap\}\n(.*?)```", (ROOT / "docs/start/index.md").read_text("utf-8"), re.S
+    )
+    printed = re.findall("^> (.*\n)", kept_of("plans")["docs-start-index"], re.M)
+    assert quoted[1] == "".join(printed[: quoted[1].count("\n")])
+
+
 def of_lines(text):
     """First word of each line, and its numbers."""
     return {line.split()[0].rstrip(":"): numbers(line) for line in text.splitlines() if line}
