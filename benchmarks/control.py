@@ -3,7 +3,7 @@
     python benchmarks/control.py            # some hours of one core
     python benchmarks/control.py --quick    # minutes
 
-It prints the tables of `docs/theory/control-variates.md`: rms of z, share below 1.96, median gain.
+It prints rms of z, share below 1.96 and median gain; docs/theory/control-variates.md sums up.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Commands made of verbs: an option for each keyword, with the help of the docstring.
 
 What is of the terminal alone is added here: --out and --force, --angle-unit and --quiet, progress,
-and what is printed.
+and what is printed. cyclopts reads signatures and docstrings, too, but takes 0.2 s longer for
+`--help`, and shows defaults of quantities in SI and errors in boxes.
 """
 
 from __future__ import annotations
