@@ -41,24 +41,19 @@ class SensorType:
 
 
 class TypicalParameter(BaseModel):
-    """A parameter over the sensors of a type, SI.
+    """A parameter over the sensors of a type, SI."""
 
-    Attributes
-    ----------
-    mean : float, of the type
-    sigma : float, of the mean
-    scatter : float, from sensor to sensor, sd
-    scatter_below : float, bound of the scatter that holds in 9 of 10 lots
-    unit : str
-    in_all : bool, whether all sensors of the type have it
-    """
-
-    mean: ParameterValue
-    sigma: ParameterSigma
-    scatter: ParameterSigma
-    scatter_below: ParameterSigma
-    unit: str
-    in_all: bool
+    mean: ParameterValue = Field(description="mean of the type")
+    sigma: ParameterSigma = Field(description="its standard deviation")
+    scatter: ParameterSigma = Field(description="standard deviation from sensor to sensor")
+    scatter_below: ParameterSigma = Field(
+        description="bound below which the scatter is with a probability of 90 %"
+    )
+    unit: str = Field(description="SI unit")
+    in_all: bool = Field(
+        description="whether it tells of the next sensor: all sensors have it, and it belongs to "
+        "the sensor and not to its mounting"
+    )
 
     @property
     def sigma_next(self) -> float:
@@ -67,12 +62,12 @@ class TypicalParameter(BaseModel):
 
 
 class TypeFile(BaseModel):
-    """The part of a file of a type that is not that of a data sheet."""
+    """What is known of the next sensor of a type, beside the keys of a data sheet."""
 
-    schema_version: Annotated[Literal[1], Number]
-    models: dict[str, Any]
-    sensors: int = Field(ge=1)
-    parameters: dict[str, TypicalParameter]
+    schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
+    models: dict[str, Any] = Field(description="model of the type, without sudden effects")
+    sensors: int = Field(ge=1, description="how many were calibrated and are not odd")
+    parameters: dict[str, TypicalParameter] = Field(description="parameters by their names")
 
 
 def read_type(path: str | Path, model: SensorModel) -> SensorType:

@@ -1,4 +1,4 @@
-"""Tables of what may stand in the files of campaigns and diagnoses."""
+"""Tables of what may stand in files."""
 
 from pathlib import Path
 
@@ -8,9 +8,10 @@ from markdown_text import code, plain, table
 from schemas import blocks
 
 from accelstudy.campaign.header import ANY, COLUMNS, HEADER, Header
+from accelstudy.campaign.of_type import TYPE_FILE, TypeFile
 from accelstudy.diagnosis.rules import RULES
 
-SCHEMA = Path(__file__).parent.parent / "reference/diagnosis.schema.yaml"
+REFERENCE = Path(__file__).parent.parent / "reference"
 
 
 def positions():
@@ -36,10 +37,15 @@ def header():
     return blocks(Header.model_json_schema(), f"Campaign: `{HEADER}`", "header: ")
 
 
-def diagnosis():
-    """Keys of a diagnosis."""
-    schema = yaml.safe_load(SCHEMA.read_text("utf-8"))
-    return blocks(schema, "Diagnosis: `diagnosis.json`", "diagnosis: ")
+def document(title, name):
+    """Keys of a JSON file that has a schema of its own."""
+    schema = yaml.safe_load((REFERENCE / f"{name}.schema.yaml").read_text("utf-8"))
+    return blocks(schema, f"{title}: `{name}.json`", f"{name}: ")
+
+
+def of_type():
+    """Keys of the file of a type."""
+    return blocks(TypeFile.model_json_schema(), f"Lot: `{TYPE_FILE}`", "type: ")
 
 
 def rules(priors):

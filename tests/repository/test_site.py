@@ -8,9 +8,12 @@ import json
 import re
 from datetime import datetime
 from importlib import import_module
+from unittest.mock import ANY
 
 import griffe
 import numpy as np
+import yaml
+from jsonschema import Draft202012Validator
 from places import ROOT
 from study_helpers import grid, make_study, run_study
 
@@ -27,7 +30,6 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.of_type import TypeFile, TypicalParameter
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.history import compare, history_of
 from accelstudy.epochs.output import comparison_document, history_document, history_table
@@ -41,8 +43,8 @@ from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
-IN_ALL = {"schema_version", "verdict"}
-"""Keys that the head of the page describes, for all files."""
+OPTIONAL = {"sigma_position_axes_mps2"}
+"""Keys that a file need not have."""
 PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
 
 
@@ -72,32 +74,46 @@ def test_each_column_of_a_study_is_described(tmp_path):
         assert said[file] == list(table), name
 
 
-def test_each_key_of_a_calibration_is_described():
+def strict(schema):
+    """Let a schema take all keys that it describes, and no others."""
+    if isinstance(schema, list):
+        return [strict(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    content = {key: strict(value) for key, value in schema.items()}
+    if "properties" in schema and "type" in schema:
+        content |= {"required": [*{*schema["properties"]} - OPTIONAL]}
+        content |= {"additionalProperties": False}
+    return content
+
+
+def test_each_key_and_column_of_a_calibration_is_described():
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-12"))
-    fit = fit_campaign(campaign, get_model("bias-scale"), get_approach("robot"))
-    assessment = assess(fit)
-    document = {**calibration_document(fit), "quality": quality_document(assessment)}
+    assessment = assess(fit_campaign(campaign, get_model("bias-scale"), get_approach("robot")))
+    document = calibration_document(assessment.fit)
+    document |= {"quality": quality_document(assessment)}
     one = calibration_of(json.loads(json_text(document)))
     history = history_of([one] * 3, [datetime(2025, month, 1) for month in (1, 2, 3)])
     written = {
-        "calibration.json": set(_keys(document)),
-        "comparison.json": set(_keys(comparison_document(compare(one, one), 1.0))),
-        "history.json": set(_keys(history_document(history))),
-        "history.parquet": set(history_table(history)),
-        "lot.json": {*_keys(_lot()), "files"},
-        "type.yaml": {
-            *TypeFile.model_fields,
-            *(f"parameters.{n}" for n in TypicalParameter.model_fields),
-        },
-        "positions.parquet": set(assessed_positions(assessment)),
-        "campaigns.parquet": set(CAMPAIGN_COLUMNS),
-        "parameters.parquet": set(PARAMETER_COLUMNS),
+        "calibration": document,
+        "comparison": comparison_document(compare(one, one), 1.0),
+        "history": history_document(history),
+        "lot": {**_lot(), "files": []},
     }
-    said = {name: set(columns) for name, columns in described("file-formats").items() if columns}
-    assert {name: said[name] | IN_ALL for name in written} == {
-        name: keys | IN_ALL for name, keys in written.items()
+    for name, content in written.items():
+        path = ROOT / f"docs/reference/{name}.schema.yaml"
+        schema = Draft202012Validator(strict(yaml.safe_load(path.read_text(encoding="utf-8"))))
+        said = [error.message for error in schema.iter_errors(json.loads(json_text(content)))]
+        assert said == [], name
+    assert described("file-formats") == {
+        "positions.csv": [],
+        "positions.parquet": list(assessed_positions(assessment)),
+        "calibration.h": ANY,
+        "calibration.params": ANY,
+        "history.parquet": list(history_table(history)),
+        "campaigns.parquet": list(CAMPAIGN_COLUMNS),
+        "parameters.parquet": list(PARAMETER_COLUMNS),
     }
-    assert said.keys() - written == {"calibration.h", "calibration.params"}
 
 
 def test_each_name_of_an_exported_calibration_is_described():
@@ -128,17 +144,6 @@ def _lot():
     model, effects = get_model("bias-scale"), tuple((found, None) for _, found in one.found)
     lot = Lot((one, one), model, effects)
     return lot_document(CalibratedLot(lot, model, [None] * 3, get_approach("robot"), {}))
-
-
-def _keys(document):
-    """Keys as the page has them: those of blocks that it takes apart stand behind a dot."""
-    for key, value in document.items():
-        if key != "quality":
-            yield key
-        listed = key in ("parameters", "effects") and isinstance(value[0], dict)
-        inner = value[0] if listed else value
-        if listed or key in ("affine", "quality"):
-            yield from (f"{key}.{each}" for each in inner)
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean(monkeypatch):
