@@ -44,10 +44,6 @@ SKIPPED = {
     r".*(zsh|fish)_source": "is for another shell",
 }
 """Beginnings of commands that are not run -> why."""
-ELSEWHERE = dict.fromkeys(
-    ("accelstudy compare", "accelstudy lot"), "stands in the part `first`, with those of --help"
-)
-"""The same, of the README, which is to be compared in seconds."""
 
 
 def log_table(seed, noise=0.005):
@@ -121,8 +117,7 @@ def pages(folder, part) -> Texts:
     if part == "first":
         examples = (text.partition("Example:\n")[2] for _, text in helps(folder))
         commands["help-examples"] = commands_of_script("".join(examples))
-        commands["README"] = [x for x in commands["README"] if not x.startswith((*ELSEWHERE,))]
-    for name, text in walk(folder, commands, SKIPPED | (ELSEWHERE if part == "readme" else {})):
+    for name, text in walk(folder, commands):
         if (part, name) != ("first", "README"):  # the others take files from it
             yield name, text
 
