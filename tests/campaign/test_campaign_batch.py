@@ -13,10 +13,10 @@ import pytest
 import yaml
 from calling import refused
 from campaign_helpers import simulated_campaign
+from log_helpers import session, write
 from page_helpers import assert_sound, text_of
-from places import DATA, ROOT, needs_data
+from places import ROOT
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
-from test_import_holds import session, write
 
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.batch.config import Task, parse_batch
@@ -29,7 +29,7 @@ from accelstudy.campaign.batch.overview import (
 from accelstudy.campaign.batch.run import run_task
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.public import public_data, record_public
+from accelstudy.campaign.importing.public import public_data
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
@@ -209,13 +209,6 @@ def test_origin(made, monkeypatch):
         assert read_origin(results / f"{name}.parquet")["config_hash"] == expected
 
 
-def test_an_imported_log_is_kept_as_a_campaign(made):
-    folder = made / "results" / "bench" / "campaigns" / "session" / "campaign"
-    assert {path.name for path in folder.iterdir()} == {
-        *("campaign.yaml", "positions.csv", "segmentation.png", "segmentation.svg")
-    }
-
-
 # --- what runs again -----------------------------------------------------------------------------
 
 
@@ -236,11 +229,16 @@ def changed(made, tmp_path_factory):
     return folder / "results" / "bench", succeed(folder, BATCH)
 
 
-def test_only_what_changed_runs_again(changed):
+def test_only_what_changed_runs_again(changed, made):
     results, text = changed
     assert calibrated(text) == {"plain", "spoilt"}
     assert jobs(text) == {"calibrate": 2, "overview": 1}
     one_line(text, "4 of 5 campaigns calibrated")
+    before, after = (
+        read_table(folder / "campaigns.parquet").set_index("campaign")
+        for folder in (made / "results/bench", results)
+    )
+    assert after.loc["spoilt", "sigma0"] == before.loc["plain", "sigma0"]
 
     # And so would one more, and a log that is calibrated otherwise.
     folder = results.parents[1]
@@ -248,14 +246,6 @@ def test_only_what_changed_runs_again(changed):
     entries = [*BATCH["campaigns"][:3], {**BATCH["campaigns"][3], "model": "bias-scale"}]
     plan = succeed(folder, {**BATCH, "campaigns": entries}, "--dry-run")
     assert set(re.findall("Calibrate (\\S+)", plan)) == {"another-one", "session"}
-
-
-def test_a_mended_campaign_is_good(changed, made):
-    before, after = (
-        read_table(results / "campaigns.parquet").set_index("campaign")
-        for results in (made / "results" / "bench", changed[0])
-    )
-    assert after.loc["spoilt", "sigma0"] == before.loc["plain", "sigma0"]
 
 
 def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
@@ -327,25 +317,6 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_pat
         assert "mgon" not in page
     # What is there is not got again, though pages are written in another unit.
     assert jobs(succeed(tmp_path, config, "--dry-run")) == {"calibrate": 1, "overview": 1}
-
-
-@needs_data
-def test_public_data_from_a_folder_that_has_them(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    entries = [{"public": name} for name in ("mpu9150-0", "innalabs-24", "ferraris-annotated")]
-    batch = parse_batch({"batch": "public", "public_folder": str(DATA), "campaigns": entries})
-    for task in batch.tasks():
-        record_public(task.source, batch.public_folder, f"{task.name}.json", 1)
-    errors = {task.name: run_task(task, task.name, f"{task.name}.json") for task in batch.tasks()}
-    assert errors["ferraris-annotated"].startswith("6 positions do not determine the model")
-    table = summarised(tmp_path, [tmp_path / name for name in errors])[0].set_index("campaign")
-    assert table["status"].tolist() == ["ok", "ok", "failed"]
-    assert table.loc["innalabs-24", "rms_norm_residual_mps2"] == pytest.approx(
-        0.4256e-3 * 9.80665, rel=1e-3
-    )
-    assert table.loc["mpu9150-0", "rms_norm_residual_mps2"] == pytest.approx(2.1e-3, rel=0.1)
-    assert table.loc["mpu9150-0", "accepted"]
-    assert not Path("resources").exists()
 
 
 # --- configuration -------------------------------------------------------------------------------

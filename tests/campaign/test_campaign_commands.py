@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call, refusal, succeed
+from calling import call, succeed
 from campaign_helpers import GRAVITY, NINE, simulated_campaign
 from page_helpers import assert_sound, text_of
 from stand_ins import composed
@@ -244,29 +244,6 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
         for lines in found:
             assert (f"No sensor is like this: {said}" in " ".join(lines)) == (said is not None)
             assert ("a wrong scale" in " ".join(lines)) == (said is not None)
-
-
-def test_a_bad_log_is_one_line(calibrations, tmp_path):
-    calibration = calibrations["gravity"][1] / "calibration.json"
-    log = tmp_path / "log.csv"
-    log.write_text("fx,fy,fz\n1,2,x\n", encoding="utf-8")
-    line = refusal("apply", calibration, log, "--out", tmp_path / "x.csv")
-    assert "line 2, column fz (fz): 'x'" in line
-    assert not (tmp_path / "x.csv").exists()
-    log.write_text("1,2,9\n", encoding="utf-8")
-    arguments = "apply", calibration, log, "--out", tmp_path / "x.csv"
-    assert "--columns: expected fx=1" in call(*arguments, "--columns", "0,1,2").stderr
-    assert call(*arguments, "--columns", "fx=1,fy=0,fz=2", "--unit", "m/s^2").exit_code == 0
-    assert "--force" in call(*arguments).stderr
-    assert "is the input" in call(*arguments[:4], log, "--force").stderr
-    assert log.read_text(encoding="utf-8") == "1,2,9\n"
-
-
-@pytest.mark.parametrize("command", ["calibrate", "export", "check-sigmas"])
-def test_what_is_not_there_is_one_line(command, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert "nowhere" in refusal(command, "nowhere", *(["--out", "out"] * (command == "calibrate")))
-    assert not list(tmp_path.iterdir())
 
 
 def test_no_position_predicted_by_the_others(tmp_path):

@@ -1,6 +1,5 @@
 """Calibration of measured campaigns: known parameters, public data, gauges, exports."""
 
-import json
 import math
 import re
 from dataclasses import replace
@@ -13,15 +12,13 @@ from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.applying import SensorCalibration, affine_form
+from accelstudy.campaign.calibration.applying import affine_form
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import GAUGES, in_gauge
-from accelstudy.campaign.calibration.export import device_matrix, export
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
@@ -88,40 +85,6 @@ def test_a_nonlinear_model_has_no_matrix():
     assert affine_form(model, model.vector({"k2_x": 1e-3})) is None
 
 
-def calibration_in(unit, nominal=None):
-    p = NINE.vector({"b_x": 0.1, "s_x": 0.01, "alpha_yz": 0.02})
-    content = {
-        "campaign": "test", "model": NINE.name, "effects": [e.spec for e in NINE.effects],
-        "unit": unit, "nominal": nominal, "parameters": [
-            {"name": q.name, "value": value, "sigma": 1.0, "unit": q.unit}
-            for q, value in zip(NINE.parameters, p.tolist(), strict=True)
-        ],
-    }  # fmt: skip
-    return SensorCalibration(NINE, p, np.eye(9), 9.81, content)
-
-
-@pytest.mark.parametrize(("unit", "nominal"), [
-    ("m/s^2", None),
-    ("g", None),
-    ("counts", {"scale": [0.02, 0.021, 0.019], "offset": [33000, 33100, 32900]}),
-])  # fmt: skip
-def test_the_device_matrix_takes_raw_readings(unit, nominal):
-    calibration = calibration_in(unit, nominal)
-    matrix = device_matrix(calibration)
-    raw = np.random.default_rng(1).normal(0, 1, (10, 3))
-    if unit == "counts":
-        raw = 33000 + 400 * raw
-        forces = (raw - nominal["offset"]) * nominal["scale"]
-    else:
-        forces = raw * (9.80665 if unit == "g" else 1)
-    k, bias = affine_form(NINE, calibration.parameters)
-    applied = np.column_stack([raw, np.ones(10)]) @ matrix.T
-    np.testing.assert_allclose(applied, (forces - bias) @ k.T, rtol=0, atol=1e-9)
-    plain = np.array([row.split() for row in export(calibration, "matrix").splitlines()], float)
-    np.testing.assert_allclose(plain, matrix, rtol=1e-11)
-    assert json.loads(export(calibration, "json"))["matrix_3x4"] == matrix.tolist()
-
-
 @pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 def test_the_claimed_sigmas_hold_in_simulation(approach):
     fit = fit_campaign(simulated_campaign({"b_x": 0.1, "s_y": 0.01}), NINE, approach)
@@ -152,14 +115,6 @@ def _in_conflict(campaign):
     advised = "“accelstudy diagnose” looks for what is wrong or missing." in lines
     assert advised == bool(found)
     return found
-
-
-def test_repeats_of_too_few_attitudes_are_told():
-    """Noise makes the design regular, but six attitudes hold no nine parameters."""
-    settings = CampaignSettings(scheme="faces-6", repeats=3, approach="gravity")
-    campaign, _ = simulate_campaign(settings)
-    with pytest.raises(InputError, match=r"18 positions do not determine .* rank 6 of 9: .*alpha"):
-        fit_campaign(campaign, NINE, GRAVITY)
 
 
 GOLDEN = (1 + 5**0.5) / 2

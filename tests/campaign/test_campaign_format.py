@@ -1,7 +1,7 @@
 """The campaign format: what is written is read again, and what is wrong ends in one clear line."""
 
+import shutil
 from dataclasses import fields, replace
-from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -9,7 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from calling import refused
+from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError, printable_line
@@ -235,23 +236,12 @@ def test_tolerated_ways_of_writing_csv(tmp_path):
     assert_same(read_campaign(tmp_path), campaign())
 
 
-# Bad input: what is done to a file, which the message must name, and what else it must say.
-
-
-def in_file(name):
-    """Decorator of a change of one file."""
-
-    def named(change):
-        change.file = name
-        return change
-
-    return named
+# Bad input: what is done to the files, and what the message must say.
 
 
 def header(**changes):
     """Change keys of campaign.yaml; None removes one."""
 
-    @in_file("campaign.yaml")
     def change(folder):
         path = folder / "campaign.yaml"
         content = yaml.safe_load(path.read_text()) | changes
@@ -263,7 +253,6 @@ def header(**changes):
 def columns(**changes):
     """Change columns of the table, by a function of the old one; None removes one."""
 
-    @in_file("positions.csv")
     def change(folder):
         path = folder / "positions.csv"
         rows = [line.split(",") for line in path.read_text().splitlines()]
@@ -278,6 +267,10 @@ def columns(**changes):
     return change
 
 
+def forces(factor):
+    return columns(**dict.fromkeys(("fx", "fy", "fz"), times(factor)))
+
+
 def at(position, value):
     """Column with one other value."""
     return lambda old: [*old[: position - 1], value, *old[position:]]
@@ -288,15 +281,11 @@ def times(factor):
 
 
 def text(name, content):
-    @in_file(name)
-    def change(folder):
-        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-
-    return change
+    encoded = content if isinstance(content, bytes) else content.encode()
+    return lambda folder: (folder / name).write_bytes(encoded)
 
 
 def cut(name, share):
-    @in_file(name)
     def change(folder):
         content = (folder / name).read_bytes()
         (folder / name).write_bytes(content[: int(share * len(content))])
@@ -308,9 +297,24 @@ def remove(name):
     return lambda folder: (folder / name).unlink()
 
 
-def both(*changes):
-    """Several changes, or one of which the message names another file."""
+def parquet(fx, name="fx"):
+    """The table as Parquet, with another column."""
 
+    def change(folder):
+        (folder / "positions.csv").unlink()
+        write_campaign(campaign(), folder, "parquet")
+        path = folder / "positions.parquet"
+        table = pq.read_table(path)
+        if name == "fx":
+            table = table.set_column(table.column_names.index("fx"), "fx", pa.array(fx))
+        else:
+            table = table.append_column("fx", table["fx"])
+        pq.write_table(table, path)
+
+    return change
+
+
+def both(*changes):
     def change(folder):
         for one in changes:
             one(folder)
@@ -325,23 +329,14 @@ BAD = {
     "no table": (remove("positions.csv"), "no table", "positions.csv or positions.parquet"),
     "two tables": (both(text("positions.parquet", "")), "two tables", "either positions.csv or"),
     "unknown key": (header(sensr="x"), "sensr: unknown key", "did you mean 'sensor'"),
-    "unknown key below": (header(gravity={"value_mps2": 9.8, "sigma": 0}),
-                          "gravity.sigma: unknown key", "did you mean 'sigma_mps2'"),
     "version": (header(schema_version=2), "schema_version", "2 is of a newer version"),
-    "no name": (header(name=None), "name", "must be given"),
     "unit": (header(unit="ug"), "unit", "'m/s^2', 'g', 'mg' or 'counts'", "not 'ug'"),
-    "no gravity": (header(gravity={}), "gravity.value_mps2", "must be given"),
     "negative gravity": (header(gravity={"value_mps2": -9.81}), "from 0.001 to 1000"),
-    "gravity in g": (both(header(gravity={"value_mps2": 1})), "gravity of 1 m/s²",
+    "gravity in g": (header(gravity={"value_mps2": 1}), "gravity of 1 m/s²",
                      "campaign.yaml and", "`gravity`"),
-    "negative sigma of gravity": (header(gravity={"value_mps2": 9.81, "sigma_mps2": -1}),
-                                  "gravity.sigma_mps2"),
-    "no noise at all": (header(sensor_noise={"sigma_mps2": 0}), "sensor_noise.sigma_mps2"),
     "counts without nominal": (header(unit="counts"), "nominal: missing"),
     "nominal without counts": (header(nominal={"scale": [1, 1, 1], "offset": [0, 0, 0]}),
                                "nominal: goes with unit: counts, not with unit: m/s^2"),
-    "two scales": (header(unit="counts", nominal={"scale": [1, 1], "offset": [0, 0, 0]}),
-                   "nominal.scale", "at least 3"),
     "scale zero": (header(unit="counts", nominal={"scale": [1, 0, 1], "offset": [0, 0, 0]}),
                    "nominal.scale.1", "zero"),
     "empty CSV": (text("positions.csv", ""), "empty", "position, fx, fy, fz"),
@@ -356,10 +351,8 @@ BAD = {
     "no positions": (columns(position=None), "position: the column is missing"),
     "word": (columns(fx=at(3, "abc")), "fx: position 3: 'abc' is no number"),
     "decimal comma": (columns(fx=at(3, '"9"";8"')), "position 3", "is no number"),
-    "underscore": (columns(fx=at(3, "9_8")), "fx: position 3: '9_8' is no number"),
     "gap": (columns(fz=at(2, "")), "fz: position 2: empty"),
     "nan": (columns(fx=at(4, "nan")), "fx: position 4: nan is not finite"),
-    "inf": (columns(sd_fx=at(4, "-inf")), "sd_fx: position 4: -inf is not finite"),
     "overflow": (columns(fx=at(4, "1e999")), "fx: position 4", "not finite"),
     "stuck channel": (columns(fy=lambda old: [1.5] * 8), "fy: 1.5 in all positions"),
     "same position": (columns(position=at(3, 2)), "position: position 2: 2 follows"),
@@ -368,7 +361,6 @@ BAD = {
     "no position": (columns(position=at(6, "")), "position: row 6: empty"),
     "half a position": (columns(position=at(3, 2.5)), "2.5 is no whole number"),
     "no samples": (columns(n_samples=at(2, 0)), "n_samples: position 2: must be from 1 to"),
-    "many samples": (columns(n_samples=at(2, 1e300)), "n_samples: position 2", "not 1e+300"),
     "negative sd": (columns(sd_fy=at(5, -0.1)), "sd_fy: position 5: must be from 0 to"),
     "one sd": (columns(sd_fx=None), "sd_fx: the column is missing", "sd_fy, sd_fz"),
     "too cold": (columns(temperature_degC=at(1, -300)), "temperature_degC: position 1: ",
@@ -384,92 +376,56 @@ BAD = {
                        "must be from -400 to 400 gon"),
     "robot without sigma": (header(robot=None), "robot.angle_sigma_mgon: missing"),
     "sigma without robot": (
-        both(columns(**dict.fromkeys(ROBOT_COLUMNS))),
+        columns(**dict.fromkeys(ROBOT_COLUMNS)),
         "robot.angle_sigma_mgon: is given, but positions.csv has no roll_robot_gon",
     ),
     "degrees": (columns(roll_robot_gon=times(0.9), pitch_robot_gon=times(0.9)),
                 "the robot's angles are in degrees, not in gon"),
     "radians": (columns(roll_robot_gon=times(GON), pitch_robot_gon=times(GON)),
                 "the robot's angles are in radians, not in gon"),
-    "opposite sign": (columns(fx=times(-1), fy=times(-1), fz=times(-1)), "axes have the wrong sign",
+    "opposite sign": (forces(-1), "axes have the wrong sign",
                       "(0, 0, −g)"),
-    "g for m/s^2": (columns(fx=times(1 / G), fy=times(1 / G), fz=times(1 / G)), "about 1 m/s²",
+    "g for m/s^2": (forces(1 / G), "about 1 m/s²",
                     "look like g, not m/s^2"),
-    "m/s^2 for g": (both(header(unit="g")), "look like m/s^2, not g", "campaign.yaml and"),
-    "counts for m/s^2": (columns(fx=times(1e3), fy=times(1e3), fz=times(1e3)),
+    "m/s^2 for g": (header(unit="g"), "look like m/s^2, not g", "campaign.yaml and"),
+    "counts for m/s^2": (forces(1e3),
                          "look like counts, not m/s^2"),
     "m/s^2 for counts": (
-        both(header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]})),
+        header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
         "look like m/s^2, not counts",
     ),
     "wrong nominal": (
         both(
             header(unit="counts", nominal={"scale": [0.01] * 3, "offset": [0, 0, 0]}),
-            columns(fx=times(400), fy=times(400), fz=times(400)),
+            forces(400),
         ),
         "positions.csv: ", "nowhere near gravity", "`scale`",
     ),
-    "no unit fits": (columns(fx=times(0.3), fy=times(0.3), fz=times(0.3)),
+    "no unit fits": (forces(0.3),
                      "nowhere near gravity, 9.81 m/s²"),
     "no force": (columns(**{f: lambda old: [1e-300 * k for k in range(8)]
                             for f in ("fx", "fy", "fz")}), "their norm is about 0 m/s²"),
     "one huge cell": (columns(fy=at(3, 1e11)), "fx, fy, fz: position 3: more than 1000 times"),
-    "huge": (columns(fx=times(1e300), fy=times(1e300), fz=times(1e300)),
+    "huge": (forces(1e300),
              "fx: position 1: must be from -1e+12 to"),
+    "words in Parquet": (parquet(["a"] * 8), "positions.parquet: fx: position 1: 'a' is no number"),
+    "null": (parquet([None, *range(7)]), "fx: position 1: empty"),
+    "truth values": (parquet([True] * 8), "fx: position 1: True is no number"),
+    "lists": (parquet([[1.0]] * 8), "fx: position 1: [1.0] is no number"),
+    "nan in Parquet": (parquet([1.0, *[np.nan] * 7]), "fx: position 2: nan is not finite"),
+    "twice in Parquet": (parquet(None, "twice"), "'fx': the column stands twice"),
+    "cut Parquet": (both(parquet([1.0] * 8), cut("positions.parquet", 0.5)),
+                    "positions.parquet: not a whole Parquet file"),
+    "no folder": (shutil.rmtree, "no such folder", "campaign.yaml and positions.csv"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(("change", "parts"), [(c, p) for c, *p in BAD.values()], ids=BAD)
 def test_bad_input_ends_with_one_line_that_says_where(tmp_path, change, parts):
-    write_campaign(campaign(), tmp_path)
-    change(tmp_path)
-    with pytest.raises(InputError) as caught:
-        read_campaign(tmp_path)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert str(tmp_path) in message
-    assert not hasattr(change, "file") or f"{change.file}: " in message
-    for part in parts:
-        assert part in message
-
-
-@pytest.mark.parametrize(("column", "part"), [
-    (pa.array(["a"] * 8), "fx: position 1: 'a' is no number"),
-    (pa.array([None, *range(7)]), "fx: position 1: empty"),
-    (pa.array([True] * 8), "fx: position 1: True is no number"),
-    (pa.array([[1.0]] * 8), "fx: position 1: [1.0] is no number"),
-    (pa.array([1.0, *[float("nan")] * 7]), "fx: position 2: nan is not finite"),
-])  # fmt: skip
-def test_bad_columns_of_parquet(tmp_path, column, part):
-    write_campaign(campaign(), tmp_path, "parquet")
-    path = tmp_path / "positions.parquet"
-    table = pq.read_table(path)
-    pq.write_table(table.set_column(table.column_names.index("fx"), "fx", column), path)
-    with pytest.raises(InputError, match=r"positions\.parquet") as caught:
-        read_campaign(tmp_path)
-    assert part in str(caught.value)
-
-
-@pytest.mark.parametrize("share", [0, 0.5, 0.99])
-def test_truncated_parquet(tmp_path, share):
-    write_campaign(campaign(), tmp_path, "parquet")
-    cut("positions.parquet", share)(tmp_path)
-    with pytest.raises(InputError, match=r"positions\.parquet: not a whole Parquet file"):
-        read_campaign(tmp_path)
-
-
-def test_a_column_that_stands_twice_in_parquet(tmp_path):
-    write_campaign(campaign(), tmp_path, "parquet")
-    table = pq.read_table(tmp_path / "positions.parquet")
-    twice = table.append_column("fx", table["fx"])
-    pq.write_table(twice, tmp_path / "positions.parquet")
-    with pytest.raises(InputError, match="'fx': the column stands twice"):
-        read_campaign(tmp_path)
-
-
-def test_no_folder(tmp_path):
-    with pytest.raises(InputError, match=r"no such folder.*campaign\.yaml and positions\.csv"):
-        read_campaign(tmp_path / "absent")
+    write_campaign(campaign(), tmp_path / "c")
+    change(tmp_path / "c")
+    with refused(str(tmp_path), *parts):
+        read_campaign(tmp_path / "c")
 
 
 @pytest.mark.parametrize("change", [{"angles": 1e-4}, {"angles": 0.0}], ids=["small", "level"])
@@ -503,89 +459,3 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path, changes, part):
     with pytest.raises(InputError, match=part):
         write_campaign(campaign(**changes), tmp_path / "folder")
     assert not (tmp_path / "folder").exists()
-
-
-def test_a_folder_that_cannot_be_written(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be written"):
-        write_campaign(campaign(), tmp_path / "file")
-
-
-@st.composite
-def damages(draw):
-    """What may happen to bytes: some are replaced, removed or inserted, or the end is missing."""
-    steps = draw(
-        st.lists(
-            st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 8), st.binary(max_size=4)),
-            min_size=1,
-            max_size=4,
-        )
-    )
-    end = draw(st.just(1.0) | st.floats(0, 1))
-
-    def damage(content):
-        for place, removed, new in steps:
-            i = int(place * len(content))
-            content = content[:i] + new + content[i + removed :]
-        return content[: int(end * len(content))]
-
-    return damage
-
-
-WORDS = (
-    *("1", "-1", "0", "1e308", ".inf", "nan", "", "true", "null", "[]", "{}", "&a [*a]", "a: b"),
-    *("!!int ''", "!!bool x", "!!map [a]", "!!timestamp x", "2001-99-99", "'", '"', "#", "\t"),
-    *("counts", "g", "fx", "position", ",", "\r", "\x85", "\0", "\ud7ff", "?", "<<", "- "),
-)
-
-
-@st.composite
-def edits(draw):
-    """Text of YAML or CSV with some of its words replaced by others that mean something there."""
-    word = st.sampled_from(WORDS)
-    changes = draw(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), word), min_size=1))
-
-    def edit(content):
-        words = content.decode().replace(",", " , ").split(" ")
-        for place, new in changes:
-            words[int(place * len(words))] = new
-        return " ".join(words).encode()
-
-    return edit
-
-
-def fuzz(name, table, damage, **changes):
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / name
-        write_campaign(campaign(**changes), folder, table)
-        path.write_bytes(damage(path.read_bytes()))
-        message = ""
-        try:
-            read = read_campaign(folder)
-        except InputError as error:
-            message = str(error)
-        else:
-            # What was taken for a campaign is one: it can be written, which checks it, and read.
-            write_campaign(read, folder, table)
-            read_campaign(folder)
-        assert len(message.splitlines()) <= 1
-
-
-@pytest.mark.parametrize("changes", [{}, WITHOUT_ROBOT | COUNTS], ids=["robot", "counts"])
-@settings(max_examples=70)
-@given(damage=damages() | edits())
-@example(damage=lambda content: content + b"a: !!bool x")
-def test_fuzzed_header(damage, changes):
-    fuzz("campaign.yaml", "csv", damage, **changes)
-
-
-@settings(max_examples=70)
-@given(damage=damages() | edits())
-def test_fuzzed_csv(damage):
-    fuzz("positions.csv", "csv", damage)
-
-
-@settings(max_examples=70)
-@given(damage=damages())
-def test_fuzzed_parquet(damage):
-    fuzz("positions.parquet", "parquet", damage)

@@ -10,7 +10,6 @@ import pytest
 from calling import refusal, refused, succeed
 from places import DATA, needs_data
 
-from accelstudy.basics.errors import UnknownNameError
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.logs import import_log
@@ -83,14 +82,6 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert settings.means or settings.block is not None or timed
 
 
-@needs_data
-@pytest.mark.parametrize("name", public_data())
-def test_the_registry_knows_the_files(name):
-    path = public_file(name, DATA)
-    assert path.is_relative_to(DATA)
-    assert path.name == public_data()[name].file_name
-
-
 # As far as an independent detector of holds, and the authors, tell their number.
 N_POSITIONS = {
     **{"xsens-mti": 38, "mpu9150-0": 23, "mpu9150-1": 23, "mpu9150-2": 23, "mpu6050": 10},
@@ -128,11 +119,6 @@ def test_command_lists():
 ])  # fmt: skip
 def test_command_refuses(arguments, message):
     assert message in refusal("public", *arguments)
-
-
-def test_an_unknown_name(tmp_path):
-    with pytest.raises(UnknownNameError, match="did you mean 'xsens-mti'"):
-        public_file("xsens_mti", tmp_path)
 
 
 def test_a_file_that_is_there_is_not_downloaded(tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_import_holds import shared
+from log_helpers import shared
 
 from accelstudy.adjustment.quality import global_test
 from accelstudy.campaign.importing.allan import (

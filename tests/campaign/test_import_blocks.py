@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from calling import refusal, succeed
+from calling import succeed
 from places import DATA, needs_data
 
 from accelstudy.campaign.format import read_campaign
@@ -63,29 +63,6 @@ def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
     assert campaign.reasons[6].startswith("the sensor moves: its parts scatter by 0.1")
     assert campaign.positions.tolist() == [n for n in range(1, COUNT + 1) if n != 6]
     assert any(line.startswith("left out: 1 block: 6 (the sensor moves") for line in campaign.notes)
-
-
-@pytest.mark.parametrize(("change", "says"), [
-    ({"--block": 39}, "560 samples are no multiple of the 39 of a block (--block): 546 or 585"),
-    ({"--block": 80}, "blocks of 80 samples are no positions"),
-    ({"--block": 3}, "--block: must be from 4 to"),
-    ({"--means": None}, "a table of means (--means) has a row for each position, no block"),
-    ({"--exclude": "1s-2s:moved"}, "has no time; name blocks by their numbers, as 13:moved"),
-])  # fmt: skip
-def test_what_is_no_log_of_blocks_is_refused_in_a_line(tmp_path, samples, change, says):
-    options = {"--columns": "fx=u,fy=v,fz=w", "--block": SIZE, **change}
-    words = [word for option in options.items() for word in option if word is not None]
-    path = write(tmp_path, samples)
-    assert says in refusal("import", path, *words, "--out", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_log_of_blocks_is_one_file(tmp_path, samples):
-    path = write(tmp_path, samples)
-    other = path.with_name("other.csv")
-    other.write_bytes(path.read_bytes())
-    line = refusal("import", path, other, *WORDS, "--out", tmp_path / "out")
-    assert "a log of blocks (--block) is one file, not 2" in line
 
 
 @needs_data

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import refusal, succeed
+from calling import succeed
+from log_helpers import G, session, write
 from scipy.io import savemat
-from test_import_holds import G, session, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
@@ -16,7 +16,7 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.means import import_means
-from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
+from accelstudy.campaign.importing.settings import ImportSettings, read_settings
 
 XSENS = {
     "columns": {"fx": 1, "fy": 2, "fz": 3},
@@ -97,39 +97,11 @@ def test_a_table_of_means_has_its_units_in_its_names(tmp_path):
     np.testing.assert_allclose(campaign.forces, np.diag([1, 1, -1]) * STANDARD_GRAVITY)
 
 
-@pytest.mark.parametrize(("change", "settings", "message"), [
-    ({"n": 0}, {}, "n_samples: must be positive"),
-    ({"sy": -1}, {}, "must not be negative"),
-    ({"fy": np.nan}, {}, r"line 2, column fy \(fy\): nothing"),
-    ({}, {"columns": {"temp": 1}}, "unknown column 'temp'"),
-    ({}, {"columns": {"fx": "q"}}, "no column 'q'"),
-])  # fmt: skip
-def test_bad_means(tmp_path, change, settings, message):
-    row = {"n": 4, "fx": 1.0, "fy": 2.0, "fz": 3.0, "sx": 1.0, "sy": 1.0, "sz": 1.0} | change
-    pd.DataFrame([row, row]).to_csv(tmp_path / "means.csv", index=False)
-    with pytest.raises(InputError, match=message):
-        import_means(tmp_path / "means.csv", parse_settings(settings))
-
-
 def test_means_as_columns(tmp_path):
     savemat(tmp_path / "means.mat", {"means": np.random.default_rng(1).normal(0, 1, (3, 24))})
     campaign = import_means(tmp_path / "means.mat", ImportSettings(unit="g"))
     assert campaign.n_positions == 24
     assert campaign.sigma_force is None
-
-
-@pytest.mark.parametrize(("content", "message"), [
-    ({"rate": 100}, r"settings: rate: unknown key; did you mean 'rate_hz'\?"),
-    ({"rate_hz": -1}, r"settings: rate_hz: must be from 1e-06 to 1e\+09 per second, not -1"),
-    ({"rate_hz": True}, "rate_hz: must be a number, not true"),
-    ({"unit": "ft"}, r"settings: unit: must be 'm/s\^2', 'g', 'mg' or 'counts', not 'ft'"),
-    ({"columns": {"fx": 1.5}}, "columns.fx"),
-    ({"gravity": {"value": 1}}, "gravity.value: unknown key"),
-])  # fmt: skip
-def test_bad_settings(content, message):
-    with pytest.raises(InputError, match=message) as caught:
-        parse_settings(content)
-    assert "\n" not in str(caught.value)
 
 
 def test_settings_are_overlaid(tmp_path):
@@ -192,17 +164,3 @@ def test_command_with_everything(tmp_path):
     assert campaign.sensor == "A-1"
     np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
     assert not (tmp_path / "out" / "segmentation.svg").exists()
-
-
-@pytest.mark.parametrize(("options", "message"), [
-    ([], "give the column of time (--time), or the rate (--rate)"),
-    (["--rate", "100", "--columns", "fx"], "--columns: expected fx=1,fy=2,fz=3"),
-    (["--rate", "100", "--unit", "counts", "--scale", "a"], "--scale: expected numbers"),
-    (["--rate", "-5"], "--rate: '-5': must be at least 1e-06 and at most 1e+09 Hz"),
-    (["--rate", "nan"], "--rate: expected a number, as 2Hz"),
-    (["--rate", "100", "--threshold", "1e-9"], "no static hold"),
-])  # fmt: skip
-def test_command_says_what_is_wrong(log, tmp_path, options, message):
-    line = refusal("import", log, "--out", tmp_path / "out", *options)
-    assert message in line
-    assert not (tmp_path / "out" / "campaign.yaml").exists()

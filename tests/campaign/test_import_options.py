@@ -4,12 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import call, refusal, succeed
-from log_helpers import open_log
+from log_helpers import RATE, G, open_log, session, shared, write
 from test_import_campaign import XSENS
-from test_import_holds import RATE, G, session, shared, write
 
 from accelstudy.api.campaigns import files_of
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
@@ -158,53 +156,7 @@ def test_sigma_does_not_depend_on_the_offset():
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
 
 
-@pytest.mark.parametrize(("factor", "options", "message"), [
-    (1 / G, [], "look like g, not m/s^2; give --unit g"),
-    (1, ["--unit", "g"], "look like m/s^2, not g; give --unit m/s^2"),
-    (1e3, [], "look like counts, not m/s^2, and need a scale; give --unit counts"),
-    (1, ["--gravity", "1.62"], "does not fit a gravity of 1.62 m/s²; give --gravity"),
-    (1, ["--threshold", "1e300"], "--threshold: '1e300': must be at least 1e-09"),
-    (1, ["--frame", "fru"], "is left-handed"),
-    (1, ["--range", "8 feet"], "--range: expected a number"),
-    (1, ["--robot-sigma", "3mgon"], r"its angles go with a table of means"),
-])  # fmt: skip
-def test_options_are_named_and_nothing_is_written(tmp_path, turned, factor, options, message):
-    path = write(tmp_path, factor * turned[0])
-    line = refusal("import", path, "--out", tmp_path / "out", "--rate", 100, *options)
-    assert message in line
-    assert "campaign.yaml" not in line
-    assert not (tmp_path / "out").exists()
-
-
 # --- What was never still ------------------------------------------------------------------------
-
-
-def turning(rate, n=9000):
-    """Specific force of a sensor that turns about its y axis, rad/s."""
-    angle = rate * np.arange(n) / RATE
-    return G * np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
-
-
-def wobbling(rng, size, cut, n=9000):
-    """Smooth motion below a frequency, Hz."""
-    frequency = np.fft.rfftfreq(n, 1 / RATE)
-    spectrum = np.fft.rfft(rng.standard_normal((n, 3)), axis=0)
-    spectrum[(frequency > cut) | (frequency == 0)] = 0
-    motion = np.fft.irfft(spectrum, n, axis=0)
-    return size * motion / motion.std()
-
-
-@pytest.mark.parametrize("motion", [
-    lambda rng: turning(0.5) + wobbling(rng, 4.0, 3),  # waved about
-    lambda rng: turning(0.1) + wobbling(rng, 0.4, 2),  # turned gently by hand
-    lambda rng: turning(0.02),  # on a turntable
-    lambda rng: wobbling(rng, 2.0, 3) - [0, 0, G],  # carried upright
-])  # fmt: skip
-def test_what_was_never_still_is_refused(tmp_path, motion):
-    rng = np.random.default_rng(1)
-    path = write(tmp_path, motion(rng) + 0.02 * rng.standard_normal((9000, 3)))
-    with pytest.raises(InputError, match=r"the sensor was never still: .* quietest hundredth"):
-        import_log(path, ImportSettings(rate_hz=RATE))
 
 
 def test_a_machine_that_hums_is_still(tmp_path):
@@ -249,22 +201,6 @@ def settings(folder, text):
     path = folder / "settings.yaml"
     path.write_text(text)
     return path
-
-
-@pytest.mark.parametrize(("options", "message"), [
-    (["--exclude", "13:moved"], "exclude: there is no hold 13; they are 1 to 8"),
-    (["--exclude", "13"], "exclude: expected a hold or a time, and why, as 13:moved"),
-    (["--exclude", "1s-2s:x"], "exclude: 1s-2s: no hold lies there"),
-    (["--join", "4"], "join: expected numbers of holds or a time, as 4,5 or"),
-    (["--join", "1s-2s"], "join: 1s-2s: fewer than two holds lie there"),
-    (["--join", "4,5"], "join: holds 4 and 5 differ by"),
-    (["--join", "4,6"], "join: 4, 6: hold 5 lies between them"),
-])  # fmt: skip
-def test_holds_that_are_not_there(tmp_path, turned, options, message):
-    line = refusal(
-        "import", write(tmp_path, turned[0]), "--out", tmp_path / "out", "--rate", 100, *options
-    )
-    assert message in line
 
 
 # --- Several sensors, several files --------------------------------------------------------------

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calling import succeed
-from test_import_holds import find_holds, opened, write
+from log_helpers import find_holds, opened, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY as G
