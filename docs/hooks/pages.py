@@ -46,6 +46,7 @@ PARTS = {
     "keys of a diagnosis": partial(file_formats.document, "Diagnosis", "diagnosis"),
     "priors of a diagnosis": partial(file_formats.rules, priors=True),
     "other rules of a diagnosis": partial(file_formats.rules, priors=False),
+    "claims of the paper": quotes.claims,
     "terms": terms,
     "figures of a study": gallery.study_figures,
 }

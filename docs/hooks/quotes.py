@@ -10,6 +10,7 @@ from decimal import Decimal
 from pathlib import Path
 
 SCORE = Path(__file__).parents[1] / "guides" / "hidden-effects-score.md"
+CLAIMS = Path(__file__).parents[2] / "tests/golden/paper/claims-command.txt"
 QUOTE = re.compile(r"\{score:\s([^;}]+);\s([^;}]+)(?:;\s([^;}]+))?\}")
 
 
@@ -40,6 +41,12 @@ def quoted(figure, campaigns, what="measured", score=None):
         if figure in row and f"λ = {row.get('λ')}" == campaigns:
             return percent(row[figure]) + " %" if what == "%" else row[figure]
     raise ValueError(f"{SCORE.name} has no {figure!r} of {campaigns!r}")
+
+
+def claims():
+    """The claims of the paper, as the golden set has them."""
+    table = CLAIMS.read_text(encoding="utf-8").partition("> |")[2].partition("\n>\n")[0]
+    return "|" + table.replace("\n> ", "\n")
 
 
 def percent(share):
