@@ -63,8 +63,17 @@ def test_the_first_example_of_a_log_needs_no_columns():
     holds = [re.search("^> holds: .*", text, re.M)[0] for text in (first, second)]
     assert holds[0] == holds[1]
     assert holds[0].startswith("> holds: 24, ")
-    recognised = re.search("^> (columns: .*)", first, re.M)[1]
-    assert f"\n{recognised}\n" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_readme_quotes_what_its_commands_print():
+    text = (ROOT / "README.md").read_text("utf-8")
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.M | re.S)
+    printed = "".join(kept_of(part)["README"] for part in ("readme", "plans"))
+    quoted = [
+        line for kind, block in blocks if not kind for line in block.splitlines() if line != "…"
+    ]
+    assert len(quoted) > 5
+    assert [line for line in quoted if f"> {line}\n" not in printed] == []
 
 
 # --- comparing -----------------------------------------------------------------------------------
