@@ -51,8 +51,8 @@ class TypicalParameter(BaseModel):
     )
     unit: str = Field(description="SI unit")
     in_all: bool = Field(
-        description="whether it tells of the next sensor: all sensors have it, and it belongs to "
-        "the sensor and not to its mounting"
+        description="whether the next sensor has it, too: all have it, and it belongs to the "
+        "sensor and not to its mounting"
     )
 
     @property
