@@ -9,7 +9,7 @@ import sys
 
 import pytest
 from golden import compare, kept_of, same_number
-from golden_parts import PARTS, QUICK
+from golden_parts import PAGES, PARTS, QUICK
 from places import ROOT
 from transcript import commands_of_page, masked
 
@@ -74,6 +74,15 @@ def test_the_readme_quotes_what_its_commands_print():
     ]
     assert len(quoted) > 5
     assert [line for line in quoted if f"> {line}\n" not in printed] == []
+
+
+def test_output_that_a_page_shows_is_what_came_out():
+    kept = {line for part in PARTS for text in kept_of(part).values() for line in text.split("\n")}
+    for path in {path for paths in PAGES.values() for path in paths if path.endswith(".md")}:
+        text = (ROOT / path).read_text(encoding="utf-8")
+        shown = re.findall(r"^```\{\.text \.wrap\}\n((?!--8<--)[^`]*)^```", text, re.M)
+        lines = {f"> {line}" for line in "".join(shown).splitlines() if line}
+        assert lines <= kept, lines - kept
 
 
 # --- comparing -----------------------------------------------------------------------------------
