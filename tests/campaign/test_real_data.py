@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from golden import kept_of
 from places import DATA, ROOT, needs_data
-from real_data import DIAGNOSED, LONGEST, diagnosed, imported, told
+from real_data import DIAGNOSED, LONGEST, WHITE, diagnosed, imported, told
 from scipy import optimize
 
 from accelstudy.basics.errors import InputError
@@ -23,6 +23,8 @@ NINE = get_model("bias-scale-nonorthogonality")
 
 pytestmark = needs_data
 
+QUOTED = [("ck-explorer", ""), ("xsens-mti", WHITE)]
+"""Diagnoses whose sentences stand on the page; of the others there is the row of the table."""
 TOO_SMALL = ["mpu6050-static", "ferraris", "ferraris-annotated"]
 
 
@@ -45,7 +47,8 @@ def limit_rows():
 def test_the_table_tells_the_diagnosis(name, variant):
     row, *lines = told(name, variant)
     assert row in PAGE
-    assert all(line in FLAT for line in lines)
+    if (name, variant) in QUOTED:
+        assert all(line in FLAT for line in lines)
 
 
 def test_the_table_tells_of_the_phone_what_the_golden_set_keeps():
