@@ -84,13 +84,6 @@ def test_york_line_is_the_published_one():
     assert result.variance_posteriori[0] == pytest.approx(YORK_OMEGA / 8, rel=1e-9)
 
 
-@pytest.mark.usefixtures("all_digits")
-def test_unweighted_line_is_the_published_one():
-    result = york(cofactors=np.ones((10, 2)))
-    np.testing.assert_allclose(result.parameters[0], [5.784043775, -0.545561198], atol=1e-9)
-    assert result.omega[0] == pytest.approx(0.618572759, abs=1e-9)
-
-
 @pytest.mark.parametrize("initial", [(5.0, -0.5), (0.0, 0.0), (10.0, -3.0)])
 def test_the_default_stops_at_a_millionth_of_sigma_from_any_start(initial):
     result = york(initial=initial)

@@ -17,7 +17,7 @@ from quality_helpers import (
     one,
 )
 
-from accelstudy.adjustment import Observations, calibrate
+from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import (
     held_out,
     position_tests,
@@ -27,27 +27,15 @@ from accelstudy.adjustment.quality import (
     variance_components,
 )
 from accelstudy.basics.units import MGON
-from accelstudy.effects import Effect, HoldConditions
-from accelstudy.effects.base import per_axis
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
 
-class ThermalBias(Effect):
-    """A bias that follows the temperature."""
-
-    name = "thermal_bias_of_the_quality_test"
-    parameters = per_axis("b_T", "m/s^2/K", "b_{T%}")
-
-    def output(self, f, p, g, hold, xp):
-        return tuple(b_t * hold.temperature for b_t in p)
-
-
 def thermal_session(seed=2):
-    model = SensorModel("nine + temperature", (*NINE.effects, ThermalBias()))
+    model = get_model(f"{NINE.name}+thermal_bias")
     hold = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
     ideal = ideal_session("mclaren-24", model, hold)
     observed = ideal.draw(Noise(sigma_gravity=1e-5), 1, np.random.default_rng(seed))
@@ -135,23 +123,6 @@ def test_a_position_that_the_others_need_is_not_predicted():
     tests = position_tests(solve(model, ROBOT, observed))
     assert tests.dof[-1] == 2
     assert np.isinf(reliability(solve(model, ROBOT, observed)).mdb[-1]).all()
-
-
-def test_quality_of_a_model_with_columns():
-    model, observed = thermal_session()
-    found = reliability(solve(model, ROBOT, observed))
-    assert found.parameters.shape == (24, 13)
-    assert np.isfinite(found.leveling).all()
-
-
-def test_selecting_all_positions_changes_nothing():
-    model, observed = thermal_session()
-    chosen = observed.take(np.arange(24))
-    assert isinstance(chosen, Observations)
-    np.testing.assert_array_equal(chosen.hold.temperature, observed.hold.temperature)
-    np.testing.assert_array_equal(
-        calibrate(model, ROBOT, chosen).parameters, calibrate(model, ROBOT, observed).parameters
-    )
 
 
 # At 3.2 mgon the robot is so much better than the sensor that no session can tell how good it is.

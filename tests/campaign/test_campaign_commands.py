@@ -20,7 +20,6 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines as diagnosis_lines
-from accelstudy.simulation.sessions import Noise
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
 
@@ -134,26 +133,6 @@ def test_pages_say_what_was_left_out_and_how_the_log_was_read(tmp_path):
         assert content["n_positions"] == whole.n_positions - 1
         positions = pd.read_parquet(out / "positions.parquet")
         assert positions["position"].tolist() == [n for n in whole.positions if n != 5]
-
-
-def test_a_bumped_position_is_named(tmp_path):
-    good = simulated_campaign(TRUTH)
-    forces = good.forces.copy()
-    forces[7] *= 1 + 0.03 / np.linalg.norm(forces[7])  # 15 sigma
-    bumped = Campaign("bumped", good.positions, forces, good.gravity, sigma_force=0.002)
-    write_campaign(bumped, tmp_path / "bumped")
-    succeed("calibrate", tmp_path / "bumped", "--out", tmp_path / "out")
-    content = content_of(tmp_path / "out")
-    assert [s["position"] for s in content["quality"]["suspects"]] == [8]
-    assert "position 8" in content["quality"]["verdict"]
-    assert content["sigma_source"] == "a posteriori"
-
-
-def test_understated_noise_is_said(tmp_path):
-    drawn = simulated_campaign(TRUTH, noise=Noise(sigma_force=0.006), sigma=0.002)
-    write_campaign(drawn, tmp_path / "loud")
-    result = call("calibrate", tmp_path / "loud", "--out", tmp_path / "out")
-    assert "understated, or an effect is missing" in result.output
 
 
 @pytest.mark.parametrize(("n", "words"), [(9, "no redundancy"), (10, "no power")])

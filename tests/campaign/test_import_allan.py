@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from log_helpers import shared
 
 from accelstudy.adjustment.quality import global_test
 from accelstudy.campaign.importing.allan import (
@@ -103,23 +102,6 @@ def test_coloured_noise_is_not():
     means = noise[: N // n * n].reshape(-1, n).mean(axis=1)
     assert accuracy.allan == pytest.approx(np.sqrt(np.mean(np.diff(means) ** 2) / 2), rel=0.15)
     assert accuracy.ratio > 5
-
-
-def test_hardly_anything_to_go_by():
-    accuracy = accuracy_of_mean(allan_deviation(np.arange(3.0), STEP), 1.0, 2.0, 4)
-    assert accuracy.allan == accuracy.white == 1.0
-    accuracy = accuracy_of_mean(allan_deviation(np.arange(11.0) % 2, STEP), 1.0, 0.5, 100)
-    assert accuracy.slope == -0.5
-
-
-def test_xsens_is_coloured():
-    log = np.loadtxt(shared("imu_tk_xsens/xsens_acc.mat"))
-    first = log[70:5100, 1:] / 415
-    curve = allan_deviation(first, STEP)
-    flat = (curve.tau >= 1) & (curve.tau <= 5)
-    assert np.all((curve.pooled[flat] > 0.5e-3) & (curve.pooled[flat] < 1.5e-3))
-    assert abs(slope(curve, 1, 5)) < 0.25
-    assert first.std(axis=0).mean() / np.sqrt(730) == pytest.approx(0.29e-3, rel=0.05)
 
 
 def drawn_accuracies(n, duration, walk, count):

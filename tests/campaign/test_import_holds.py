@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from log_helpers import RATE, G, find_holds, open_log, opened, session, shared
+from log_helpers import RATE, G, find_holds, opened, session
 
 from accelstudy.campaign.importing import windows
 
@@ -123,45 +123,6 @@ def test_few_holds_in_much_motion(tmp_path):
 
 
 # --- Public data ---------------------------------------------------------------------------------
-
-
-def near(holds, reference, scale=1.0):
-    """Largest difference of the means, in sd of a sample, of the holds that both know."""
-    worst, common = 0.0, 0
-    start, end = spans(holds)
-    for row in reference.itertuples():
-        overlap = np.minimum(end, row.i1) - np.maximum(start, row.i0)
-        i = int(np.argmax(overlap))
-        if overlap[i] > 0.5 * row.n:
-            common += 1
-            step = (holds.means[i] / scale - [row.ax, row.ay, row.az]) / [row.sx, row.sy, row.sz]
-            worst = max(worst, np.abs(step).max())
-    return worst, common
-
-
-def test_xsens():
-    log = open_log(
-        shared("imu_tk_xsens/xsens_acc.mat"), columns={"fx": 1, "fy": 2, "fz": 3}, time=0,
-        unit="counts", scale=1 / 415,
-    )  # fmt: skip
-    holds = find_holds(log)
-    assert 38 <= len(holds.table) <= 42
-    assert holds.table["t1"].iloc[0] - holds.table["t0"].iloc[0] == pytest.approx(51, abs=0.5)
-    reference = pd.read_csv(shared("imu_tk_xsens/derived_static_means.csv"))
-    worst, common = near(holds, reference, 1 / 415)
-    assert common == len(reference)
-    assert worst < 0.05
-
-
-@pytest.mark.parametrize("i", range(3))
-def test_mpu9150(i):
-    columns = {"fx": 0, "fy": 1, "fz": 2}
-    holds = find_holds(open_log(shared(f"mpu9150/imu{i}.log"), columns=columns, rate_hz=100))
-    reference = pd.read_csv(shared(f"mpu9150/derived_static_means_imu{i}.csv"))
-    assert len(holds.table) == len(reference) == 23
-    worst, common = near(holds, reference)
-    assert common == 23
-    assert worst < 0.1
 
 
 @pytest.mark.parametrize(("sigma", "factor"), [(0.0003, 6), (0.002, 6), (0.01, 2), (0.1, 2)])

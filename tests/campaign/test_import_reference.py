@@ -178,33 +178,23 @@ def test_calibrations_that_tell_no_angles(plate, tmp_path):
     assert "thermal_bias needs the temperature" in warm
 
 
-@pytest.mark.parametrize(
-    ("words", "part"),
-    [
-        (["--reference-log", "ref.csv"], "--reference-log: give the calibration.json"),
-        (["--reference", "ref/calibration.json"], "--reference: give the raw log"),
-        (["--reference-offset", "3"], "--reference-offset: goes with --reference-log"),
-        (["--reference-columns", "fx=1"], "--reference-columns: goes with --reference-log"),
-    ],
-)
-def test_options_that_go_together(plate, tmp_path, words, part):
-    words = [plate / word if "." in word else word for word in words]
+@pytest.mark.parametrize(("words", "part"), [
+    ("--reference-log LOG", "--reference-log: give the calibration.json"),
+    ("--reference FILE", "--reference: give the raw log"),
+    ("--reference-offset 3", "--reference-offset: goes with --reference-log"),
+    ("--reference-columns fx=1", "--reference-columns: goes with --reference-log"),
+    ("BOTH --means", "--means"),
+    ("BOTH --block 100", "--block"),
+    ("BOTH --robot-sigma 3mgon", "--robot-sigma"),
+    ("BOTH --reference-columns fx=ax,fw=az", "--reference-columns: fw"),
+    ("BOTH --reference-columns ax,ay", "--reference-columns: expected"),
+    ("BOTH --reference-offset nan", "--reference-offset"),
+])  # fmt: skip
+def test_options_that_do_not_go_together(plate, tmp_path, words, part):
+    words = words.replace("BOTH", "--reference-log LOG --reference FILE")
+    words = words.replace("LOG", f"{plate}/ref.csv")
+    words = words.replace("FILE", f"{plate}/ref/calibration.json").split()
     assert part in refusal("import", plate / "log.csv", "--out", tmp_path / "c", *words)
-
-
-@pytest.mark.parametrize(
-    ("more", "part"),
-    [
-        (["--means"], "--means"),
-        (["--block", "100"], "--block"),
-        (["--robot-sigma", "3mgon"], "--robot-sigma"),
-        (["--reference-columns", "fx=ax,fw=az"], "--reference-columns: fw"),
-        (["--reference-columns", "ax,ay"], "--reference-columns: expected"),
-        (["--reference-offset", "nan"], "--reference-offset"),
-    ],
-)
-def test_options_that_do_not_go_together(plate, tmp_path, more, part):
-    assert part in refusal(*given(plate, tmp_path / "c", "ref.csv", "ref/calibration.json", *more))
 
 
 def test_angles_in_the_log_are_left_out(plate, tmp_path):

@@ -119,16 +119,6 @@ def test_common_errors_are_those_of_changed_parameters(campaign):
     np.testing.assert_allclose(common @ c, change, atol=1e-9)
 
 
-def test_a_reference_beyond_its_knee_is_as_noisy_as_it_is():
-    """With half of its gain left, its noise counts twice: σ/(½ g) in pitch."""
-    clips = ReferenceSensor(
-        calibration="made", frame="rbd", sigma_mps2=0.002, effects=["saturation(knee=6)"],
-        parameters=[0.5] * 3, covariance=[[0.0] * 3] * 3,
-    )  # fmt: skip
-    sigma, _ = clips.errors(np.array([[0.0, np.pi / 4], [0.0, 0.0]]), G)
-    np.testing.assert_allclose(sigma[:, 1], 0.002 / G * np.array([2, 1]), rtol=1e-9)
-
-
 def _directions(angles):
     roll, pitch = angles.T
     return np.sin(pitch), -np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll)

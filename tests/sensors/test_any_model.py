@@ -215,16 +215,6 @@ def test_a_calibration_of_mended_data_says_so(error, words, whole):
     assert (content["mended"]["matrix"] is None) == ("angle" in error)
 
 
-def test_a_calibration_without_a_bumped_position():
-    gross = ("outlier_position(position=21, x=0.1)",)
-    _, diagnosis, content = calibration_of(gross_errors=gross)
-    assert [hold["position"] for hold in content["excluded"]] == [21]
-    assert content["n_positions"] == 29
-    truth = diagnosis.final.solution.parameters
-    np.testing.assert_allclose([p["value"] for p in content["parameters"]], truth, atol=1e-12)
-    assert content["quality"]["global_test"]["accepted"]
-
-
 def test_a_calibration_with_the_noise_that_was_found():
     _, diagnosis, content = calibration_of(noise_effects=("noise_level(kappa=3)",))
     assert diagnosis.verdict == "noise_model"

@@ -2,18 +2,15 @@
 
 import re
 
-import numpy as np
 import pytest
 import yaml
-from calling import refused, succeed
+from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.drawing.style import _parameters, model_title
-from accelstudy.effects import Effect, base, effect_names, get_effect, register
-from accelstudy.effects.base import formulas, per_axis
+from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.effects.base import formulas
 from accelstudy.sensors.models import MODELS, get_model
-from accelstudy.sensors.plausibility import largest
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
@@ -76,13 +73,6 @@ def test_the_model_of_a_file(content, expected, tmp_path):
             get_model(f"{path}:c")
 
 
-def test_titles_of_compositions():
-    assert model_title(f"{NINE}+warm_up(tau=300)+quadratic_scale") == (
-        "9 + warm up (300) + quadratic scale"
-    )
-    assert model_title("bias+warm_up(tau=300)") == "bias + warm up (300)"
-
-
 def test_a_part_of_an_effect_takes_its_share_of_the_true_values():
     study = parse_study({
         "study": "part", "seed": 1,
@@ -93,44 +83,6 @@ def test_a_part_of_an_effect_takes_its_share_of_the_true_values():
 
 
 # --- what an effect need not say -----------------------------------------------------------------
-
-
-@pytest.fixture
-def squared():
-    """The example of the README under another name, registered for the time of a test."""
-
-    @register
-    class SquaredScale(Effect):
-        """Second-order nonlinearity k_i f_i²/g (K2 of IEEE Std 1293, in units of g)."""
-
-        name = "squared_scale"
-        parameters = per_axis("k2", "1", "k_{2%}")
-
-        def output(self, f, p, g, hold, xp):
-            return tuple(k * f_i * f_i / g for k, f_i in zip(p, f, strict=True))
-
-    _parameters.cache_clear()
-    yield SquaredScale.name
-    del base._registry._items[SquaredScale.name]
-    get_effect.cache_clear()
-    _parameters.cache_clear()
-
-
-def test_an_effect_that_says_no_more_than_it_must_serves_everywhere(squared, tmp_path):
-    text = succeed("effects").output
-    assert "squared_scale: f_i² k2_i/g" in text
-    assert squared in succeed("effects", "--scheme", "mclaren-24").output
-    succeed("simulate-campaign", "--out", tmp_path / "c", "--seed", "3", "--model", NINE,
-        "--effect", squared, "--size", "5")  # fmt: skip
-    assert squared in succeed("effects", "--campaign", tmp_path / "c").output
-    text = succeed(
-        "diagnose", tmp_path / "c", "--out", tmp_path / "d", "--replicates", "100"
-    ).output
-    assert "squared scale" in text
-    page = (tmp_path / "d/report.html").read_text(encoding="utf-8")
-    assert "squared scale" in page
-    succeed("calibrate", tmp_path / "c", "--model", f"{NINE}+{squared}", "--out", tmp_path / "k")
-    assert largest(get_effect(squared)) == np.inf
 
 
 @pytest.mark.parametrize("name", effect_names())

@@ -11,7 +11,7 @@ from accelstudy.study.figures.theory import largest_of_groups
 NAME = "beyond-linear-theory"
 SIGMA = 0.3
 """Noise of the sensor in a simulation that shows an excess, m/s²."""
-REPLICATES = 12_000
+REPLICATES = 6000
 
 
 def numbers(tables, column):

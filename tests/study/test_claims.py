@@ -18,7 +18,6 @@ from study_helpers import (
 )
 
 from accelstudy.basics.units import MGON
-from accelstudy.basics.wording import interval, number
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
@@ -42,7 +41,7 @@ from accelstudy.study.replicates import read_replicates
 from accelstudy.study.sensitivity import shapley_table
 
 STANDARD_ERRORS = 4.5
-REPLICATES = 2000
+REPLICATES = 1000
 BASE_SAMPLES, RESAMPLES = 256, 20
 KEYS = {
     "grids": [grid(schemes=["mclaren-24", "rings-24"], replicates=REPLICATES)],
@@ -129,21 +128,6 @@ def test_mean_reductions_are_those_of_linear_theory(judged, scheme, effect, line
     assert abs(row["median"] - row["mean"]) < 2
 
 
-def test_spread_of_single_simulations(judged):
-    """σ̂0 of r = 15 and of r = 63 spread by 18 % and 9 %: the ratio by 20 %."""
-    for effect in ("bias", "scale", "nonorthogonality"):
-        row = judged[1].loc[f"reduction-{effect}", "mclaren-24"]
-        low, high = 100 - row["single_low"], 100 - row["single_high"]
-        assert np.log(low / high) / (2 * 1.96) == pytest.approx(0.203, rel=0.15)
-
-
-def test_percentile_of_the_papers_number(judged):
-    row = judged[1].loc["reduction-bias", "mclaren-24"]
-    assert row["paper"] == 50
-    assert 60 < row["percentile"] < 90  # between the median, 41 %, and the largest
-    assert judged[1].loc["reduction-scale", "mclaren-24"]["percentile"] < 70
-
-
 def test_accuracy_near_level(judged):
     for name in ("level-roll", "level-pitch", "roll-does-not-matter"):
         claim = judged[0].loc[name]
@@ -205,9 +189,7 @@ def test_order_of_the_inputs(tables, judged, rejudge):
 
 @pytest.mark.parametrize(("mean", "central", "verdict"), [
     (54, (53, 55), REPRODUCED),  # rounds to about 50
-    (46, (45, 47), REPRODUCED),
     (57, (56, 58), NOT_REPRODUCED),
-    (41, (39, 43), NOT_REPRODUCED),
     (0, (-5, 5), NOT_REPRODUCED),
     (41, (-10, 65), REPRODUCED),  # single simulations spread over the paper's number
 ])  # fmt: skip
@@ -369,22 +351,6 @@ def test_a_scheme_of_odd_name_does_not_break_the_page(judged):
     page = claims_page(judged[0].reset_index(), rows)
     assert "<b>&</b>" not in page
     assert "&lt;b&gt;&amp;&lt;/b&gt;" in page
-
-
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [
-        (12.981, "13.0"), (0.0123456, "0.0123"), (63.0, "63.0"), (-100.0, "−100"), (0.0, "0"),
-        (1234.5, "1234"), (np.nan, "–"),
-    ],
-)  # fmt: skip
-def test_numbers_for_people(value, shown):
-    assert number(value) == shown
-
-
-def test_intervals_for_people():
-    assert interval(1.0, 20.0) == "1.00 … 20.0"
-    assert interval(np.nan, np.nan) == ""
 
 
 def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):

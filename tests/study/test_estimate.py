@@ -211,7 +211,7 @@ DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
 )
 def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, keys, gain):
     few = simulated_statistics(cell_of(noise, approach, 400, **keys), 1, LEVELING)
-    many = plain(cell_of(noise, approach, 10_000, **keys), 2)
+    many = plain(cell_of(noise, approach, 4000, **keys), 2)
     assert (few.control, many.control) == ("linear", "none")
     limit = 6 if keys is DISTURBED else STANDARD_ERRORS  # heavy tails of squares
     for name in ("bias", "sd", "tilt_rms", "variance_factor"):
@@ -230,7 +230,7 @@ def test_where_calibrations_fail_what_is_left_is_estimated():
     cell = cell_of(1.5, replicates=1000)
     found = simulated_statistics(cell, 1, LEVELING)
     assert 3 < found.simulated - found.converged < 300
-    many = plain(replace(cell, replicates=10_000), 2)
+    many = plain(replace(cell, replicates=4000), 2)
     for name in ("bias", "sd", "coverage", "correlation", "tilt_rms"):
         one, other = found[name], many[name]
         error = np.hypot(np.hypot(one.error, other.error), 1 / 1000 if name == "coverage" else 0)

@@ -36,13 +36,6 @@ def test_the_configuration_is_a_study_with_figures(folder):
     assert {"closed-forms", "leveling-overview", "sweep-positions"} <= {*figure_names(study)}
 
 
-def test_the_workflow_takes_it_from_there(folder):
-    planned = snakemake(folder, "--dry-run", "--cores", "1")
-    assert planned.returncode == 0, planned.stdout
-    for rule in ("simulate", "collect", "figure", "study"):
-        assert f"\n{rule} " in planned.stdout
-
-
 def test_nothing_is_overwritten(folder):
     config = folder / "config" / "config.yaml"
     before = config.read_text(encoding="utf-8")

@@ -132,15 +132,12 @@ def test_numbers_hang_on_no_code_that_their_version_leaves_out(snakefile, list_o
     assert ran.stdout.strip() == "[]"
 
 
-IMPORTED = """\
-import sys
-import accelstudy.jobs, accelstudy.study.results
-print([name for name in ("pydantic", "matplotlib", "jinja2", "scipy.stats") if name in sys.modules])
-"""
-
-
-def test_a_job_that_simulates_loads_no_more_than_it_needs():
-    ran = subprocess.run(
-        [sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True
-    )
+@pytest.mark.parametrize(("modules", "unused"), [
+    ("accelstudy.jobs, accelstudy.study.results", "pydantic matplotlib jinja2 scipy.stats"),
+    ("accelstudy.jobs, accelstudy.study.config, accelstudy.study.figures",
+     "matplotlib pandas scipy.stats"),
+])  # fmt: skip
+def test_jobs_and_the_start_of_the_workflow_load_no_more_than_they_need(modules, unused):
+    code = f"import sys, {modules}\nprint([x for x in {unused.split()} if x in sys.modules])"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

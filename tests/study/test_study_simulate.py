@@ -5,7 +5,6 @@ import subprocess
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import scipy
@@ -26,7 +25,6 @@ from accelstudy.design.estimability import estimability
 from accelstudy.files import tables
 from accelstudy.files.tables import (
     git_commit,
-    parquet_writer,
     read_origin,
     read_table,
     write_table,
@@ -97,16 +95,6 @@ def test_a_cell_that_is_not_estimable_leaves_no_rows(written):
         assert set(read_table(path)["cell"].astype(str)) == {GRAVITY, ROBOT}
 
 
-def test_correlations_of_a_block(written):
-    result = simulated(written[0][GRAVITY])
-    matrix = result.correlation_sum / 60
-    np.testing.assert_allclose(np.diag(matrix), 1, rtol=1e-12)
-    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
-    names = [*PAPER_TRUTH]
-    scales = matrix[names.index("s_x"), names.index("s_y")]
-    assert scales == pytest.approx(-0.25, abs=2e-3)  # −3m/(1 − 3m), m = 1/15
-
-
 # --- origin --------------------------------------------------------------------------------------
 
 
@@ -168,27 +156,6 @@ def files(folder):
     return sorted(path.name for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
-def test_nothing_is_left_of_an_interrupted_file(error, tmp_path):
-    path, content = tmp_path / "estimates.parquet", pa.table({"a": [1.0]})
-
-    def write(then):
-        with parquet_writer(path, content.schema, PROVENANCE) as writer:
-            writer(content)
-            if then:
-                raise then
-
-    with pytest.raises(error):
-        write(error)
-    assert files(tmp_path) == []
-    write(None)
-    before = path.read_bytes()
-    with pytest.raises(error):
-        write(error)
-    assert files(tmp_path) == ["estimates.parquet"]
-    assert path.read_bytes() == before
-
-
 def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
     calls = []
 
@@ -206,17 +173,6 @@ def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
 
 
 # --- reading -------------------------------------------------------------------------------------
-
-
-def test_reading_what_is_no_table(written, tmp_path):
-    path = tmp_path / "table.parquet"
-    with pytest.raises(InputError, match=rf"^{path}: no such file$"):
-        read_table(path)
-    content = written[1].read_bytes()
-    for broken in (b"", b"PAR1", content[:100], content[: len(content) // 2], content[:-1]):
-        path.write_bytes(broken)
-        with pytest.raises(InputError, match=rf"^{path}: not a whole Parquet file .*delete it"):
-            read_table(path)
 
 
 def test_reading_files_and_folders(tmp_path):

@@ -18,7 +18,7 @@ from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import coverage_columns, read_estimates
 
 STANDARD_ERRORS = 4.5
-REPLICATES = 2000
+REPLICATES = 1000
 SCHEMES = ["mclaren-24", "rings-24", "faces-edges-18", "rhombicuboctahedron-24", "faces-6"]
 MCLAREN = f"{NINE}/mclaren-24"
 
@@ -256,15 +256,6 @@ def assert_flagged(tables, cell, failed):
     assert (row["n_replicates"], row["n_converged"]) == (n + failed, n)
 
 
-def test_absurd_noise_is_flagged(tmp_path):
-    tables = run_study(tmp_path, grids=[grid(sensor_sigma_mps2=3, approaches="gravity")])
-    cell = f"{MCLAREN}/gravity/sensor_sigma_mps2=3"
-    failed = int((~tables["estimates"]["converged"]).sum()) // 9
-    assert 0 < failed < 60
-    assert_flagged(tables, cell, failed)
-    assert tables["leveling"]["n_converged"].tolist() == [60 - failed]
-
-
 def test_some_replicates_fail(monkeypatch, tmp_path):
     """Replicates with a hopeless observation fail, and the others do not notice."""
     whole = run_study(tmp_path / "whole", grids=[grid(approaches="gravity")])
@@ -300,21 +291,6 @@ def test_no_replicate_converges(tmp_path):
 
 
 # --- wrong gravity, missing effects --------------------------------------------------------------
-
-
-def test_a_wrong_gravity_biases_the_scales_alone(tmp_path):
-    """Held at g + e, the sensor seems to measure too little: 1 + s becomes (1 + s) g/(g + e)."""
-    errors = [-0.01, 0.001, 0.03]
-    table = run_study(tmp_path, grids=[grid(replicates=1000, gravity_error_mps2=errors)])
-    assert len(table["summary"]) == 2 * 3 * 9
-    for row in table["summary"].to_dict("records"):
-        e, expected = row["gravity_error_mps2"], 0.0
-        if row["parameter"].startswith("s_"):
-            expected = -1e6 * (1 + 200e-6) * e / (9.80665 + e)
-        limit = STANDARD_ERRORS * row["sd_empirical"] / np.sqrt(1000)
-        assert abs(row["bias"] - expected) < limit
-        if row["parameter"].startswith("s_"):
-            assert abs(row["bias"]) > 2 * limit
 
 
 def test_tilt_does_not_feel_a_wrong_gravity(tmp_path):

@@ -278,22 +278,6 @@ def test_results_cannot_be_written(tmp_path, monkeypatch):
     assert not (tmp_path / "a").exists()
 
 
-def test_truncated_estimates(finished):
-    results = finished / "results" / "tiny"
-    name = f"results/tiny/estimates/{SET_UPS[0]}.parquet"
-    estimates = finished / name
-    whole = estimates.read_bytes()
-    estimates.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=f"{SET_UPS[0]}.parquet: not a whole Parquet file"):
-        read_table(results / "estimates")
-
-    # And so it is, though no table asks for it.
-    estimates.unlink()
-    assert "simulate" in planned(finished)
-    succeed(finished, name)
-    assert estimates.read_bytes() == whole
-
-
 # --- around it -----------------------------------------------------------------------------------
 
 
@@ -333,11 +317,6 @@ def check_report(folder, results):
     assert "closed-forms" in {figure.stem for figure in figures}
     assert "Empirical standard deviation of each parameter" in text  # its caption
     assert "1 mgon = 0.0009" in text  # what a caption says of the study
-
-
-def test_report(single):
-    succeed(single, "--report", "report.zip")
-    check_report(single, single / "results" / "tiny")
 
 
 @pytest.fixture
