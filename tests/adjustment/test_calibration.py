@@ -95,11 +95,6 @@ def test_derivatives_against_finite_differences(name, approach, estimates_gravit
     np.testing.assert_allclose(at.jac_observations[:, :, 0], b, rtol=0, atol=1e-6)
 
 
-def test_parameters_of_the_equations_end_with_gravity():
-    names = [str(p) for p in CalibrationEquations(NINE.trace, ROBOT, True).parameters]
-    assert names == [*NINE.parameter_names, "g"]
-
-
 # --- the robot's conditions in components are those of the paper ---------------------------------
 
 

@@ -301,13 +301,6 @@ def test_commands_write_nothing_into_input(measured, name):
     assert content(measured) == before
 
 
-def test_an_error_of_reading_names_what_was_read(measured, tmp_path):
-    calibration = measured / "calibrated/calibration.json"
-    result = call("apply", calibration, "/proc/self/mem", "--out", tmp_path / "out.csv")
-    assert result.stderr == "error: /proc/self/mem: cannot be read: Input/output error\n"
-    assert content(tmp_path) == {}
-
-
 def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
     end, start = os.pipe()
     os.write(start, (measured / "calibrated/calibration.json").read_bytes())

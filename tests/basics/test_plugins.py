@@ -171,14 +171,6 @@ def test_one_that_fails_at_work_is_one_line():
     assert not Path("new").exists()
 
 
-def test_what_does_not_use_it_stays_the_same():
-    words = ("simulate-campaign", "--effect", "warm_up", "--noise-effect", "heavy_tails")
-    succeed(*words, "--out", "without")
-    succeed(*words, "--plugin", "ripple.py", "--out", "with")
-    tables = [Path(folder, "positions.csv").read_bytes() for folder in ("without", "with")]
-    assert tables[0] == tables[1]
-
-
 def test_the_help_loads_none():
     Path("bad.py").write_text("x = (")
     assert call("--plugin", "bad.py", "--help").exit_code == 0
@@ -256,14 +248,6 @@ def test_a_model_in_a_file_names_it_and_loads_nothing(named):
     assert plugins.loaded_files() == []
     plugins.load_files(["ripple.py"])
     assert get_model("model.yaml").effects[1].name == "ripple"
-
-
-def test_another_one_than_a_model_names_is_told(capsys):
-    plugins.load_files(["ripple.py"])
-    get_model(model_file(plugins.as_a_key()["plugins"]))
-    assert capsys.readouterr().err == ""
-    get_model(model_file({"elsewhere/ripple.py": "12ab"}))
-    assert "with another elsewhere/ripple.py than is loaded" in capsys.readouterr().err
 
 
 def test_the_list_of_a_lot_loads_nothing():

@@ -55,11 +55,6 @@ def test_a_truncated_file_is_refused(size, tmp_path):
             read(path)
 
 
-def test_a_table_is_a_table_to_other_programs(tmp_path):
-    write_in_groups(tmp_path / "table.parquet")
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "table.parquet"), TABLE)
-
-
 @pytest.mark.parametrize("said", [b"[", b"[]", b"\xff", b'{"seed": 1}'])
 def test_a_table_with_another_origin_is_no_table_of_a_study(tmp_path, said):
     """Such as one of another program."""

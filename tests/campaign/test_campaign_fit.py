@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
+from campaign_helpers import FIVE_AXES, GRAVITY, NINE, ROBOT, simulated_campaign
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -117,18 +117,12 @@ def _in_conflict(campaign):
     return found
 
 
-GOLDEN = (1 + 5**0.5) / 2
-AXES = np.array([[0, 1, GOLDEN], [0, 1, -GOLDEN], [1, GOLDEN, 0], [1, -GOLDEN, 0], [GOLDEN, 0, 1]])
-DODECAHEDRON = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
-"""Nine faces on five axes: five sums and three biases, so eight of nine parameters."""
-
-
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize(("sigma", "repeats"), [(2e-5, 1), (2e-2, 1), (2e-3, 4)])
 def test_the_noise_of_readings_gives_no_rank(sigma, repeats, stated):
     """Neither the noise nor the scales and angles of a sensor make eight parameters nine."""
     sensor = np.array([[1.004, 0, 0], [0.005, 0.997, 0], [-0.008, 0.006, 1.006]])
-    ideal = -9.80665 * np.repeat(DODECAHEDRON, repeats, axis=0) @ sensor.T + [0.12, -0.08, 0.2]
+    ideal = -9.80665 * np.repeat(FIVE_AXES, repeats, axis=0) @ sensor.T + [0.12, -0.08, 0.2]
     rng, numbers = np.random.default_rng(36), np.arange(len(ideal))
     for _ in range(15):
         forces = ideal + sigma * rng.standard_normal(ideal.shape)
@@ -139,7 +133,7 @@ def test_the_noise_of_readings_gives_no_rank(sigma, repeats, stated):
 
 def test_what_shows_weakly_but_above_the_noise_is_determined():
     """A tenth position, two degrees beside the first: hardly, but with sigmas that hold."""
-    faces = np.concatenate([DODECAHEDRON, DODECAHEDRON[:1] + np.array([0.03, 0.03, 0])])
+    faces = np.concatenate([FIVE_AXES, FIVE_AXES[:1] + np.array([0.03, 0.03, 0])])
     faces /= np.linalg.norm(faces, axis=1)[:, None]
     forces = -9.80665 * faces * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2]
     forces += 2e-4 * np.random.default_rng(36).standard_normal(forces.shape)

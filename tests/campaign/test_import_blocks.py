@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import succeed
-from places import DATA, needs_data
 
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.logs import import_log
@@ -63,14 +62,3 @@ def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
     assert campaign.reasons[6].startswith("the sensor moves: its parts scatter by 0.1")
     assert campaign.positions.tolist() == [n for n in range(1, COUNT + 1) if n != 6]
     assert any(line.startswith("left out: 1 block: 6 (the sensor moves") for line in campaign.notes)
-
-
-@needs_data
-def test_public_blocks_are_all_positions(tmp_path):
-    """Means and standard deviations are those of the samples of each block."""
-    succeed("public", "ck-explorer", "--folder", DATA, "--out", tmp_path / "out")
-    campaign = read_campaign(tmp_path / "out")
-    raw = np.loadtxt(DATA / "ck_explorer/acc_log.csv", delimiter=",", skiprows=1) * G
-    blocks = raw.reshape(160, 100, 3)
-    np.testing.assert_allclose(campaign.forces, blocks.mean(axis=1), atol=1e-9)
-    np.testing.assert_allclose(campaign.sd, blocks.std(axis=1, ddof=1), rtol=1e-9)

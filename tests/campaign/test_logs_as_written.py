@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from calling import refusal, succeed
 from log_helpers import BIAS, HAND_RATE, HOLD, HOLDS, MOVE, SCALE, by_hand, found, open_log
-from recorded import EPOCH, write_bag, write_ulog
+from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY as G
@@ -288,21 +288,10 @@ def folder(tmp_path_factory):
     (folder / "alone.mcap").write_bytes((folder / "two/two.mcap").read_bytes())
     for name, fields in (("untimed", "float x;float y;float z;float a;float b;"),
                          ("no-x", "uint64_t timestamp;float y;float z;float a;")):  # fmt: skip
-        (folder / f"{name}.ulg").write_bytes(ulog(f"sensor_accel:{fields}"))
+        sample = message("D", struct.pack("<H5f", 0, *range(5)))
+        (folder / f"{name}.ulg").write_bytes(b"".join([*ulog(fields), sample]))
     table().to_csv(folder / "frd.csv", index=False)
     return folder
-
-
-def ulog(*formats):
-    """A flight log of these formats, with one sample of a sensor_accel of five floats."""
-
-    def message(kind, content):
-        return struct.pack("<HB", len(content), ord(kind)) + content
-
-    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
-    parts += [message("F", each.encode()) for each in formats]
-    parts.append(message("A", struct.pack("<BH", 0, 0) + b"sensor_accel"))
-    return b"".join((*parts, message("D", struct.pack("<H5f", 0, *range(5)))))
 
 
 @pytest.mark.parametrize(("name", "settings", "turn", "frame"), [

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from calling import refusal, succeed
+from campaign_helpers import FIVE_AXES
 from page_helpers import text_of
 
 import accelstudy as acs
@@ -12,41 +13,27 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import assessed_positions
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.format import read_campaign
+from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
-GOLDEN = (1 + 5**0.5) / 2
-AXES = np.array([[0, 1, GOLDEN], [0, 1, -GOLDEN], [1, GOLDEN, 0], [1, -GOLDEN, 0], [GOLDEN, 0, 1]])
-NINE = np.concatenate([AXES, -AXES[:4]]) / np.hypot(1, GOLDEN)
-"""Nine faces of a dodecahedron on five axes: five sums and three biases, one too few."""
 CUBE = get_scheme("faces-edges-corners-26").directions
-HEADER = """\
-schema_version: 1
-name: made-up
-unit: m/s^2
-gravity: {value_mps2: 9.80665, sigma_mps2: 0.0}
-sensor_noise: {sigma_mps2: 0.002}
-"""
 
 
 def written(folder, directions, seed, outside=None):
     """Write the campaign of a sensor with known errors and a noise of 2 mm/s²."""
-    folder.mkdir()
-    (folder / "campaign.yaml").write_text(HEADER, encoding="utf-8")
     noise = 0.002 * np.random.default_rng(seed).standard_normal(directions.shape)
     forces = -9.80665 * directions * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2] + noise
     forces += 0 if outside is None else outside(directions)
-    rows = [f"{i},{x},{y},{z}" for i, (x, y, z) in enumerate(forces, 1)]
-    text = "\n".join(["position,fx,fy,fz", *rows, ""])
-    (folder / "positions.csv").write_text(text, encoding="utf-8")
+    numbers = np.arange(1, len(forces) + 1)
+    write_campaign(Campaign("made-up", numbers, forces, 9.80665, sigma_force=0.002), folder)
     return folder
 
 
 def test_nine_positions_of_rank_eight(tmp_path):
     """Some draws of the noise made them nine, with scales of 100 000 ppm."""
-    campaign = written(tmp_path / "nine", NINE, seed=24)
+    campaign = written(tmp_path / "nine", FIVE_AXES, seed=24)
     says = "rank 8 of 9: s_x, s_y, s_z"
     assert says in refusal("calibrate", campaign, "--out", tmp_path / "calibrated")
     assert says in refusal("diagnose", campaign, "--out", tmp_path / "diagnosis")

@@ -10,6 +10,11 @@ from accelstudy.simulation.sessions import Noise, session
 
 NINE = get_model("bias-scale-nonorthogonality")
 GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+_GOLDEN = (1 + 5**0.5) / 2
+_AXES = np.array([[0, 1, _GOLDEN], [0, 1, -_GOLDEN], [1, _GOLDEN, 0], [1, -_GOLDEN, 0],
+                  [_GOLDEN, 0, 1]])  # fmt: skip
+FIVE_AXES = np.concatenate([_AXES, -_AXES[:4]]) / np.hypot(1, _GOLDEN)
+"""Nine faces of a dodecahedron on five axes: five sums and three biases, so eight parameters."""
 
 
 def simulated_campaign(values, scheme="mclaren-24", seed=1, noise=None, sigma=0.002):

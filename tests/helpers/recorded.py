@@ -50,21 +50,27 @@ def write_bag(path, time, topics, temperature=None, frame="imu_link", stamped=Tr
             bag.write(connection, received, serialize(message, kind))
 
 
+def message(kind, content):
+    """A message of a flight log."""
+    return struct.pack("<HB", len(content), ord(kind)) + content
+
+
+def ulog(fields, count=1):
+    """Begin a flight log: parts with the fields of sensor_accel and its instances."""
+    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
+    parts += [message("F", f"sensor_accel:{fields}".encode())]
+    names = (struct.pack("<BH", i, i) + b"sensor_accel" for i in range(count))
+    return [*parts, *(message("A", name) for name in names)]
+
+
 def write_ulog(path, time, sensors, temperature):
     """Write a flight log with one sensor_accel for each of the forces (n, 3), m/s².
 
     The library writes only what it has read, so it gets a log without samples first.
     """
-
-    def message(kind, content):
-        return struct.pack("<HB", len(content), ord(kind)) + content
-
-    fields = "sensor_accel:uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;"
+    fields = "uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;"
     fields += "float x;float y;float z;float temperature;uint32_t error_count;"
-    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
-    parts += [message("F", fields.encode())]
-    for i in range(len(sensors)):
-        parts.append(message("A", struct.pack("<BH", i, i) + b"sensor_accel"))
+    parts = ulog(fields, len(sensors))
     for i, forces in enumerate(sensors):
         for t, force, warm in zip(time, forces, temperature, strict=True):
             at = round(1e6 * t) + 5_000_000

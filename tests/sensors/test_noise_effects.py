@@ -34,12 +34,6 @@ def near_variance(values, expected, kurtosis=3.0):
     return abs(np.mean(values**2) / expected - 1) < 4.5 * math.sqrt((kurtosis - 1) / n)
 
 
-def test_the_catalogue_is_complete():
-    assert set(noise_effect_names()) >= {
-        *("noise_level", "axis_noise", "coloured_noise", "heavy_tails", "quantisation")
-    }
-
-
 def test_nothing_changes_without_effects_and_nothing_but_the_forces_with_them():
     plain = IDEAL.draw(Noise(), 3, np.random.default_rng(1))
     other = IDEAL.draw(Noise(effects=("coloured_noise",)), 3, np.random.default_rng(1))

@@ -101,11 +101,6 @@ def test_derivative_of_the_correction_against_finite_differences(name):
         np.testing.assert_allclose(found[..., i], difference / 2e-5, rtol=0, atol=1e-6)
 
 
-def test_a_perfect_sensor_changes_nothing():
-    model = get_model(TWELVE)
-    np.testing.assert_array_equal(model.sense(forces(), np.zeros(12)), forces())
-
-
 def test_order_names_and_units_of_the_parameters():
     model = get_model("bias-scale-nonorthogonality-crossaxis")
     names = "b_x b_y b_z s_x s_y s_z alpha_yz alpha_zy alpha_zx alpha_xz alpha_xy alpha_yx"
@@ -183,13 +178,6 @@ def test_an_unknown_name_is_answered_with_a_suggestion():
         SensorModel.of("mine", ["friction"])
 
 
-def test_a_model_of_the_caller():
-    mine = SensorModel.of("mine", ["scale", "bias"])
-    model = get_model("mine", {"mine": mine})
-    assert model is mine
-    assert model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
-
-
 def test_presets_name_models_and_schemes_that_exist():
     assert len({preset.name for preset in PRESETS}) == len(PRESETS)
     for preset in PRESETS:
@@ -215,12 +203,6 @@ def test_reading_errors_are_functions_of_what_is_read():
     k = np.array([2e-3, -1e-3])
     expected = angles / (1 - k) - angles
     np.testing.assert_allclose(model.reading_errors(angles, k), expected, rtol=1e-12)
-
-
-def test_effects_of_the_sensor_leave_the_robot_alone():
-    model = get_model(TWELVE)
-    errors = model.reading_errors(np.array([[0.3, -0.2]]), random_parameters(model))
-    np.testing.assert_array_equal(errors, [[0.0, 0.0]])
 
 
 def test_an_effect_is_registered_once():
