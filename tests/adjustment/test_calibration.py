@@ -25,7 +25,6 @@ from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.design.closed_forms import (
     perfect_robot_ratio,
 )
-from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
@@ -187,15 +186,12 @@ def test_robot_adjustment_is_that_of_the_papers_equations():
 # --- exact data ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "approach"),
-    [
-        (name, approach)
-        for name in MODELS
-        for approach in (GRAVITY, ROBOT)
-        if approach is ROBOT or not name.endswith("crossaxis")  # to which gravity is blind
-    ],
-)
+@pytest.mark.parametrize(("name", "approach"), [
+    (name, approach)
+    for name in MODELS
+    for approach in (GRAVITY, ROBOT)
+    if approach is ROBOT or not name.endswith("crossaxis")  # to which gravity is blind
+])  # fmt: skip
 def test_exact_data_return_the_truth(name, approach):
     model = get_model(name)
     ideal, truth = true_session(model=model)
@@ -295,21 +291,6 @@ def test_intervals_cover_the_truth_in_95_percent(monte_carlo, case, which):
 # --- gravity as an observation -------------------------------------------------------------------
 
 
-def test_a_milligal_is_a_common_scale_of_1_02_ppm():
-    ideal, _ = true_session(gravity=G)
-    sigma_gravity = 1e-5
-
-    def variance_of_mean_scale(noise):
-        result = calibrate(NINE, GRAVITY, ideal.observations(noise))
-        return result.cofactors[0, 3:6, 3:6].mean()
-
-    added = variance_of_mean_scale(Noise(sigma_gravity=sigma_gravity)) - variance_of_mean_scale(
-        Noise()
-    )
-    assert math.sqrt(added) == pytest.approx(1.02e-6, abs=0.005e-6)
-    assert math.sqrt(added) == pytest.approx(sigma_gravity / G, rel=1e-3)
-
-
 @BOTH
 def test_observed_gravity_spreads_the_mean_scale_as_theory_says(approach):
     noise = Noise(sigma_gravity=0.002)
@@ -345,26 +326,6 @@ def test_gravity_that_is_held_fixed_is_one_number():
 
 
 # --- effects that see more than the force --------------------------------------------------------
-
-
-def test_what_is_missing_in_the_model_shows_in_omega():
-    """Of readings with an effect that follows the temperature, or the last change of the force."""
-    hold = HoldConditions(temperature=15 * np.sin(np.arange(24.0)))
-    for effect, sizes in (("thermal_bias", {"b_T_y": -1e-3}), ("hysteresis", {"h_x": 3e-3})):
-        ideal, _ = true_session(model=get_model(f"{NINE.name}+{effect}"), hold=hold, **sizes)
-        observed = ideal.draw(Noise(), 100, np.random.default_rng(12))
-        result = calibrate(NINE, ROBOT, observed)
-        assert result.omega.mean() > result.redundancy + 10 * math.sqrt(2 * result.redundancy / 100)
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("effect", "column"), [("thermal_bias", "temperature"), ("hysteresis", "step_x")]
-)
-def test_a_missing_column_is_named(effect, column, approach):
-    observed = replace(true_session()[0].observations(Noise()), hold=None)
-    with pytest.raises(InputError, match=f"column '{column}'"):
-        calibrate(get_model(f"{NINE.name}+{effect}"), approach, observed)
 
 
 # --- invariances ---------------------------------------------------------------------------------

@@ -116,41 +116,7 @@ def test_omega_is_that_of_the_residuals():
     assert result.omega[0] == pytest.approx(np.sum(YORK_WEIGHTS * result.residuals[0] ** 2))
 
 
-def test_plugging_in_the_raw_observations_is_not_the_same():
-    """The shortcut linearises at l, not at l + v; its fixed point is not the least-squares line."""
-    x = np.array([5.0, -0.5])
-    for _ in range(50):
-        a = np.column_stack([np.ones(10), PEARSON[:, 0]])
-        b = np.array([x[1], -1.0])
-        weight = 1 / (YORK_COFACTORS @ b**2)
-        psi = x[0] + x[1] * PEARSON[:, 0] - PEARSON[:, 1]
-        dx = -np.linalg.solve(a.T @ (weight[:, None] * a), a.T @ (weight * psi))
-        x = x + dx
-    assert np.abs(dx).max() < 1e-12
-    assert np.abs(x - YORK).max() > 1e-3
-    residual = x[0] + x[1] * PEARSON[:, 0] - PEARSON[:, 1]
-    assert np.sum(residual**2 / (YORK_COFACTORS @ np.array([x[1] ** 2, 1]))) > YORK_OMEGA
-
-
 # --- cofactor matrices and dense blocks ----------------------------------------------------------
-
-
-def test_cofactor_matrices_of_the_points():
-    matrices = np.einsum("no,op->nop", YORK_COFACTORS, np.eye(2))
-    result, expected = york(cofactors=matrices), york()
-    np.testing.assert_allclose(result.parameters, expected.parameters, rtol=1e-12)
-    np.testing.assert_allclose(result.cofactors, expected.cofactors, rtol=1e-10)
-    np.testing.assert_allclose(result.residuals, expected.residuals, atol=1e-12)
-
-
-def test_all_points_in_one_dense_block():
-    equations = as_one_block(LINE, 10)
-    matrix = np.diag(YORK_COFACTORS.ravel())[None]
-    result = adjust(equations, PEARSON.reshape(1, 1, 20), matrix, [5.0, -0.5])
-    np.testing.assert_allclose(result.parameters, york().parameters, rtol=1e-10)
-    np.testing.assert_allclose(result.cofactors, york().cofactors, rtol=1e-10)
-    assert result.omega[0] == pytest.approx(YORK_OMEGA, abs=2e-9)
-    assert result.redundancy == 8
 
 
 def test_correlated_observations_equal_transformed_uncorrelated_ones():

@@ -148,24 +148,6 @@ def test_variance_components_are_recovered(factors):
     np.testing.assert_allclose(spread, claimed, rtol=0.35)
 
 
-def test_variance_components_are_the_fixed_point():
-    """With both variances scaled, vᵀ Q⁻¹ v of each group is its redundancy (Förstner 1979)."""
-    observed = draw(22, "fibonacci-36", noise=replace(COARSE, sigma_gravity=1e-5))
-    found = variance_components(NINE, ROBOT, observed)
-    force, angle = np.sqrt(found.factors)
-    scaled = replace(
-        observed, sigma_force=force * observed.sigma_force, sigma_angle=angle * observed.sigma_angle
-    )
-    solution = solve(NINE, ROBOT, scaled)
-    shares = redundancy_numbers(solution).observations
-    squares = solution.residuals**2 / solution.variances
-    for part, expected in zip((slice(0, 3), slice(3, 5)), found.redundancy, strict=True):
-        assert shares[:, part].sum() == pytest.approx(expected, rel=1e-4)
-        assert squares[:, part].sum() == pytest.approx(expected, rel=1e-3)
-    again = variance_components(NINE, ROBOT, scaled)
-    np.testing.assert_allclose(again.factors, 1, atol=1e-3)
-
-
 def test_a_component_that_is_not_there_goes_to_zero_and_not_below():
     """A perfect robot, believed to have 20 mgon."""
     drawn = draw(23, noise=Noise(sigma_angle=0.0), replicates=30)

@@ -134,16 +134,6 @@ def test_redundancy_numbers_sum_up_to_r(scheme, model, approach, sigma_gravity, 
     assert numbers.observations.max() < 1 + 1e-10
 
 
-def test_positions_of_mclaren_share_the_redundancy_equally():
-    """Exactly at the ideal sensor; the paper's errors break the symmetry by a few 1e-4."""
-    directions = get_scheme("mclaren-24").directions
-    ideal = session(NINE, np.zeros(9), directions).observations(Noise())
-    numbers = redundancy_numbers(solve(NINE, GRAVITY, ideal))
-    np.testing.assert_allclose(numbers.positions, 15 / 24, atol=1e-9)
-    # Of the three forces of a position, each has the share of its axis in the direction.
-    np.testing.assert_allclose(numbers.observations, 15 / 24 * directions**2, atol=1e-9)
-
-
 def test_the_value_of_gravity_is_not_checked_beside_scale_factors():
     assert redundancy_numbers(
         solve(NINE, ROBOT, draw(1, noise=Noise(sigma_gravity=1e-5)))

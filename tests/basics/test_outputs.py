@@ -313,14 +313,11 @@ def test_a_pipe_is_not_taken_for_the_output(measured, tmp_path):
 
 
 @pytest.mark.usefixtures("drawn")  # figures are what does not fit
-@pytest.mark.parametrize(
-    ("name", "room"),
-    [
-        *((name, 0) for name in ("apply", "import", "truth")),
-        ("calibrate", 7000),
-        ("calibrate", 20_000),
-    ],
-)
+@pytest.mark.parametrize(("name", "room"), [
+    *((name, 0) for name in ("apply", "import", "truth")),
+    ("calibrate", 7000),
+    ("calibrate", 20_000),
+])  # fmt: skip
 def test_a_full_disk_is_one_line(measured, tmp_path, name, room):
     """Room for files of so many bytes; beyond it writing fails as it does on a full disk."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -326,18 +326,6 @@ def test_an_installed_package_is_found_when_it_is_looked_for():
     assert "of the plug-in our-sensors 1.0 (our_sensors.ripple)" in succeed("effects").stdout
 
 
-def test_what_is_installed_is_looked_up_once(package, monkeypatch):
-    looks = []
-    found = plugins.entry_points
-    monkeypatch.setattr(plugins, "entry_points", lambda: looks.append(1) or found())
-    assert plugins.digests() == plugins.digests() != {}
-    assert plugins.installed("effects")
-    assert len(looks) == 1
-    monkeypatch.syspath_prepend(package)  # another path, on which there may be other packages
-    assert plugins.installed("effects")
-    assert len(looks) == 2
-
-
 def test_jobs_depend_on_the_content_of_a_package(package):
     before = code_version()
     assert "our_sensors" not in sys.modules

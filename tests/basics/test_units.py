@@ -82,12 +82,6 @@ def test_angles_in_degrees_are_for_people_only():
     assert "100 gon = 90°" in angle_note()
 
 
-def test_the_unit_of_angles_is_as_before_when_a_command_fails():
-    with pytest.raises(ZeroDivisionError), angles_in("deg"):
-        _ = 1 / 0
-    assert attitude_unit() == "gon"
-
-
 def test_an_unknown_angle_unit_is_named():
     with pytest.raises(UnknownNameError, match="unknown angle unit 'grad'"), angles_in("grad"):
         pass

@@ -147,25 +147,6 @@ def test_little_redundancy_is_said(tmp_path, n, words):
             assert words in result.output
 
 
-def test_apply_levels_a_log(calibrations, tmp_path):
-    calibration = calibrations["robot"][1] / "calibration.json"
-    f_b = np.array([[0.5, -0.7, -9.0], [0.0, 0.0, -9.8]])
-    readings = NINE.sense(f_b, NINE.vector(TRUTH))
-    log = tmp_path / "log.csv"
-    pd.DataFrame(readings, columns=["fx", "fy", "fz"]).to_csv(log, index=False)
-    succeed("apply", calibration, log, "--out", tmp_path / "level.csv")
-    level = pd.read_csv(tmp_path / "level.csv")
-    roll = np.arctan2(-f_b[:, 1], -f_b[:, 2]) * 200 / np.pi
-    assert np.all(np.abs(level["roll_gon"] - roll) < 5e-3 * level["sigma_roll_mgon"])
-    assert (level["sigma_pitch_mgon"] > 12.9).all()
-    degrees = tmp_path / "degrees.csv"
-    succeed("--angle-unit", "deg", "apply", calibration, log, "--out", degrees)
-    level = level.rename(columns=lambda name: name.replace("gon", "deg"))
-    angles = level.columns[level.columns.str.contains("deg")]
-    level[angles] *= 0.9
-    pd.testing.assert_frame_equal(pd.read_csv(degrees), level, atol=1e-5)
-
-
 def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold(calibrations, tmp_path):
     """Readings of a sensor that stands upright, at the pole and 4 gon beside it, noise 20 mm/s²."""
     n, sigma, rng = 4000, 0.02, np.random.default_rng(8)
@@ -223,23 +204,3 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
         for lines in found:
             assert (f"No sensor is like this: {said}" in " ".join(lines)) == (said is not None)
             assert ("a wrong scale" in " ".join(lines)) == (said is not None)
-
-
-def test_no_position_predicted_by_the_others(tmp_path):
-    """Five positions with a robot and twelve parameters: each is needed by the fit."""
-    drawn = simulated_campaign(TRUTH)
-    few = {name: getattr(drawn, name)[[0, 3, 7, 11, 15]] for name in ("forces", "angles")}
-    write_campaign(
-        Campaign(
-            **{"name": "few", "positions": np.arange(1, 6), "gravity": drawn.gravity, **few},
-            sigma_force=0.002,
-            sigma_angle=drawn.sigma_angle,
-            yaw=np.zeros(5),
-        ),
-        tmp_path / "few",
-    )
-    model = "bias-scale-nonorthogonality-cubic"
-    options = ("--approach", "robot", "--model", model)
-    succeed("calibrate", tmp_path / "few", *options, "--out", tmp_path / "out")
-    content = content_of(tmp_path / "out")
-    assert content["quality"]["held_out"] is None

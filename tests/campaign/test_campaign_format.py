@@ -44,10 +44,6 @@ def campaign(**changes):
 
 
 WITHOUT_ROBOT = {"angles": None, "sigma_angle": None, "yaw": None}
-COUNTS = {
-    "unit": "counts",
-    "nominal": Conversion(np.array([0.0024, -0.0024, 0.0023]), np.array([33123.0, 33275, 32364])),
-}
 
 
 def assert_same(read, written):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from calling import refused
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -139,7 +138,6 @@ def test_no_angles_no_unit_of_angles():
 
 # --- recognition ---------------------------------------------------------------------------------
 
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 TEMPERATURE = {"temperature": (10.0, 40.0), "temperature_order": "ABBA"}
 DESIGNS = {
     "plain": {"scheme": "faces-edges-18"},

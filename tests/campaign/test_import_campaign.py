@@ -18,15 +18,6 @@ from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.settings import ImportSettings, read_settings
 
-XSENS = {
-    "columns": {"fx": 1, "fy": 2, "fz": 3},
-    "time": 0,
-    "unit": "counts",
-    "scale": [1 / 414.4, 1 / 412.0, 1 / 414.6],
-    "offset": [33124, 33275, 32365],
-    "gravity": {"value_mps2": 9.81744},
-}
-
 
 @pytest.fixture
 def log(tmp_path):

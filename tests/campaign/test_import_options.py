@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from calling import call, refusal, succeed
 from log_helpers import RATE, G, open_log, session, shared, write
-from test_import_campaign import XSENS
 
 from accelstudy.api.campaigns import files_of
 from accelstudy.basics.units import GON
@@ -13,11 +12,18 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
-from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
+XSENS = {
+    "columns": {"fx": 1, "fy": 2, "fz": 3},
+    "time": 0,
+    "unit": "counts",
+    "scale": [1 / 414.4, 1 / 412.0, 1 / 414.6],
+    "offset": [33124, 33275, 32365],
+    "gravity": {"value_mps2": 9.81744},
+}
 SINCE_1970 = {"s": 1.7e9, "ms": 1.7e12, "us": 1_700_000_000_123_456, "ns": 17 * 10**17 + 1}
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
@@ -292,12 +298,3 @@ def test_means_with_a_robot(tmp_path, frame, unit):
     assert f"the robot's angles are in {unit}, not in {wrong}" in line
     result = call("import", *arguments, "--out", tmp_path / "new")
     assert "--robot-sigma takes them for the robot's" in result.stderr
-
-
-def test_means_of_a_day(tmp_path):
-    table = pd.DataFrame(np.eye(3)[[0, 1, 2, 0]] * 9.8, columns=["fx", "fy", "fz"])
-    table["t"] = 1_700_000_000_000_000_000 + np.arange(4) * 10**10
-    table.to_csv(tmp_path / "means.csv", index=False)
-    content = {"time": "t", "time_unit": "ns"}
-    campaign = import_means(tmp_path / "means.csv", parse_settings(content))
-    np.testing.assert_allclose(campaign.time, [0, 10, 20, 30])

@@ -187,16 +187,13 @@ def test_a_temperature_that_is_not_used_is_said(tmp_path, names):
     assert f"temperature: which of {', '.join(names)}, in °C?" in said(campaign)
 
 
-@pytest.mark.parametrize(
-    ("prefix", "point", "seconds", "rest"),
-    [
-        ("", ".", "header.stamp.secs", "header.stamp.nsecs"),
-        ("field.", ".", "field.header.stamp.secs", "field.header.stamp.nsecs"),
-        (".", ".", ".header.stamp.sec", ".header.stamp.nanosec"),
-        ("/imu/data/", "/", "/imu/data/header/stamp/sec", "/imu/data/header/stamp/nanosec"),
-        ("", "_", "secs", "nsecs"),
-    ],
-)
+@pytest.mark.parametrize(("prefix", "point", "seconds", "rest"), [
+    ("", ".", "header.stamp.secs", "header.stamp.nsecs"),
+    ("field.", ".", "field.header.stamp.secs", "field.header.stamp.nsecs"),
+    (".", ".", ".header.stamp.sec", ".header.stamp.nanosec"),
+    ("/imu/data/", "/", "/imu/data/header/stamp/sec", "/imu/data/header/stamp/nanosec"),
+    ("", "_", "secs", "nsecs"),
+])  # fmt: skip
 def test_columns_of_ros_are_recognised(tmp_path, prefix, point, seconds, rest):
     whole = np.floor(TIME + 1e-9)
     columns = {

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import grid, make_cells, make_study, simulated
+from study_helpers import grid, make_cells, simulated
 
-from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme
@@ -144,8 +143,3 @@ def test_seeds_of_cells_without_noise_effects_are_those_of_old():
     """Words of a seed as they were before there were noise effects and conditions of the holds."""
     cell = make_cells(grid(), seed=2018)["bias-scale-nonorthogonality/mclaren-24/robot"]
     assert cell.seed(2018, 3).generate_state(2).tolist() == [4071928413, 2252154610]
-
-
-def test_a_noise_effect_that_does_not_exist():
-    with pytest.raises(InputError, match=r"noise.effects: unknown noise effect 'pink'"):
-        make_study(noise={"effects": ["pink"]})

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import Effect, HoldConditions, Parameter, effect_names, get_effect, register
+from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect, register
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -62,14 +61,6 @@ def test_a_model_of_the_axes_is_that_of_the_paper(name, data):
     np.testing.assert_allclose(model.axes_matrix(p), axes, rtol=0, atol=1e-14)
     expected = forces() @ (np.diag(1 + s) @ np.linalg.inv(axes)).T + b
     np.testing.assert_allclose(model.sense(forces(), p), expected, rtol=0, atol=1e-14 * G)
-
-
-@pytest.mark.parametrize("g", [9.78, 9.83])
-def test_nonlinear_scale_in_units_of_gravity(g):
-    model = get_model("bias-scale-nonorthogonality-quadratic-cubic")
-    p = model.vector({"k2_x": 300e-6, "k3_y": 500e-6})
-    f_s = model.sense([[g, g, g]], p, g)
-    np.testing.assert_allclose(f_s, [[g * (1 + 300e-6), g * (1 + 500e-6), g]], rtol=1e-14)
 
 
 @ALL_MODELS
@@ -161,21 +152,6 @@ def test_an_inverse_that_does_not_exist_is_not_a_number(effect, wrong):
 
 
 # --- names ---------------------------------------------------------------------------------------
-
-
-def test_a_parameter_name_stands_for_one_thing():
-    with pytest.raises(InputError, match="parameters b_x, b_y, b_z occur in two effects"):
-        SensorModel.of("twice", ["bias", "scale", "bias"])
-
-
-def test_an_unknown_name_is_answered_with_a_suggestion():
-    with pytest.raises(UnknownNameError, match="unknown effect 'bais'; did you mean 'bias'") as e:
-        SensorModel.of("wrong", ["bais"])
-    assert all(name in str(e.value) for name in effect_names())
-    with pytest.raises(UnknownNameError, match=f"did you mean '{NINE}'"):
-        get_model("bias-scale-nonortogonality")
-    with pytest.raises(UnknownNameError, match="unknown effect 'friction'"):
-        SensorModel.of("mine", ["friction"])
 
 
 def test_presets_name_models_and_schemes_that_exist():

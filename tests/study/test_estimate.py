@@ -70,13 +70,10 @@ def expected(kind, apart):
     return of.get(kind, KNOWN[kind][1])
 
 
-@pytest.mark.parametrize(
-    ("kind", "n", "apart"),
-    [
-        *((kind, *each) for kind in KNOWN for each in [(100, 0.1), (1000, 3.0)]),
-        *((kind, 20, 0.01) for kind in KNOWN if kind != "share"),  # of 20, often all are inside
-    ],
-)
+@pytest.mark.parametrize(("kind", "n", "apart"), [
+    *((kind, *each) for kind in KNOWN for each in [(100, 0.1), (1000, 3.0)]),
+    *((kind, 20, 0.01) for kind in KNOWN if kind != "share"),  # of 20, often all are inside
+])  # fmt: skip
 def test_every_statistic_is_as_far_off_as_it_states(kind, n, apart):
     values, errors, gains = samples(n, apart, kind)
     scatter = values.std(axis=0, ddof=1)
@@ -197,18 +194,15 @@ LACKING = {"simulated_effects": ["bias", "scale", "nonorthogonality", "quadratic
 DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
 
 
-@pytest.mark.parametrize(
-    ("noise", "approach", "keys", "gain"),
-    [
-        (0.002, "gravity", {}, 1e5),
-        (0.3, "robot", {}, 10),
-        # Linear theory is taken where the noise-free session is calibrated, not at the truth.
-        (0.002, "gravity", LACKING, 1000),
-        # The control is the normal noise on which effects act; its distribution stays known.
-        (0.002, "gravity", DISTURBED, 1),
-        (0.002, "gravity", {"noise": {"effects": ["quantisation"]}}, 1),
-    ],
-)
+@pytest.mark.parametrize(("noise", "approach", "keys", "gain"), [
+    (0.002, "gravity", {}, 1e5),
+    (0.3, "robot", {}, 10),
+    # Linear theory is taken where the noise-free session is calibrated, not at the truth.
+    (0.002, "gravity", LACKING, 1000),
+    # The control is the normal noise on which effects act; its distribution stays known.
+    (0.002, "gravity", DISTURBED, 1),
+    (0.002, "gravity", {"noise": {"effects": ["quantisation"]}}, 1),
+])  # fmt: skip
 def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, keys, gain):
     few = simulated_statistics(cell_of(noise, approach, 400, **keys), 1, LEVELING)
     many = plain(cell_of(noise, approach, 4000, **keys), 2)

@@ -14,7 +14,7 @@ from playwright.sync_api import sync_playwright
 from study_helpers import NINE, grid, make_study, run_study
 
 from accelstudy.basics.units import angles_in
-from accelstudy.drawing.style import APPROACH_COLOURS, model_title
+from accelstudy.drawing.style import model_title
 from accelstudy.study.explorer import content
 from accelstudy.study.explorer.page import explorer_page, write_explorer
 from accelstudy.study.tables import TABLES
@@ -179,12 +179,6 @@ def test_angles_in_degrees(study, tables):
     assert "mgon" not in json.dumps(read(page, "page")["columns"], ensure_ascii=False)
     assert "mgon" not in set(table_of(page, "parameters")["unit"])
     same(table_of(page, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
-
-
-def test_charts_have_the_colours_of_the_figures(page):
-    charts = json.dumps(read(page, "page")["charts"])
-    for colour in APPROACH_COLOURS.values():
-        assert colour in charts
 
 
 # --- in a browser --------------------------------------------------------------------------------

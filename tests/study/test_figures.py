@@ -21,7 +21,6 @@ from accelstudy.study.figures.attitudes import sigma_table
 from accelstudy.study.figures.calibrations import correlation_table, single_runs
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.figures.leveling_overview import tilt_table
-from accelstudy.study.figures.panels import panels
 from accelstudy.study.figures.table_1 import preset_table
 from accelstudy.study.figures.total_effects import changes
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
@@ -143,32 +142,6 @@ def test_a_study_without_estimable_cells_draws(name, tables, paper):
     crosses = sum(len(line.get_xdata()) for line in lines if line.get_marker() == "x")
     said = {text.get_text() for ax in drawn.axes for text in ax.texts}
     assert crosses or said & {"nothing to show", "no estimable cell"} or not get_figure(name).tables
-
-
-def test_panels_have_the_places_and_labels_of_their_rows():
-    table = pd.DataFrame({
-        "group": ["bias", "bias", "scale"], "angle": ["roll", "pitch", "pitch"],
-        "unit": ["mm/s²", "mm/s²", "ppm"], "value": [1.0, 2.0, np.nan],
-    })  # fmt: skip
-    drawn = panels(
-        table,
-        lambda ax, rows: ax.plot(rows["value"], rows["value"], "o") and None,
-        30,
-        row="group",
-        column="angle",
-        xlabel="x",
-        ylabel="sd / {unit}",
-        legend=style.approach_handles(["robot"]),
-    )
-    labels = [(ax.get_title(), ax.get_xlabel(), ax.get_ylabel()) for ax in drawn.axes]
-    assert labels == [
-        *[("roll", "", "sd / mm/s²"), ("pitch", "", "")],
-        *[("", "x", "sd / ppm"), ("", "x", "")],
-    ]
-    said = [[text.get_text() for text in ax.texts] for ax in drawn.axes]
-    assert said == [[], [], ["none"], ["no estimable cell"]]
-    (ax,) = panels(table.iloc[:0], lambda ax, rows: None, 30, row="group").axes
-    assert [text.get_text() for text in ax.texts] == ["nothing to show"]
 
 
 def test_figures_2_and_3_show_the_closed_form(paper):

@@ -145,14 +145,6 @@ def test_more_replicates_extend_the_fewer():
         np.testing.assert_array_equal(estimates(replace(cell, replicates=fewer)), many[:fewer])
 
 
-def test_cells_are_independent():
-    """Errors of different cells are uncorrelated, those of one cell with itself are the same."""
-    cells = make_cells(grid(schemes=["mclaren-24", "rings-24"], replicates=1000)).values()
-    errors = np.stack([estimates(cell)[:, 0] for cell in cells])
-    correlation = np.corrcoef(errors)[np.triu_indices(4, 1)]
-    assert np.abs(correlation).max() < 4.5 / np.sqrt(1000)
-
-
 BASE = {"grids": [grid(["bias-scale", NINE], ["mclaren-24", "faces-6"], 60)]}
 BIGGER = {
     "grids": [

@@ -88,13 +88,6 @@ def test_observed_gravity_is_a_parameter(tmp_path):
     assert abs(g["error"].std() / 1e-4 - 1) < 4.5 / np.sqrt(2 * 59)
 
 
-def test_a_cell_that_is_not_estimable_leaves_no_rows(written):
-    cells, estimates, leveling = written
-    assert f"{NINE}/faces-6/gravity" in cells
-    for path in (estimates, leveling):
-        assert set(read_table(path)["cell"].astype(str)) == {GRAVITY, ROBOT}
-
-
 # --- origin --------------------------------------------------------------------------------------
 
 

@@ -150,16 +150,6 @@ def test_ratio_of_sigma_a_posteriori_to_the_empirical_one(study, summary):
 # --- cells ---------------------------------------------------------------------------------------
 
 
-def test_rank_and_redundancy(study):
-    cells = study["cells"].set_index("cell")
-    redundancy = cells["redundancy"]
-    assert redundancy[f"{MCLAREN}/gravity"] == 24 - 9
-    assert redundancy[f"{MCLAREN}/robot"] == 72 - 9
-    assert redundancy["bias-scale/faces-6/gravity"] == 0
-    assert cells.loc[f"{MCLAREN}/gravity", "fourth_moment"] == pytest.approx(1 / 15, rel=1e-9)
-    assert cells.loc[f"{MCLAREN}/gravity", "rank"] == 9
-
-
 def test_without_redundancy_there_is_no_sigma_a_posteriori(summary):
     rows = of(summary, "bias-scale/faces-6/gravity")
     undefined = ["sd_posteriori_mean", "sd_ratio", "coverage_95", "coverage_95_low"]
@@ -186,13 +176,6 @@ def test_a_cell_that_is_not_estimable_is_reported_with_the_reason(study):
         assert name not in set(study[table]["cell"])
 
 
-def test_only_cells_that_are_not_estimable(tmp_path):
-    tables = run_study(tmp_path, grids=[grid(schemes="faces-6", approaches="gravity")])
-    rows = {name: len(table) for name, table in tables.items() if "cell" in table}
-    nothing = dict.fromkeys(("correlations", "leveling", "quantiles", "estimates"), 0)
-    assert rows == {"cells": 1, "summary": 9, **nothing}
-
-
 def test_one_replicate_has_no_spread(tmp_path):
     rows = run_study(tmp_path, grids=[grid(replicates=1)])["summary"]
     assert rows[["sd_empirical", "sd_ratio", "bias_ci95_low"]].isna().all().all()
@@ -200,26 +183,6 @@ def test_one_replicate_has_no_spread(tmp_path):
 
 
 # --- correlations --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("cell", "published", "digits"), [
-    (f"{MCLAREN}/gravity", 0.25, 0.005),
-    (f"{MCLAREN}/robot", 0.012, 0.0005),
-    (f"{NINE}/rings-24/gravity", 0.14, 0.005),
-    (f"{NINE}/rings-24/robot", 0.007, 0.0005),
-])  # fmt: skip
-def test_correlation_of_the_scales(study, cell, published, digits):
-    table = study["correlations"]
-    rows = table[
-        (table["cell"] == cell)
-        & table["parameter_1"].str.startswith("s_")
-        & table["parameter_2"].str.startswith("s_")
-        & (table["parameter_1"] < table["parameter_2"])
-    ]
-    assert len(rows) == 3
-    assert abs(rows["adjustment"].abs().mean() - published) < digits + 1e-3
-    limit = STANDARD_ERRORS / np.sqrt(REPLICATES)
-    np.testing.assert_allclose(rows["empirical"], rows["adjustment"], atol=limit)
 
 
 def test_empirical_correlations_are_those_of_the_adjustment(study):
