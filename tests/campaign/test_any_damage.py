@@ -187,7 +187,7 @@ WHICH = st.integers(0, 59)
 
 
 @pytest.mark.parametrize("name", READ_BY)
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(damage=bytes_damaged() | words_replaced(), which=WHICH)
 @example(damage=lambda content: b"[" * 100000, which=0)
 def test_any_damage_of_a_file_is_one_line(whole, name, damage, which):
@@ -195,7 +195,7 @@ def test_any_damage_of_a_file_is_one_line(whole, name, damage, which):
 
 
 @pytest.mark.parametrize("name", [name for name in READ_BY if name.endswith((".yaml", ".json"))])
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(damage=values_replaced(), which=WHICH)
 def test_any_other_value_is_one_line(whole, name, damage, which):
     read(whole, name, READ_BY[name][which % len(READ_BY[name])], damage)

@@ -237,10 +237,6 @@ def test_a_lag_follows_the_thermometer(tmp_path):
         for warning in leveled.warnings
     )
     assert not any("start of the calibration session" in warning for warning in leveled.warnings)
-    table = pd.read_csv(log).drop(columns="time")
-    table.to_csv(tmp_path / "without.csv", index=False)
-    with pytest.raises(InputError, match="thermal_bias needs the time"):
-        level_log(calibration, tmp_path / "without.csv", tmp_path / "never.csv")
 
 
 def test_a_drift_stays_where_the_session_left_it(tmp_path):

@@ -130,16 +130,16 @@ def test_the_table_of_campaigns(made):
     for name, row in good.iterrows():
         path = results / "campaigns" / name / "calibration.json"
         content = json.loads(path.read_text(encoding="utf-8"))
-        test = content["quality"]["global_test"]
+        quality, test = content["quality"], content["quality"]["global_test"]
         assert row["sigma0"] ** 2 == pytest.approx(test["statistic"] / test["dof"])
-        assert row["accepted"] == test["accepted"]
-        assert row["verdict"] == content["quality"]["verdict"]
-        assert row["rms_norm_residual_mps2"] == content["rms_norm_residual_mps2"]
-        assert row["sigma_source"] == content["sigma_source"]
-        tilt = content["quality"]["tilt_rms_mgon"]
-        assert row["tilt_pitch_rad"] == pytest.approx(tilt["pitch"] * MGON)
-        held = content["quality"]["held_out"]
-        assert row["held_out_mps2"] == held["rms_mps2"]
+        assert row["tilt_pitch_rad"] == pytest.approx(quality["tilt_rms_mgon"]["pitch"] * MGON)
+        expected = {
+            "accepted": test["accepted"], "verdict": quality["verdict"],
+            "rms_norm_residual_mps2": content["rms_norm_residual_mps2"],
+            "held_out_mps2": quality["held_out"]["rms_mps2"],
+            "sigma_source": content["sigma_source"],
+        }  # fmt: skip
+        assert row[[*expected]].to_dict() == expected
         assert (path.parent / "report.html").exists()
     assert good.loc["plain", "sigma_priori_mps2"] == 0.002
     assert good.loc["session", "gravity_mps2"] == 9.81
@@ -391,17 +391,16 @@ def test_one_line_for_a_wrong_key(change, message):
 
 
 def test_the_workflow_says_it(tmp_path):
-    result = run(tmp_path, {"batch": "b", "campaigns": [{"campain": "a"}]})
-    assert result.returncode != 0
-    assert "Traceback" not in result.stdout
-    one_line(result.stdout, "tiny.yaml: campaigns.0.campain: unknown key; did you mean 'campaign'")
+    without = snakemake(tmp_path, "--snakefile", ROOT / "workflow/campaigns.smk", "--cores", 1)
+    wrong = run(tmp_path, {"batch": "b", "campaigns": [{"campain": "a"}]})
+    for result, said in (
+        (without, "no campaigns; name them with --configfile"),
+        (wrong, "tiny.yaml: campaigns.0.campain: unknown key; did you mean 'campaign'"),
+    ):
+        assert result.returncode != 0
+        assert "Traceback" not in result.stdout
+        one_line(result.stdout, said)
     assert not (tmp_path / "results").exists()
-
-
-def test_without_configuration(tmp_path):
-    result = snakemake(tmp_path, "--snakefile", ROOT / "workflow/campaigns.smk", "--cores", 1)
-    assert result.returncode != 0
-    one_line(result.stdout, "no campaigns; name them with --configfile")
 
 
 # --- without Snakemake ---------------------------------------------------------------------------
@@ -421,19 +420,15 @@ def test_a_gravity_of_its_own(tmp_path, gravity, error):
         assert json.loads(path.read_text(encoding="utf-8"))["gravity_mps2"] == gravity
 
 
-def test_all_failed(tmp_path):
-    assert "no such folder" in run_task(task_of(campaign=str(tmp_path / "none")), tmp_path / "out")
+def test_where_all_failed_the_page_says_why(tmp_path):
+    """What a page shows is escaped."""
+    task = task_of(campaign=str(tmp_path / "<i>&"))
+    assert task.name == "i-"
+    assert "no such folder" in run_task(task, tmp_path / "out")
     campaigns, parameters, page = summarised(tmp_path, [tmp_path / "out"])
     assert campaigns.dtypes.astype(str).to_dict() == CAMPAIGN_COLUMNS
     assert parameters.empty
     assert "Calibrated" not in page
-
-
-def test_what_a_page_shows_is_escaped(tmp_path):
-    task = task_of(campaign=str(tmp_path / "<i>&"))
-    assert task.name == "i-"
-    run_task(task, tmp_path / "out")
-    page = summarised(tmp_path, [tmp_path / "out"])[2]
     assert "<i>" not in page
     assert "&lt;i&gt;&amp;: no such folder" in page
 

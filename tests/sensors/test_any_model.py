@@ -14,7 +14,6 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
@@ -24,7 +23,6 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
-from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.drawing.style import model_title
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
@@ -119,28 +117,6 @@ def test_a_study_of_compositions(tmp_path):
         parse_study(content(grids=[grid(models=f"{NINE}+warm_up(tau=300)")]))
     with pytest.raises(InputError, match=r"grids\.0\.models.*unknown model or effect 'warmup'"):
         parse_study(content(grids=[grid(models=f"{NINE}+warmup")]))
-
-
-def test_the_sensitivity_of_a_composition():
-    name = f"{NINE}+quadratic_scale+cubic_scale"
-    settings = {"roll_gon": [0], "pitch_gon": [0], "model": "bias+scale + nonorthogonality"}
-    study = parse_study(content(grids=[grid()], sensitivity=settings))
-    assert study.sensitivity.model.name == NINE
-    settings["model"] = f"{NINE}+ cross_coupling"
-    study = parse_study(content(grids=[grid(models=settings["model"])], sensitivity=settings))
-    assert study.sensitivity.model.name == study.cells[0].model == f"{NINE}+cross_coupling"
-    (model,) = parse_study(content(grids=[grid(models=name)])).grids[0].models
-    assert model.name == f"{NINE}-quadratic-cubic"
-
-
-def test_batches_and_the_round_trip_take_a_composition():
-    batch = parse_batch({"batch": "b", "model": f"{NINE} +thermal_bias",
-                         "campaigns": [{"campaign": "c"}]})  # fmt: skip
-    assert batch.tasks()[0].model == f"{NINE}+thermal_bias"
-    with pytest.raises(InputError, match="model: unknown model or effect 'thermal'"):
-        parse_batch({"batch": "b", "model": f"{NINE}+thermal", "campaigns": [{"campaign": "c"}]})
-    trip = parse_round_trip({"campaign": {"name": "t"}, "model": "bias+scale"})
-    assert trip.model == "bias-scale"
 
 
 # --- what a diagnosis found, used the next day ----------------------------------------------------

@@ -81,16 +81,6 @@ def test_the_robot_does_not_concern_the_gravity_approach():
     assert usual.noise.sigma_angle == 0
 
 
-def test_model_of_the_user():
-    cells = make_cells(grid(models="mine"), models={"mine": ["scale", "bias"]})
-    cell = cells["mine/mclaren-24/robot"]
-    assert cell.estimated_model.parameter_names == ("s_x", "s_y", "s_z", "b_x", "b_y", "b_z")
-    result = simulated(cell)
-    truth = [cell.truth[name] for name in cell.estimated_model.parameter_names]
-    errors = (result.estimates.mean(axis=0) - truth) / result.sigma_priori[0]
-    assert np.abs(errors).max() < 4.5 / np.sqrt(cell.replicates)
-
-
 def test_effects_of_the_simulated_sensor():
     cells = make_cells(
         grid(models=["bias-scale", NINE]), simulated_effects=["bias", "nonorthogonality"]
