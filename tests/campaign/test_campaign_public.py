@@ -7,10 +7,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from calling import refusal, refused, succeed
+from calling import refusal, refused
 from places import DATA, needs_data
 
-from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import (
@@ -96,20 +95,6 @@ def test_the_registry_imports_the_files(name):
     campaign, _ = import_log(public_file(name, DATA), import_settings(name))
     assert campaign.name == name
     assert campaign.n_positions == N_POSITIONS.get(name, campaign.n_positions)
-
-
-@needs_data
-def test_command(tmp_path):
-    result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)
-    assert "holds: 10" in result.output
-    assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
-    assert (tmp_path / "out" / "segmentation.png").exists()
-
-
-def test_command_lists():
-    result = succeed("public")
-    for name, entry in public_data().items():
-        assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

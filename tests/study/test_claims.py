@@ -1,4 +1,7 @@
-"""The paper's claims and those of this project: known numbers, and verdicts that can be either."""
+"""The paper's claims and those of this project: verdicts that can be either.
+
+The golden set keeps their numbers.
+"""
 
 import re
 
@@ -6,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from page_helpers import text_of
-from scipy.special import gammaln
 from study_helpers import (
     NINE,
     PAPER_TRUTH,
@@ -30,7 +32,6 @@ from accelstudy.study.claims.verdicts import (
     NOT_REPRODUCED,
     OPEN,
     REPRODUCED,
-    SLIP,
     TABLES,
     judge,
     judge_all,
@@ -40,7 +41,6 @@ from accelstudy.study.claims.verdicts import (
 from accelstudy.study.replicates import read_replicates
 from accelstudy.study.sensitivity import shapley_table
 
-STANDARD_ERRORS = 4.5
 REPLICATES = 1000
 BASE_SAMPLES, RESAMPLES = 256, 20
 KEYS = {
@@ -101,73 +101,6 @@ def rejudge(tables, by_scheme):
 @pytest.fixture(scope="module")
 def judged(rejudge, by_scheme):
     return rejudge(), by_scheme.set_index(["claim", "scheme"])
-
-
-def mean_of_chi(r):
-    return np.sqrt(2 / r) * np.exp(gammaln((r + 1) / 2) - gammaln(r / 2))
-
-
-# --- numbers -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("scheme", "effect", "linear"), [
-    ("mclaren-24", "bias", 41),
-    ("mclaren-24", "scale", 28),
-    ("mclaren-24", "nonorthogonality", 54),
-    ("rings-24", "bias", 41),
-    ("rings-24", "scale", 15),
-    ("rings-24", "nonorthogonality", 64),
-])  # fmt: skip
-def test_mean_reductions_are_those_of_linear_theory(judged, scheme, effect, linear):
-    """Up to the rounding of the published numbers, Monte Carlo, and E σ̂0 < σ0."""
-    row = judged[1].loc[f"reduction-{effect}", scheme]
-    remaining = (1 - row["mean"] / 100) * mean_of_chi(15.0) / mean_of_chi(63.0)
-    spread = np.sqrt((1 / 30 + 1 / 126) / REPLICATES) * (100 - linear)
-    assert abs(100 * (1 - remaining) - linear) < 0.5 + STANDARD_ERRORS * spread
-    assert row["single_low"] < row["mean"] < row["single_high"]
-    assert abs(row["median"] - row["mean"]) < 2
-
-
-def test_accuracy_near_level(judged):
-    for name in ("level-roll", "level-pitch", "roll-does-not-matter"):
-        claim = judged[0].loc[name]
-        assert claim["ours"] == pytest.approx(12.98, rel=STANDARD_ERRORS / np.sqrt(2 * 200_000))
-        assert claim["ci95_low"] < claim["ours"] < claim["ci95_high"]
-        assert claim["verdict"] == REPRODUCED
-
-
-def test_correlations(judged):
-    claims = judged[0]
-    assert claims.loc["scale-correlation-gravity", "ours"] == pytest.approx(0.25, abs=2e-3)
-    # 0.012 in an isotropic scheme, 0.007 to 0.015 over twelve.
-    assert 0.25 / 0.015 < claims.loc["scale-correlation-robot", "ours"] < 0.25 / 0.007
-    assert claims.loc["nearly-uncorrelated", "ours"] < 0.02
-    assert claims.loc["scale-correlation-robot", "verdict"] == REPRODUCED
-
-
-def test_slips_stand_last_of_the_papers_claims(judged):
-    slips = judged[0][judged[0]["verdict"] == SLIP]
-    assert [*slips.index] == ["roll-accuracy-falls-with", "degree-of-freedom", "equation-10"]
-    papers = judged[0][judged[0]["section"] != ""]
-    assert [*papers.index[-3:]] == [*slips.index]
-    assert papers["section"][:-3].is_monotonic_increasing
-    assert judged[0].index.is_unique
-    freedom = slips.loc["degree-of-freedom"]
-    assert (freedom["paper"], freedom["ours"]) == (15, 63)
-    assert slips.loc["equation-10", "ours"] == pytest.approx(-100)
-    assert "a misclosure of −100 gon" in slips.loc["equation-10", "sentence"]
-    pitched = slips.loc["roll-accuracy-falls-with", "ours"]
-    assert pitched == pytest.approx(18.36, rel=STANDARD_ERRORS / np.sqrt(2 * 200_000))
-
-
-def test_sensitivity(judged):
-    claims = judged[0]
-    assert claims.loc["f_x-roll", "ours"] == 0
-    assert claims.loc["f_x-roll", "verdict"] == REPRODUCED
-    # sin²φ at 30 gon is 20.6 %: not inessential.
-    assert claims.loc["f_z-small-tilt", "ours"] == pytest.approx(20.6, abs=2)
-    assert claims.loc["f_z-small-tilt", "verdict"] == NOT_REPRODUCED
-    assert claims.loc["alpha_zx-roll", "ours"] == pytest.approx(35.7, abs=4)
 
 
 def test_order_of_the_inputs(tables, judged, rejudge):

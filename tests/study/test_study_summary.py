@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from scipy.special import gammaln
 from scipy.stats import binom
-from study_helpers import NINE, PAPER_SENSOR, grid, run_study
+from study_helpers import NINE, grid, run_study
 
 from accelstudy.study import replicates as module
 from accelstudy.study.compiling import calibrator
@@ -73,18 +73,6 @@ def test_sds_are_those_of_linear_theory(summary):
     assert (summary["sd_se"] / summary["sd_empirical"]).max() < 1e-4
     assert summary["sd_gain"].min() > 1e4
     np.testing.assert_allclose(summary["sd_priori_mean"], summary["sd_linear"], rtol=1e-4)
-
-
-def test_gravity_based_sds_of_24_positions(summary):
-    """0.707 mm/s², 101.9 ppm and 10.26 mgon, for n = 24 and m = 1/15."""
-    rows = of(summary, f"{MCLAREN}/gravity")
-    assert [*rows["unit"]] == 3 * ["mm/s^2"] + 3 * ["ppm"] + 3 * ["mgon"]
-    published = np.repeat([0.7071, 101.97, 10.264], 3)
-    # The published numbers are rounded, and of an ideal sensor.
-    np.testing.assert_allclose(rows["sd_empirical"], published, rtol=1e-3)
-    np.testing.assert_allclose(rows["sd_closed_form"], published, rtol=2e-3)
-    assert PAPER_SENSOR["bias"]["value"] == [0.05, 0.01, 0.03]
-    np.testing.assert_allclose(rows["truth"], [50, 10, 30, *[200] * 3, 12, 12, 44], rtol=1e-12)
 
 
 def test_estimates_are_unbiased(summary):
