@@ -25,6 +25,7 @@ from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.schemes import get_scheme
 from accelstudy.sensors.conversion import Conversion
 
 TRUTH = {"b_x": 0.05, "s_z": 2e-4, "alpha_zx": 7e-4}
@@ -35,6 +36,12 @@ SETTINGS = {
     "scale": [1.0, 1.1, 1.0], "offset": 0.1, "gravity": {"value_mps2": 9.81, "sigma_mps2": 0.0},
     "frame": "flu", "range_mps2": 1000.0, "exclude": [], "join": [], "window_s": 1.0,
     "threshold_mps2": 10.0, "trim_s": 0.0, "shortest_s": 1.0,
+}  # fmt: skip
+CONTENTS = {
+    "settings.yaml": SETTINGS, "study.yaml": study_content(),
+    "model.yaml": {"models": {"mine": ["bias", "scale", "nonorthogonality"]}},
+    "scheme.yaml": {"scheme": "mine", "directions": get_scheme("fibonacci-12").directions.tolist()},
+    "box.yaml": {"title": "box", "scale": "3000 ppm", "velocity_random_walk": "1 mm/s^2/sqrt(Hz)"},
 }  # fmt: skip
 COUNTS = Conversion(np.array([0.01, -0.01, 0.02]), np.array([10.0, 20.0, 0.0]))
 
@@ -130,6 +137,9 @@ READ_BY = {
     "settings.yaml": ["import WHOLE/log.csv --out OUT --no-figure --settings FILE"],
     "log.csv": OF_LOG, "log.mat": OF_LOG, "log.parquet": OF_LOG,
     "study.yaml": ["cells FILE"],
+    "model.yaml": ["effects --scheme mclaren-24 --model FILE"],
+    "scheme.yaml": ["schemes FILE"],
+    "box.yaml": ["init OUT --sensor FILE"],
 }  # fmt: skip
 """Files, and commands that read them."""
 
@@ -144,11 +154,11 @@ def whole(tmp_path_factory):
     write_campaign(replace(robot, unit="counts", nominal=COUNTS), folder / "counts")
     document = calibration_document(fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY))
     (folder / "calibration.json").write_text(json.dumps(document), encoding="utf-8")
-    (folder / "settings.yaml").write_text(yaml.safe_dump(SETTINGS))
     LOG.to_csv(folder / "log.csv", index=False)
     LOG.to_parquet(folder / "log.parquet")
     savemat(folder / "log.mat", {"log": LOG.to_numpy()}, do_compression=True)
-    (folder / "study.yaml").write_text(yaml.safe_dump(study_content()))
+    for name, content in CONTENTS.items():
+        (folder / name).write_text(yaml.safe_dump(content))
     for name, commands in READ_BY.items():
         assert not any(read(folder, name, command) for command in commands)
     return folder
@@ -179,7 +189,11 @@ def read(whole, name, command, damage=None):
         for word, stands_for in (("FILE", path), ("FOLDER", path.parent), ("WHOLE", whole),
                                  ("OUT", here / "out")):  # fmt: skip
             command = command.replace(word, str(stands_for))
-        return one_line_at_most(here, command.split())
+        status = one_line_at_most(here, command.split())
+        if path.parent != here and not status:  # what was taken for a campaign is one
+            write_campaign(read_campaign(path.parent), here / "again")
+            read_campaign(here / "again")
+        return status
 
 
 WHICH = st.integers(0, 59)
@@ -189,7 +203,6 @@ WHICH = st.integers(0, 59)
 @pytest.mark.parametrize("name", READ_BY)
 @settings(max_examples=20)
 @given(damage=bytes_damaged() | words_replaced(), which=WHICH)
-@example(damage=lambda content: b"[" * 100000, which=0)
 def test_any_damage_of_a_file_is_one_line(whole, name, damage, which):
     read(whole, name, READ_BY[name][which % len(READ_BY[name])], damage)
 

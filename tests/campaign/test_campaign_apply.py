@@ -110,7 +110,7 @@ def test_sigmas_hold_where_the_sensor_loses_gain(plain):
 
 
 REFUSED = [
-    *((text, "not a calibration.json of accelstudy") for text in ("", "\x00", "[]", "{}")),
+    *((text, "not a calibration.json") for text in ("", "\x00", "[]", "{}", "[" * 100_000)),
     ({"parameters": 3}, "parameters: must be a list"),
     ({"redundancy": 0}, "redundancy: must be 1 or more"),
     ({"redundancy": 10**400}, "redundancy: must be from 0 to 1000000000, not a huge number"),
@@ -125,7 +125,7 @@ REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("change", "part"), REFUSED)
+@pytest.mark.parametrize(("change", "part"), REFUSED, ids=[row[1] for row in REFUSED])
 def test_what_is_no_calibration_is_one_line(plain, tmp_path, change, part):
     path = tmp_path / "calibration.json"
     content = {**plain.content, "sigma_source": "a posteriori"}
