@@ -8,17 +8,13 @@ from pathlib import Path
 
 import pytest
 from calling import refusal, refused
-from places import DATA, needs_data
 
 from accelstudy.campaign.importing import public
-from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import (
     PublicData,
     fetch,
-    import_settings,
     next_attempt,
     public_data,
-    public_file,
     read_record,
     record_public,
 )
@@ -79,22 +75,6 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert (settings.scale is not None) == (settings.unit == "counts")
         timed = settings.rate_hz is not None or settings.time is not None
         assert settings.means or settings.block is not None or timed
-
-
-# As far as an independent detector of holds, and the authors, tell their number.
-N_POSITIONS = {
-    **{"xsens-mti": 38, "mpu9150-0": 23, "mpu9150-1": 23, "mpu9150-2": 23, "mpu6050": 10},
-    **{"innalabs-24": 24, "innalabs-31": 31, "innalabs-49": 49, "ferraris-annotated": 6},
-    **{"mpu6050-static": 1, "ck-explorer": 160},
-}
-
-
-@needs_data
-@pytest.mark.parametrize("name", [name for name in public_data() if public_data()[name].settings])
-def test_the_registry_imports_the_files(name):
-    campaign, _ = import_log(public_file(name, DATA), import_settings(name))
-    assert campaign.name == name
-    assert campaign.n_positions == N_POSITIONS.get(name, campaign.n_positions)
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

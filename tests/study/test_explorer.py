@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import shutil
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -88,64 +89,55 @@ def test_set_ups_are_those_of_the_tables(page, tables):
         assert list(rows[key]) == list(cells[key])
     assert list(rows["model"]) == [model_title(name) for name in cells["model"]]
     assert list(rows["n"]) == list(cells["n_positions"])
+    leveling = tables["leveling"].set_index("cell").reindex(cells["cell"])
     same(rows["sensor-noise"], cells["sensor_sigma_mps2"] * 1e3)
     same(rows["robot-noise"], cells["robot_sigma_mgon"].where(cells["approach"] == "robot"))
-    leveling = tables["leveling"].set_index("cell").reindex(cells["cell"])
-    tilt = tables["quantiles"].query("quantity == 'tilt'").set_index(["cell", "name"])
     same(rows["both_q95"], leveling["both_rms_q95_mgon"])
-    for angle in ("roll", "pitch"):
-        same(rows[f"{angle}_rms"], leveling[f"{angle}_rms_mgon"])
-        same(rows[f"{angle}_q95"], leveling[f"{angle}_rms_q95_mgon"])
-        for end, probability in (("low", 0.025), ("high", 0.975)):
+    tilt = tables["quantiles"].query("quantity == 'tilt'").set_index(["cell", "name"])
+    for angle, (end, probability) in product(
+        ("roll", "pitch"), (("low", 0.025), ("high", 0.975), ("q95", None), ("rms", None))
+    ):
+        if probability is None:
+            expected = leveling[f"{angle}_rms{'_q95' * (end == 'q95')}_mgon"]
+        else:
             quantile = tilt[np.isclose(tilt["probability"].astype(float), probability)]["value"]
-            quantile = quantile.xs(angle, level="name").reindex(cells["cell"])
-            same(rows[f"{angle}_{end}"], quantile)
-
-
-def test_parameters_are_those_of_the_summary(page, tables):
-    rows, summary = table_of(page, "parameters"), tables["summary"]
-    assert list(tables["cells"]["cell"].iloc[rows["i"]]) == list(summary["cell"])
-    assert list(rows["parameter"]) == list(summary["parameter"])
-    assert list(rows["unit"].str.replace("²", "^2")) == list(summary["unit"])
-    for quantity, column in {
-        "truth": "truth",
-        "bias_high": "bias_ci95_high",
-        "empirical": "sd_empirical",
-        "posteriori": "sd_posteriori_mean",
-        "linear": "sd_linear",
-        "ratio": "sd_ratio",
-        "ratio_low": "sd_ratio_ci95_low",
-    }.items():
-        same(rows[quantity], summary[column])
-    same(rows["coverage_low"], summary["coverage_95_low"])
-    some = rows[rows["posteriori"].notna()]
-    assert len(some)
-    assert some["posteriori"].between(some["posteriori_low"], some["posteriori_high"]).all()
-
-
-def test_correlations_are_those_of_the_tables(page, tables):
-    rows, table = table_of(page, "correlations"), tables["correlations"]
-    assert list(tables["cells"]["cell"].iloc[rows["i"]]) == list(table["cell"])
-    for _, cell in table.assign(shown=rows["correlation"].astype(float)).groupby("cell"):
-        u = int(np.sqrt(len(cell)))
-        shown, adjustment, empirical = (
-            cell[name].to_numpy().reshape(u, u) for name in ("shown", "adjustment", "empirical")
-        )
-        assert np.isnan(np.diag(shown)).all()
-        for triangle, expected in (
-            (np.tril_indices(u, -1), adjustment),
-            (np.triu_indices(u, 1), empirical),
-        ):
-            assert np.abs(shown[triangle] - expected[triangle]).max() <= 0.00051
-
-
-def test_failures_are_there(page, tables):
-    rows = table_of(page, "setups")
+            expected = quantile.xs(angle, level="name").reindex(cells["cell"])
+        same(rows[f"{angle}_{end}"], expected)
     blind = rows[rows["state"].str.startswith("not estimable: ")]
     assert len(blind) == BLIND
-    reasons = set(tables["cells"].query("not estimable")["reason"])
-    assert set(blind["state"].str.removeprefix("not estimable: ")) == reasons
+    assert set(blind["state"].str.removeprefix("not estimable: ")) == set(
+        cells.query("not estimable")["reason"]
+    )
     assert blind["roll_rms"].isna().all()
+
+
+SUMMARY = {
+    "truth": "truth", "bias_high": "bias_ci95_high", "empirical": "sd_empirical",
+    "posteriori": "sd_posteriori_mean", "linear": "sd_linear", "ratio": "sd_ratio",
+    "ratio_low": "sd_ratio_ci95_low", "coverage_low": "coverage_95_low",
+}  # fmt: skip
+
+
+def test_parameters_and_correlations_are_those_of_the_tables(page, tables):
+    for name, table in (("parameters", "summary"), ("correlations", "correlations")):
+        rows = table_of(page, name)
+        assert list(tables["cells"]["cell"].iloc[rows["i"]]) == list(tables[table]["cell"])
+    rows, summary = table_of(page, "parameters"), tables["summary"]
+    assert list(rows["parameter"]) == list(summary["parameter"])
+    assert list(rows["unit"].str.replace("²", "^2")) == list(summary["unit"])
+    for quantity, column in SUMMARY.items():
+        same(rows[quantity], summary[column])
+    some = rows[rows["posteriori"].notna()]
+    assert some["posteriori"].between(some["posteriori_low"], some["posteriori_high"]).all()
+    shown = table_of(page, "correlations")["correlation"].astype(float)
+    for _, cell in tables["correlations"].assign(shown=shown).groupby("cell"):
+        u = int(np.sqrt(len(cell)))
+        matrix, adjustment, empirical = (
+            cell[name].to_numpy().reshape(u, u) for name in ("shown", "adjustment", "empirical")
+        )
+        expected = np.tril(adjustment, -1) + np.triu(empirical, 1)
+        np.fill_diagonal(expected, np.nan)
+        np.testing.assert_allclose(matrix, expected, rtol=0, atol=0.00051)
 
 
 def test_some_failed_and_an_infinite_condition(study, tables):
