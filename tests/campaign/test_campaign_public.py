@@ -7,8 +7,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from calling import refusal, refused
+from calling import refusal, refused, succeed
+from places import DATA, needs_data
 
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import (
     PublicData,
@@ -75,6 +77,20 @@ def test_the_registry_says_how_a_file_is_read(name):
         assert (settings.scale is not None) == (settings.unit == "counts")
         timed = settings.rate_hz is not None or settings.time is not None
         assert settings.means or settings.block is not None or timed
+
+
+def test_command_lists():
+    result = succeed("public")
+    for name, entry in public_data().items():
+        assert f"{name}: {entry.description}\n    {entry.licence}, {entry.url}\n" in result.output
+
+
+@needs_data
+def test_command(tmp_path):
+    result = succeed("public", "mpu6050", "--out", tmp_path / "out", "--folder", DATA)
+    assert "holds: 10" in result.output
+    assert read_campaign(tmp_path / "out").sensor == "MPU-6050"
+    assert (tmp_path / "out" / "segmentation.png").exists()
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
