@@ -120,7 +120,7 @@ def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, 
 
 
 def read_table(path: str | Path | Sequence[str | Path], **options: Any) -> pd.DataFrame:
-    """Read a table from a file, a folder of files, or several files.
+    """Read a table from a file, a folder of files, or several files; options as of `read_frame`.
 
     Raises
     ------

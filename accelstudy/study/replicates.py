@@ -160,7 +160,7 @@ def read_replicates(paths: Sequence[str | Path], cell: Cell) -> Replicates | Non
         If a file is missing or damaged.
     """
     names = ESTIMATES.names[5:]
-    rows = read_table(paths, columns=names, filters=[("cell", "==", cell.name)])
+    rows = read_table(paths, columns=names, rows=("cell", [cell.name]))
     if rows.empty:
         return None
     u = cell.n_unknowns

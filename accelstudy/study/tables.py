@@ -252,8 +252,7 @@ def read_estimates(
         configuration may have left them.
     """
     names = [cells] if isinstance(cells, str) else cells
-    filters = None if names is None else [("cell", "in", list(names))]
-    table = read_table(path, filters=filters)
+    table = read_table(path, rows=None if names is None else ("cell", names))
     if (twice := table.duplicated(["cell", "replicate", "parameter"])).any():
         cell = table.loc[twice, "cell"].iloc[0]
         raise InputError(

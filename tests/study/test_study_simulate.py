@@ -171,12 +171,13 @@ def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
 def test_reading_files_and_folders(tmp_path):
     paths = [tmp_path / f"{name}.parquet" for name in "ab"]
     for i, path in enumerate(paths):
-        write_table(path, pd.DataFrame({"x": [i, i + 10]}), PROVENANCE)
+        write_table(path, pd.DataFrame({"x": [i, i + 10], "is": ["low", "high"]}), PROVENANCE)
     (tmp_path / ".accelstudy-1.part").mkdir()
     (tmp_path / ".accelstudy-1.part" / "c.parquet").write_bytes(b"half")
     assert read_table(paths[1])["x"].tolist() == [1, 11]
     assert read_table(paths)["x"].tolist() == read_table(tmp_path)["x"].tolist() == [0, 10, 1, 11]
-    assert read_table(paths, filters=[("x", ">", 5)])["x"].tolist() == [10, 11]
+    assert read_table(paths, columns=["x"], rows=("is", ["high"]))["x"].tolist() == [10, 11]
+    assert read_table(paths, rows=("is", ["none"])).empty
 
 
 def test_parts_are_joined_in_the_order_of_the_cells(tmp_path):

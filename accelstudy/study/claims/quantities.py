@@ -110,9 +110,13 @@ def sd_ratio_of_noise(evidence: Evidence, times: float, at_pitch: float) -> Numb
 
 def effect_of_force(evidence: Evidence, force: str, at_roll: float) -> Numbers:
     """Total effect, %, of one force on roll, among the forces alone."""
-    study, settings = evidence.study, evidence.settings
-    samples = settings.base_samples, settings.resamples, study.seed
-    table = leveling_sensitivity([at_roll], [0], study.sigma_force, *samples, g=study.gravity_mps2)
+    study, settings, table = evidence.study, evidence.settings, evidence.tables["sensitivity"]
+    at = (table["roll_gon"] == at_roll) & (table["pitch_gon"] == 0)
+    table = table[at & (table["analysis"] == "forces")]
+    if table.empty:  # not on the grid of the study
+        samples = settings.base_samples, settings.resamples, study.seed
+        noise, g = study.sigma_force, study.gravity_mps2
+        table = leveling_sensitivity([at_roll], [0], noise, *samples, g=g)
     return _largest(table[(table["output"] == "roll") & (table["input"] == force)])
 
 
