@@ -20,7 +20,6 @@ from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.csgraph import connected_components
 
 Array = NDArray[np.float64]
 
@@ -57,6 +56,8 @@ def linear_shapley(slope: ArrayLike, covariance: ArrayLike) -> tuple[Array, Arra
 
 def _groups(covariance: Array) -> list[NDArray[np.int64]]:
     """Indices of the groups of correlated inputs; inputs without variance are in none."""
+    from scipy.sparse.csgraph import connected_components  # slow to import; figures do without it
+
     varied = np.flatnonzero(np.diagonal(covariance) > 0)
     n, label = connected_components(covariance[np.ix_(varied, varied)] != 0, directed=False)
     return [varied[label == i] for i in range(n)]

@@ -57,7 +57,7 @@ def controlled_quantiles(
     """
     p, count = levels, len(own)
     wide = np.minimum(p, 1 - p) / 2
-    plain, low, high = _sample_quantiles(np.sort(own), [p, p - wide, p + wide])
+    plain, low, high = _sample_quantiles(own, [p, p - wide, p + wide])
     slope = (high - low) / (2 * wide)
     # Too few values have no density: their error is unknown.
     variance = p * (1 - p) / count * (slope**2 if count >= LEAST else np.nan)
@@ -65,7 +65,7 @@ def controlled_quantiles(
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
     paired = theory if converged is None else theory[converged]
     failed = len(theory) - count
-    linear, low, high = _sample_quantiles(np.sort(theory), [p, p - wide, p + wide])
+    linear, low, high = _sample_quantiles(theory, [p, p - wide, p + wide])
     sd = _sd_near((own - paired)[:SOME], paired[:SOME], p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
         # Share of the replicates that only one of the two has below its quantile.
@@ -97,11 +97,13 @@ def share_below(value: float, own: Array, quantiles: Estimates) -> float:
 
 
 def _sample_quantiles(values: Array, probabilities: ArrayLike) -> Array:
-    """Quantiles of sorted values."""
+    """Quantiles of values, of which only those at some ranks are sorted."""
     last = len(values) - 1
     rank = np.asarray(probabilities, dtype=float) * last
     below = rank.astype(int)
-    low, high = values[below], values[np.minimum(below + 1, last)]
+    above = np.minimum(below + 1, last)
+    ordered = np.partition(values, np.union1d(below, above))
+    low, high = ordered[below], ordered[above]
     return np.asarray(low + (rank - below) * (high - low))
 
 

@@ -26,7 +26,6 @@ from accelstudy.study.estimate import (
     Statistic,
     controlled,
 )
-from accelstudy.study.known import KnownValues
 from accelstudy.study.quantiles import controlled_quantiles, usual_levels
 from accelstudy.study.replicates import Replicates, simulate
 
@@ -122,6 +121,9 @@ def statistics(
     leveling : mapping with max_tilt_gon and attitudes
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
+    # Imports scipy.special slowly; who only reads tables does without it.
+    from accelstudy.study.known import KnownValues
+
     good, count = replicates.simulated.converged, int(replicates.simulated.converged.sum())
     if not count:
         return CellStatistics(cell, replicates)
@@ -160,19 +162,21 @@ def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dic
     good = block.converged
     freedom = block.redundancy if block.redundancy > 0 else np.nan
     factor = block.omega[good, None] / freedom
-    error = block.estimates[good] - cell.true_values
-    priori = block.sigma_priori[good]
-    posteriori = np.sqrt(factor) * priori
+    estimates, priori = block.estimates[good], block.sigma_priori[good]
+    together = np.empty((len(estimates), 2 * cell.n_unknowns))
+    posteriori, error = np.hsplit(together, 2)  # parts of it, as a million of each takes long
+    np.multiply(np.sqrt(factor), priori, out=posteriori)
+    np.subtract(estimates, cell.true_values, out=error)
     numbers = {
         "error": error,
         "sigma_priori": priori,
         "sigma_posteriori": posteriori,
-        "sigma_and_error": np.hstack([posteriori, error]),
+        "sigma_and_error": together,
         "inside": (np.abs(error) <= sigmas_95(block.redundancy) * posteriori).astype(float),
         "variance_factor": factor,
     }
     if tilt is not None:
-        squares = tilt.squares(block.estimates[good][:, : len(tilt.reference)])
+        squares = tilt.squares(estimates[:, : len(tilt.reference)])
         each = np.sqrt(squares)
         numbers["tilt_squared"] = squares
         numbers["tilt"] = np.column_stack([each, each.max(axis=1)])

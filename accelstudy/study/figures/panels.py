@@ -99,7 +99,8 @@ def panels(
             near = {(i + down, j + right) for down, right in BESIDE[name]}
             if words[i, j] not in {words[at] for at in near.intersection(np.ndindex(axes.shape))}:
                 ax.set(**{name: words[i, j]})
-    fig.align_ylabels(axes)
+    # Each of those aligned asks all others for their extent; panels without a label have none.
+    fig.align_ylabels([ax for ax in axes.flat if ax.get_ylabel()])
     if colours and image:
         fig.colorbar(image, ax=axes, label=colours, pad=0.02, aspect=30)
     for ax in fig.axes:
