@@ -102,7 +102,7 @@ def _sample_quantiles(values: Array, probabilities: ArrayLike) -> Array:
     rank = np.asarray(probabilities, dtype=float) * last
     below = rank.astype(int)
     above = np.minimum(below + 1, last)
-    ordered = np.partition(values, np.union1d(below, above))
+    ordered = np.partition(values, np.append(below, above))
     low, high = ordered[below], ordered[above]
     return np.asarray(low + (rank - below) * (high - low))
 
