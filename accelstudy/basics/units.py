@@ -51,6 +51,7 @@ UNITS: dict[str, dict[str, float]] = {
         "deg": math.pi / 180.0,
         "arcsec": math.pi / 648000.0,
     },
+    "rad/K": {"mgon/K": MGON, "mdeg/K": 1e-3 * math.pi / 180.0, "rad/K": 1.0},
     "1": {"ppm": 1e-6, "%": 1e-2, "1": 1.0},
     "m": {"mm": 1e-3, "cm": 1e-2, "m": 1.0},
     "s": {
@@ -165,7 +166,8 @@ def to_recorded(value: ArrayLike, unit: str) -> NDArray[np.float64]:
 
 def display_unit(unit: str) -> str:
     """Unit in which people see a quantity of the SI `unit`: that of files, but angles as chosen."""
-    return ANGLE_UNITS[attitude_unit()] if unit == "rad" else recorded_unit(unit)
+    angle, of, other = unit.partition("/")
+    return ANGLE_UNITS[attitude_unit()] + of + other if angle == "rad" else recorded_unit(unit)
 
 
 def unit_label(unit: str) -> str:

@@ -112,6 +112,7 @@ WORDS = {
     "bias": ("bias of {}", "the bias of {}"),
     "scale": ("scale of {}", "the scale of {}"),
     "square": ("quadratic scale of {}", "the quadratic scale of {}"),
+    "nonorthogonality": ("non-orthogonality {}", "the non-orthogonality {}"),
     "reading": ("reading of {}", "the robot's reading of {}"),
     "tilt": ("tilt {}", "the tilt of the robot's base ({})"),
 }

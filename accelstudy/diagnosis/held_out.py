@@ -14,23 +14,14 @@ from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.decision.learned import fit_of_place, most_probable_place
 from accelstudy.diagnosis.decision.posterior import (
-    Explanation,
     Posterior,
     Weighing,
-    weigh_beside,
-    weigh_pairs,
 )
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import (
-    Singles,
-    all_pairs,
-    classes_of,
-    equivalents,
-    weigh_singles,
-)
+from accelstudy.diagnosis.evidence.hypotheses import Singles
 from accelstudy.diagnosis.held_out_threshold import threshold
 from accelstudy.diagnosis.prediction import (
     HeldOutGap,
@@ -121,10 +112,9 @@ def predicted_gap(
     except (InputError, np.linalg.LinAlgError):
         return replace(gap, reason="the fitted positions do not determine the model")
     part = pose(replace(problem.base, solution=base))
-    singles = weigh_singles(part.examined, part.field, part.evidence)
-    place = finding.place
-    chosen, others = _chosen_alike(part, singles, finding)
-    refit = _refitted(part, singles, chosen, place)
+    of_part, place = Weighing(part), finding.place
+    chosen, others = _chosen_alike(of_part, finding)
+    refit = _refitted(part, of_part.singles, chosen, place)
     if isinstance(refit, str):
         return replace(gap, reason=refit)
     rest, rng = first.observed.take(held), np.random.default_rng(seeds[1])
@@ -148,24 +138,17 @@ def predicted_gap(
     return replace(gap, names=names) if sure else gap
 
 
-def _chosen_alike(
-    part: Problem, singles: Singles, finding: Finding
-) -> tuple[Sequence[Choice], bool]:
+def _chosen_alike(part: Weighing, finding: Finding) -> tuple[Sequence[Choice], bool]:
     """Effects of the credible set that a part chooses, and whether it would choose something else.
 
     Of a learned function they are what is certain beside it.
     """
     chosen, credible = finding.chosen, finding.alternatives
     if finding.place is not None:
-        return chosen[1:], _place_of(part, singles) != finding.place
+        return chosen[1:], _place_of(part) != finding.place
     if len(chosen) > 1:
-        members = equivalents(part.examined, singles)
-        classes, together = classes_of(singles, members), []
-        if len(classes) > 1:
-            together = all_pairs(singles.shapes, part.residuals, part.evidence)
-        pairs = weigh_pairs(together, singles, members, classes)
-        pairs = [one for one in pairs if len(one.best) == len(chosen)]
-        best = max(pairs, key=lambda one: one.log_weight, default=None)
+        sets = [one for one in part.sets if len(one.best) == len(chosen)]
+        best = max(sets, key=lambda one: one.log_weight, default=None)
         same = [one for one in credible if best and _same(one.classes, best.names)]
         if best is None or not same:
             return chosen, True
@@ -178,10 +161,11 @@ def _chosen_alike(
         for members in one.classes
         for name in members
     }
-    name = max(singles.densities, key=singles.densities.__getitem__, default="")
+    densities = part.singles.densities
+    name = max(densities, key=densities.__getitem__, default="")
     if name not in wanted:
         return chosen, True
-    return [Choice(singles.best[name], wanted[name], chosen[0].probability)], False
+    return [Choice(part.singles.best[name], wanted[name], chosen[0].probability)], False
 
 
 def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
@@ -210,16 +194,12 @@ def _refitted(
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
-def _place_of(part: Problem, singles: Singles) -> Place | None:
-    """Place that a part chooses for something unknown, alone or beside an effect."""
-    unknown, z = part.field.unknown, part.residuals.z
-    if unknown is None:
+def _place_of(part: Weighing) -> Place | None:
+    """Place that a part chooses for something unknown, alone or beside effects."""
+    alone = [one for one in part.alone if one.names == (UNKNOWN,)]
+    if not alone:
         return None
-    density = float(unknown.log_density(part.evidence, unknown.parts(z), z @ z))
-    alone = Explanation((UNKNOWN,), ((UNKNOWN,),), density + float(np.log(RULES.prior_unknown)))
-    classes = classes_of(singles, equivalents(part.examined, singles))
-    posterior = Posterior.of([alone, *weigh_beside(part, singles, classes)])
-    found = most_probable_place(part, posterior)
+    found = most_probable_place(part.problem, Posterior.of([*alone, *part.with_unknown]))
     return None if found is None else found.place
 
 

@@ -99,6 +99,6 @@ def confirm(
         if gap.held_out is None or not gap.held_out.refutes:
             break
         # Without a learned function, what is certain is left.
-        finding = finding.unlearned or without_the_refuted(finding, problem.frame, gap.held_out)
+        finding = finding.unlearned or without_the_refuted(case, finding, gap.held_out)
         gap = measured_gap(finding, first)
     return finding, gap

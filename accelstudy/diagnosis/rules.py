@@ -147,17 +147,23 @@ class Rules:
     """An effect whose log evidence is this far below the strongest needs no further shapes."""
     undecided: float = 2.0
     """Log evidence by which a shape may fall short of the best and still be the true one."""
+    set_members: int = 3
+    """Effects that are missing together, at most."""
+    sets_started: int = 6
+    """Candidates to which every other one is added."""
+    sets_extended: int = 40
+    """Sets to which every candidate is added, at most."""
+    sets_within: float = 7.0
+    """Log evidence by which a set may be weaker than the strongest one and still be extended."""
+    set_positions: int = 100
+    """Outlying positions that are tried in sets, at most."""
+    bounds_within: float = 8.0
+    """Log evidence by which a set may be weaker than the strongest one and still get the bounds of
+    each effect beside the others."""
     unknown_beside: int = 3
-    """Effects beside which something unknown is looked for."""
-    refitted_pairs: int = 5
-    """Pairs that are refitted where the best explanation leaves a misfit."""
-    pair_shapes: int = 5
-    """Shapes of a pair of which bounds are evaluated."""
-    pair_within: float = 6.0
-    """Log evidence by which a pair may be weaker than the strongest one and still get its
-    bounds."""
-    paired_positions: int = 100
-    """Bumped positions that are tried in pairs, at most."""
+    """Effects, and pairs of effects, beside which something unknown is looked for."""
+    refitted_sets: int = 5
+    """Sets that are refitted where the best explanation leaves a misfit."""
 
     def level(self, sigma_known: bool) -> float:
         """Level of the test for anything that is missing."""

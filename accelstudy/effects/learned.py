@@ -44,6 +44,7 @@ TARGETS = {
     "bias": (AXES, "m/s^2"),
     "scale": (AXES, "1"),
     "square": (AXES, "s^2/m"),
+    "nonorthogonality": (("yz", "zy", "zx"), "rad"),
     "reading": (ROBOT, "rad"),
     "tilt": (("a", "b"), "rad"),
 }
@@ -90,8 +91,8 @@ class Learned(Effect):
     def equation(self) -> str:
         """What it adds, for people."""
         of = "h_i(c), c the " + self.coordinate
-        times = {"scale": " f_i", "square": " f_i²"}.get(self.target, "")
-        return of.replace(",", times + ",", 1)
+        times = {"scale": " f_i", "square": " f_i²", "nonorthogonality": " f_j"}
+        return of.replace(",", times.get(self.target, "") + ",", 1)
 
     @property
     def deviations(self) -> Array:
@@ -156,7 +157,7 @@ class Learned(Effect):
         return [p[i : i + size] for i in range(0, len(p), size)]
 
     def output(self, f, p, g, hold, xp):
-        """Return h, h f or h f², or what a tilt of h does."""
+        """Return h, h f or h f², or what a tilt or non-orthogonality of h does."""
         if self.target == "reading":
             return super().output(f, p, g, hold, xp)
         parts, arguments = self._parts(p), self.arguments(f, (), hold)
@@ -167,6 +168,9 @@ class Learned(Effect):
             h = [xp.sign(step) * h_i for h_i in h]
         if self.target == "tilt":
             return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
+        if self.target == "nonorthogonality":
+            rows = get_effect("nonorthogonality").axes(tuple(h), xp)
+            return tuple(sum(a * f_j for a, f_j in zip(row, f, strict=True)) for row in rows)
         power = {"bias": 0, "scale": 1, "square": 2}[self.target]
         return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
 

@@ -13,12 +13,13 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.posterior import weigh
+from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
-from accelstudy.diagnosis.evidence.detection import Chance, detect
+from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect
@@ -173,14 +174,14 @@ def sensor_evidence(
     base = fit_base(campaign, model, approach or usual_approach(campaign))
     problem = pose(base if noise is None else replace(base, level=noise.level))
     chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
-    detection = detect(problem.field, problem.evidence, problem.residuals, chance)
-    weighing = weigh(problem, detection, chance)
+    case = Case(campaign, problem, chance)
+    detection, weighing = case.detection, case.weighing
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
     z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals
     odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
-    odds |= {one.names[0]: one.log_weight - nothing for one in weighing.noises}
+    odds |= {one.names[0]: one.log_weight - nothing for one in case.noises}
     if noise is not None and noise.said:
         doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
         any_level = Evidence(doubted, problem.evidence.redundancy)
@@ -191,11 +192,11 @@ def sensor_evidence(
             for place, log in unknown.by_place(problem.evidence, z).items()
         }
     pairs, pair_specs = {}, {}
-    for together in weighing.together:
-        effects = sorted((h.effect for h in together.best if h.effect), key=lambda e: e.name)
-        if len(effects) == len(together.best) == 2:
+    for pair in weigh_sets(weighing.singles.shapes, problem.residuals, problem.evidence, most=2):
+        effects = sorted((h.effect for h in pair.best if h.effect), key=lambda e: e.name)
+        if len(effects) == 2:
             one, other = effects
-            pairs[one.name, other.name] = together.log_density - nothing
+            pairs[one.name, other.name] = pair.log_density - nothing
             pair_specs[one.name, other.name] = one.spec, other.spec
     of_unit_weight = max(problem.evidence.variance(float(z @ z)), SMALLEST)
     variance = of_unit_weight if noise is None else 1.0

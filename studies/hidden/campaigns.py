@@ -114,6 +114,7 @@ def outcome(d: Diagnosis) -> Row:
             {"names": one.names, "classes": one.classes, "posterior": _rounded(one.posterior)}
             for one in d.credible_set
         ],
+        "certain": [[name.name for name in part.names] for part in d.certain if part.is_effect],
         "place": d.place,
         "fits": [fit_squares(one) for one in fits],
         "confirmed": bool(d.gap.confirmed),

@@ -51,7 +51,7 @@ KINDS: Mapping[str, tuple[Sequence[str], Callable[[str, str], Collection[str]]]]
     "invisible": (tuple(EFFECTS), invisible_effects),
 }
 """Kinds that each set may have, and those that make sense in a design by an approach."""
-SETS = ("nothing", *KINDS, "two")
+SETS = ("nothing", *KINDS, "two", "three")
 """Blocks of campaigns."""
 
 
@@ -98,11 +98,11 @@ class Sized(Block):
     campaigns: Replicates = Field(description="of each kind and size")
 
 
-class Pairs(Block):
-    """Campaigns with two effects each."""
+class Several(Block):
+    """Campaigns with two or three effects each."""
 
-    sizes: Sizes = Field(description="noncentralities λ, of either effect")
-    campaigns: Replicates = Field(description="of each size, each with two effects at random")
+    sizes: Sizes = Field(description="noncentralities λ, of each effect")
+    campaigns: Replicates = Field(description="of each size, each with effects at random")
 
 
 class Study(Block):
@@ -135,7 +135,8 @@ class HiddenConfig(Study):
     nothing: Nothing | None = Field(None, description="nothing is missing")
     noise: Kinds | None = Field(None, description="only the noise is not as it is said to be")
     one: Sized | None = Field(None, description="one effect of the catalogue")
-    two: Pairs | None = Field(None, description="two effects of the catalogue")
+    two: Several | None = Field(None, description="two effects of the catalogue")
+    three: Several | None = Field(None, description="three that are easily distinguished")
     removed: Sized | None = Field(
         None, description="one effect whose family the diagnosis does not know"
     )
@@ -232,6 +233,8 @@ def _hidden(name: str, kind: str, design: str, approach: str) -> list[dict[str, 
     """What is hidden in campaigns of a block and kind, if a session can show it."""
     if name == "two":
         return [{"effect": pair} for pair in distinct_pairs(design, approach)]
+    if name == "three":
+        return [{"effect": triple} for triple in distinct_triples(design, approach)]
     if kind and kind not in KINDS[name][1](design, approach):
         return []
     return [{name: kind} if name in ("noise", "gross") else {"effect": (kind,) if kind else ()}]
@@ -253,6 +256,23 @@ def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
     for shape in seen.shapes:
         alike[shape.effect.name].update(seen.same_as(shape))
     return tuple(pair for pair in combinations(seen.visible, 2) if pair[1] not in alike[pair[0]])
+
+
+TRIPLES, SIMILAR = 60, 0.8
+"""Sets of three effects of a session, and the canonical cosine of two that are not similar."""
+
+
+@cache
+def distinct_triples(design: str, approach: str) -> tuple[tuple[str, str, str], ...]:
+    """Sets of three effects, all over those that a session can show and easily distinguish."""
+    seen = atlas(design, approach)
+    cosines = seen.cosines()
+    triples = [
+        names
+        for names in combinations(seen.visible, 3)
+        if all(cosines[pair] < SIMILAR for pair in combinations(names, 2))
+    ]
+    return tuple(triples[:: len(triples) // TRIPLES + 1])
 
 
 @cache

@@ -11,10 +11,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.certain import without_the_refuted
-from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
+from accelstudy.diagnosis.decision.posterior import Case, Explanation, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding, because
+from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
 from accelstudy.diagnosis.report.words import headline
@@ -107,7 +108,8 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
         "named", problem.frame, chosen=(Choice(best, (best.name,), 1.0),),
         posterior=Posterior.of([weighed]),
     )  # fmt: skip
-    said = without_the_refuted(finding, problem.frame, gap)
+    case = Case(campaign, problem, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
+    said = without_the_refuted(case, finding, gap)
     assert said.verdict == "unknown"
     assert said.reason == because(
         "refuted", names=["quadratic_scale"], before=gap.before, after=gap.after

@@ -11,7 +11,7 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out, held_out_threshold
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.detection import Chance, detect
-from accelstudy.diagnosis.evidence.hypotheses import Singles, classes_of, equivalents, weigh_singles
+from accelstudy.diagnosis.evidence.hypotheses import classes_of, equivalents, weigh_singles
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
@@ -128,6 +128,6 @@ def test_an_imitator_leaves_nothing_of_what_it_imitates():
 
 def test_a_part_that_can_show_no_pair_chooses_none():
     """Positions that are too few for two effects at once would not have chosen these two."""
-    part, none = SimpleNamespace(examined=None), Singles({}, {}, {}, {})
+    part = SimpleNamespace(sets=[])
     finding = SimpleNamespace(chosen=("one", "other"), alternatives=(), place=None)
-    assert held_out._chosen_alike(part, none, finding) == (("one", "other"), True)
+    assert held_out._chosen_alike(part, finding) == (("one", "other"), True)

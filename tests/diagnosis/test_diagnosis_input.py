@@ -108,9 +108,10 @@ def test_what_needs_a_missing_column_is_untestable_with_the_reason(robot, tmp_pa
     gone = ["temperature_degC", "vibration_mps2", "time_s"]
     found = document(tmp_path, command(tmp_path, robot, table=lambda t: t.drop(columns=gone)))
     reasons = found["untestable_reasons"]
+    thermal = ("bias", "curve", "scale", "nonorthogonality")
     needs = {
         "time": {"bias_drift", "bias_jump", "warm_up"},
-        "temperature": {"thermal_bias", "thermal_curve", "thermal_scale"},
+        "temperature": {f"thermal_{what}" for what in thermal},
         "vibration": {"vibration_rectification"},
     }
     assert set(found["untestable_effects"]) == set(reasons) == set().union(*needs.values())
@@ -124,6 +125,7 @@ def test_what_does_not_change_shows_nothing(robot, tmp_path):
     hidden = {
         *("thermal_bias", "thermal_scale", "vibration_rectification", "gravity_error"),
         *("bias_drift", "bias_jump", "warm_up", "thermal_curve", "mounting_slip"),
+        "thermal_nonorthogonality",
     }
     found = document(tmp_path, run)
     assert set(found["invisible_effects"]) == hidden

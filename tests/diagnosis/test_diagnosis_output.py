@@ -57,7 +57,7 @@ CASES = {
               "order": "random"},
     "gravity": {"effects": ("quadratic_scale: 0.003, 0.004, -0.003",), "approach": "gravity"},
     "no_effect": {},
-    "unknown": {"effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03",
+    "unknown": {"effects": (THERMAL, "hysteresis: 0.03, 0.02, 0.03", "settling: 0.01",
                             "cubic_scale: 0.006, 0.005, 0.006"),
                 "temperature": (20.0, 40.0),
                 "temperature_order": "random"},
@@ -68,7 +68,7 @@ CASES = {
 HEADLINES = {
     "named": "The model lacks thermal bias.",
     "gravity": "The model lacks", "no_effect": "Nothing that these data can show",
-    "unknown": "it has no name here", "learned": "the bias of x depends on the yaw",
+    "unknown": "and something smaller: ", "learned": "the bias of x depends on the yaw",
     "noise_model": "its noise is not",
     "gross_error": "The data have a gross error",
 }  # fmt: skip
@@ -157,32 +157,32 @@ def told(diagnosis, folder):
 def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     examined = examine(named.frame.solution)
     shapes = examined.candidates
-    thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_scale"))
+    thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_curve"))
     weighed = [
         Explanation((name,), ((name,),), np.log(p), best)
         for name, p, best in (
             ("thermal_bias", 0.55, (thermal,)),
-            ("thermal_scale", 0.4, (drift,)),
+            ("thermal_curve", 0.4, (drift,)),
             ("unknown", 0.05, ()),
         )
     ]
     posterior = Posterior.of(weighed)
     finding = Finding(
         "narrowed", named.final, None, named.finding.chosen, posterior,
-        statement(posterior.credible_set),
+        statement(posterior.credible_set, named.case.cosine),
     )  # fmt: skip
     diagnosis = replace(otherwise(named, finding), gap=replace(named.gap, names=()))
     content, text = told(diagnosis, tmp_path)
     (part,) = content["certain"]
-    assert part["names"] == ["thermal_bias", "thermal_scale"]
+    assert part["names"] == ["thermal_bias", "thermal_curve"]
     assert part["posterior"] == pytest.approx(0.95)
     assert 0 < part["purity"] < 1
     for words in (
-        "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal scale.",
-        "This campaign cannot tell thermal bias (0.55) and thermal scale (0.4) apart; further",
+        "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal curve.",
+        "This campaign cannot tell thermal bias (0.55) and thermal curve (0.4) apart; further",
         "that such an effect is missing; not that it is thermal bias rather than a rival",
         "a wrong name costs 7, a right name that is withheld 3",
-        "whether thermal bias or thermal scale is missing",
+        "whether thermal bias or thermal curve is missing",
         "temperature / °C",
         "takes thermal bias, and its sigmas do not know of the others",
         "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
@@ -203,7 +203,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     posterior = Posterior.of(weighed)
     finding = Finding(
         "unknown", named.final, because("not in the catalogue"), named.finding.chosen, posterior,
-        statement(posterior.all),
+        statement(posterior.all, named.case.cosine),
     )  # fmt: skip
     diagnosis = otherwise(named, finding, next_positions=())
     content, text = told(diagnosis, tmp_path)

@@ -94,11 +94,8 @@ def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     ]
     monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
     test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")
-    problem, weighing = (
-        SimpleNamespace(frame="fit"),
-        SimpleNamespace(posterior=Posterior.of(weighed)),
-    )
-    return judge_noise(SimpleNamespace(problem=problem, weighing=weighing), test)
+    problem, posterior = SimpleNamespace(frame="fit"), Posterior.of(weighed)
+    return judge_noise(SimpleNamespace(problem=problem, posterior=posterior), test)
 
 
 @pytest.mark.parametrize(("case", "said", "code"), [

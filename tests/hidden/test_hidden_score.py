@@ -84,6 +84,8 @@ CASES = [
     (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "quadratic_scale", "bias_drift")),
     (truth("two", [DRIFT, SQUARE], 40, "right"), answer("named", "bias_drift")),
     (truth("two", [DRIFT, WARM], 40, "wrong"), answer("named", "warm_up", "settling")),
+    (truth("three", [DRIFT, SQUARE, MOUNTED], 60, "nothing"),
+     answer("named", "quadratic_scale", "mounting_rotation", "bias_drift")),
     (truth("noise", what="level"), answer("noise_model", "noise_level")),
     (truth("removed", size=400.0, what="warm_up"), answer("unknown")),
     (truth("removed", size=60.0, what="warm_up"), answer("named", "bias_drift")),

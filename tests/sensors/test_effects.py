@@ -37,7 +37,7 @@ NUMBERS = {
     **{"settling": 1, "vibration_rectification": 3, "saturation": 3, "gravity_error": 1},
     **{"base_tilt": 2, "encoder_offset": 2, "encoder_scale": 2, "encoder_eccentricity": 4},
     **{"axis_nonperpendicularity": 1, "joint_compliance": 2, "mounting_slip": 3},
-    **{"thermal_curve": 3},
+    **{"thermal_curve": 3, "thermal_nonorthogonality": 3},
 }
 RIG = {
     *("gravity_error", "base_tilt", "encoder_offset", "encoder_scale", "encoder_eccentricity"),
@@ -154,6 +154,10 @@ OUTPUT = {
     "cross_coupling": lambda f, f_prev, p, h: per_other_axis(f, p),
     "thermal_bias": lambda f, f_prev, p, h: np.outer(h.temperature - 20, p),
     "thermal_scale": lambda f, f_prev, p, h: np.outer(h.temperature - 20, p) * f,
+    "thermal_nonorthogonality": lambda f, f_prev, p, h: (
+        np.stack([-p[0] * f[:, 1] + p[1] * f[:, 2], -p[2] * f[:, 2], 0 * f[:, 0]], 1)
+        * (h.temperature - 20)[:, None]
+    ),
     "warm_up": lambda f, f_prev, p, h: np.outer(np.exp(-h.time / 600), p),
     "bias_drift": lambda f, f_prev, p, h: np.outer(h.time, p),
     "bias_jump": lambda f, f_prev, p, h: np.outer(h.time > 600, p),

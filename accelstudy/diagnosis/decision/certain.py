@@ -32,13 +32,14 @@ def with_what_is_certain(case: Case, finding: Finding) -> Finding:
     posterior = finding.posterior
     assert posterior is not None
     if finding.verdict != "unknown":
-        return replace(finding, says=statement(finding.credible_set))
+        return replace(finding, says=statement(finding.credible_set, case.cosine))
     problem, weighing = case.problem, case.weighing
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
     if finding.code == "misfit" or beyond > 1 - RULES.credible:
-        posterior = posterior.doubting(_perhaps_imitations(problem, weighing, posterior))
-    finding = replace(finding, posterior=posterior, says=statement(posterior.all))
-    chosen = [choice for _, choice in _certain_effects(weighing, posterior)]
+        posterior = posterior.doubting(_perhaps_imitations(case, posterior))
+    says = statement(posterior.all, case.cosine)
+    finding = replace(finding, posterior=posterior, says=says)
+    chosen = [choice for _, choice in _certain_effects(weighing, posterior, says)]
     if not chosen:
         return finding
     fit = _fit_of(problem, weighing, chosen)
@@ -48,10 +49,12 @@ def with_what_is_certain(case: Case, finding: Finding) -> Finding:
     return replace(finding, frame=Frame.of(fit[1]), chosen=added)
 
 
-def _certain_effects(weighing: Weighing, posterior: Posterior) -> list[tuple[Part, Choice]]:
-    """Effects and families of effects that are certain, each with its most probable member."""
+def _certain_effects(
+    weighing: Weighing, posterior: Posterior, says: Statement
+) -> list[tuple[Part, Choice]]:
+    """Components that are certain and effects, each with its most probable name."""
     chosen = []
-    for part in statement(posterior.all).certain:
+    for part in says.certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
             best = next(shapes, weighing.singles.best[name.name])
@@ -59,13 +62,14 @@ def _certain_effects(weighing: Weighing, posterior: Posterior) -> list[tuple[Par
     return chosen
 
 
-def _perhaps_imitations(problem: Problem, weighing: Weighing, posterior: Posterior) -> set[str]:
+def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     """Names of what seems certain, and yet does not explain nearly all that is left without it.
 
     More is missing than the catalogue explains. An effect of it may imitate what is in none, though
     hardly ever nearly all of that.
     """
-    seeming = _certain_effects(weighing, posterior)
+    problem, weighing = case.problem, case.weighing
+    seeming = _certain_effects(weighing, posterior, statement(posterior.all, case.cosine))
     chosen, names = [choice for _, choice in seeming], set[str]()
     after = _disagreement(problem, _fit_of(problem, weighing, chosen))
     for i, (part, _) in enumerate(seeming):
@@ -94,13 +98,13 @@ def _disagreement(problem: Problem, fit: tuple[list[Hypothesis], Solution] | Non
     return max(solution.omega - noise, 1e-9)
 
 
-def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Finding:
+def without_the_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
     """What is said where the held-out positions refute what was chosen: nothing of it is certain.
 
     Parameters
     ----------
+    case : Case
     finding : Finding
-    frame : Frame, of the base fit
     held : HeldOutGap
     """
     reason = finding.reason
@@ -110,5 +114,5 @@ def without_the_refuted(finding: Finding, frame: Frame, held: HeldOutGap) -> Fin
     assert finding.posterior is not None
     doubted = [name for choice in finding.chosen for name in choice.members]
     posterior = finding.posterior.doubting(doubted)
-    says = Statement((), statement(posterior.all).open)
-    return Finding("unknown", frame, reason, posterior=posterior, says=says)
+    says = Statement((), statement(posterior.all, case.cosine).open)
+    return Finding("unknown", case.problem.frame, reason, posterior=posterior, says=says)

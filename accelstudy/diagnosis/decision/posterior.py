@@ -1,8 +1,9 @@
 """One posterior over everything that could be the case once something is missing.
 
 Fewer explanations are told than were weighed (`Posterior.told`). All kinds of wrong noise count as
-one, named by the most probable of them. Where one effect is more probable than two, a pair counts
-for the more probable of its two effects. "This effect is missing" then leaves open whether a second
+one, named by the most probable of them. Where one effect is more probable than several, a set
+counts for the most probable of its effects, and likewise a set of three for the most probable of
+its pairs where two are more probable. "This effect is missing" then leaves open whether a second
 one, too small to be seen, is missing as well.
 """
 
@@ -11,10 +12,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from scipy import special
 
+from accelstudy.adjustment.quality import column_basis
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
@@ -22,8 +25,6 @@ from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.hypotheses import (
     Class,
     Singles,
-    Together,
-    all_pairs,
     classes_of,
     equivalents,
     unknown_beside,
@@ -39,14 +40,17 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     most_evidence,
     tail_test,
 )
+from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.hypotheses import Hypothesis, cosines
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
 
 SLOW = (("time", "bias"), ("time", "scale"))
 """Places of what follows something that was not recorded, and that slow noise may be, too."""
+NEGLIGIBLE = 20.0
+"""Log weight by which an explanation may fall short of another one and still be worth its time."""
 
 
 @dataclass(frozen=True)
@@ -123,21 +127,29 @@ class Posterior:
     def told(self) -> tuple[Explanation, ...]:
         """Those that are told, most probable first."""
         noise = next((i for i, one in enumerate(self.all) if one.of_noise), None)
-        single = {
-            one.classes[0]: i for i, one in enumerate(self.all) if len(one.names) == 1 and one.best
-        }
-        more = sum(one.posterior for one in self.all if len(one.names) > 1)
-        alone = sum(self.all[i].posterior for i in single.values()) > more
+        size, parts = self._size, dict[tuple[tuple[str, ...], ...], int]()
+        for i, one in enumerate(self.all):
+            if one.best and len(one.names) == size:
+                parts[tuple(sorted(one.classes))] = i
         counted = {i: float(one.log_weight) for i, one in enumerate(self.all)}
         for i, one in enumerate(self.all):
             into = None
             if one.of_noise:
                 into = noise
-            elif len(one.names) > 1 and alone:
-                into = min((single[c] for c in one.classes if c in single), default=None)
+            elif len(one.names) > size:
+                within = (tuple(sorted(some)) for some in combinations(one.classes, size))
+                into = min((parts[some] for some in within if some in parts), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
         return ranked(replace(self.all[i], log_weight=log) for i, log in counted.items())
+
+    @property
+    def _size(self) -> int:
+        """Number of effects: the least that is more probable than all larger ones together."""
+        several = [one for one in self.all if one.best or len(one.names) > 1]
+        sizes, posteriors = [len(one.names) for one in several], [one.posterior for one in several]
+        each = np.bincount(sizes, weights=posteriors, minlength=2)
+        return int(np.argmax(each > np.cumsum(each[::-1])[::-1] - each))
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -171,30 +183,101 @@ class Posterior:
 
 @dataclass(frozen=True)
 class Weighing:
-    """Everything that could be the case, given that something is wrong.
+    """Everything that a problem may have missing, weighed once it is needed.
 
     Attributes
     ----------
-    singles : Singles, the evidence for each candidate by itself
-    members : dict of candidate to the names that mean the same
-    classes : list of Class, candidates that mean the same together, strongest evidence first
-    together : list of Together, the evidence for all pairs of candidates
-    alone : list of Explanation, one effect, one bumped position, or something unknown
-    pairs : list of Explanation, two of them, or one of them beside something unknown
-    noises : list of Explanation, only the noise is wrong, in one of its kinds
-    slow : float, probability that the noise lasts for some holds, by the evidence alone
-    posterior : Posterior, of all of these
+    problem : Problem
     """
 
-    singles: Singles
-    members: Mapping[str, tuple[str, ...]]
-    classes: list[Class]
-    together: list[Together]
-    alone: list[Explanation]
-    pairs: list[Explanation]
-    noises: list[Explanation]
-    slow: float
-    posterior: Posterior
+    problem: Problem
+
+    @cached_property
+    def singles(self) -> Singles:
+        """Evidence for each candidate by itself."""
+        problem = self.problem
+        return weigh_singles(problem.examined, problem.field, problem.evidence)
+
+    @cached_property
+    def members(self) -> Mapping[str, tuple[str, ...]]:
+        """Names that mean the same as each candidate."""
+        return equivalents(self.problem.examined, self.singles)
+
+    @cached_property
+    def classes(self) -> list[Class]:
+        """Candidates with those that mean the same, strongest evidence first."""
+        return classes_of(self.singles, self.members)
+
+    @cached_property
+    def alone(self) -> list[Explanation]:
+        """One effect, one outlying position, or something unknown."""
+        each, unknown = -np.log(max(len(self.classes), 1)), self.problem.field.unknown
+        alone = [
+            Explanation((best.name,), (names,), self.singles.densities[best.name] + each, (best,))
+            for best, names in self.classes
+        ]
+        if unknown is not None:
+            z = self.problem.residuals.z
+            density = unknown.log_density(self.problem.evidence, unknown.parts(z), z @ z)
+            log = float(density + np.log(RULES.prior_unknown))
+            alone.append(Explanation((UNKNOWN,), ((UNKNOWN,),), log))
+        return alone
+
+    @cached_property
+    def sets(self) -> list[Explanation]:
+        """Two or three effects or outlying positions."""
+        k, weighed, problem = len(self.classes), [], self.problem
+        if k < 2:
+            return []
+        sets = weigh_sets(self.singles.shapes, problem.residuals, problem.evidence)
+        logs = [one.log_density + set_prior(len(one.best), k) for one in sets]
+        least = max(logs, default=0.0) - NEGLIGIBLE
+        called = {name: best.name for best, names in self.classes for name in names}
+        strength = self.singles.densities
+        for one, log in zip(sets, logs, strict=True):
+            if log < least:
+                continue
+            best = tuple(sorted(one.best, key=lambda h: -strength[h.name]))
+            classes = tuple(self.members[h.name] for h in best)
+            effects = [c for c, h in zip(classes, best, strict=True) if h.effect is not None]
+            if len(set(effects)) == len(effects):
+                names = tuple(called.get(h.name, h.name) for h in best)
+                weighed.append(Explanation(names, classes, log, best))
+        return weighed
+
+    @cached_property
+    def with_unknown(self) -> list[Explanation]:
+        """Something unknown beside the strongest effects, and beside the strongest pairs."""
+        if len(self.classes) < 2:
+            return []
+        singles = [one for one in self.alone if one.best]
+        least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
+        pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
+        pairs.sort(key=lambda one: -one.log_weight)
+        return with_unknown(
+            self.problem, [*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]]
+        )
+
+
+def with_unknown(problem: Problem, explanations: Iterable[Explanation]) -> list[Explanation]:
+    """Weigh explanations with something unknown beside them.
+
+    Parameters
+    ----------
+    problem : Problem
+    explanations : of effects or outlying positions
+    """
+    unknown, weighed = problem.field.unknown, list[Explanation]()
+    if unknown is None:
+        return weighed
+    prior = float(np.log(RULES.prior_two * RULES.prior_unknown))
+    for one in explanations:
+        basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
+        log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
+        if log is not None:
+            names, classes = (*one.names, UNKNOWN), (*one.classes, (UNKNOWN,))
+            weighed.append(Explanation(names, classes, one.log_weight + log + prior))
+    return weighed
 
 
 @dataclass(frozen=True)
@@ -220,83 +303,34 @@ class Case:
 
     @cached_property
     def weighing(self) -> Weighing:
-        """Everything that could be the case, weighed."""
-        return weigh(self.problem, self.detection, self.chance)
+        """Everything that may be missing."""
+        return Weighing(self.problem)
 
+    def cosine(self, name: str, other: str) -> float:
+        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
+        one, two = (self.weighing.singles.best.get(each) for each in (name, other))
+        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
 
-def weigh(problem: Problem, detection: Detection, chance: Chance) -> Weighing:
-    """Weigh everything that could be the case.
+    @property
+    def noises(self) -> list[Explanation]:
+        """Only the noise is wrong, in one of its kinds."""
+        return self._noises[0]
 
-    Parameters
-    ----------
-    problem : Problem
-    detection : Detection, of the same
-    chance : Chance, residuals without any effect
-    """
-    singles = weigh_singles(problem.examined, problem.field, problem.evidence)
-    members = equivalents(problem.examined, singles)
-    classes = classes_of(singles, members)
-    each = -np.log(max(len(classes), 1))
-    alone = [
-        Explanation((best.name,), (names,), singles.densities[best.name] + each, (best,))
-        for best, names in classes
-    ]
-    unknown = detection.densities.get(UNKNOWN)
-    if unknown is not None:
-        alone.append(Explanation((UNKNOWN,), ((UNKNOWN,),), unknown + np.log(RULES.prior_unknown)))
-    together = all_pairs(singles.shapes, problem.residuals, problem.evidence)
-    pairs = weigh_pairs(together, singles, members, classes)
-    pairs += weigh_beside(problem, singles, classes)
-    noises, slow = _noises(problem, detection, chance)
-    posterior = Posterior.of([*alone, *pairs, *noises])
-    return Weighing(singles, members, classes, together, alone, pairs, noises, slow, posterior)
+    @property
+    def slow(self) -> float:
+        """Probability that the noise lasts for some holds, by the evidence alone."""
+        return self._noises[1]
 
+    @cached_property
+    def posterior(self) -> Posterior:
+        """Of everything that may be missing or wrong."""
+        weighing = self.weighing
+        weighed = [*weighing.alone, *weighing.sets, *weighing.with_unknown, *self.noises]
+        return Posterior.of(weighed)
 
-def weigh_pairs(
-    together: Iterable[Together],
-    singles: Singles,
-    members: Mapping[str, tuple[str, ...]],
-    classes: Sequence[Class],
-) -> list[Explanation]:
-    """Weigh candidates together.
-
-    Parameters
-    ----------
-    together, singles, members, classes : as in `Weighing`
-    """
-    k = len(classes)
-    if k < 2:
-        return []
-    each = np.log(RULES.prior_two) - np.log(k * (k + 1) / 2)
-    called = {name: best.name for best, names in classes for name in names}
-    weighed = []
-    for one in together:
-        best = tuple(sorted(one.best, key=lambda h: -singles.densities[h.name]))
-        alike = tuple(members[h.name] for h in best)
-        if alike[0] != alike[1] or best[0].effect is None:
-            names = tuple(called.get(h.name, h.name) for h in best)
-            weighed.append(Explanation(names, alike, one.log_density + each, best))
-    return weighed
-
-
-def weigh_beside(problem: Problem, singles: Singles, classes: Sequence[Class]) -> list[Explanation]:
-    """Weigh each of the strongest candidates beside something unknown.
-
-    Parameters
-    ----------
-    problem : Problem
-    singles, classes : as in `Weighing`
-    """
-    k, unknown, weighed = len(classes), problem.field.unknown, []
-    if unknown is None or k < 2:
-        return []
-    for first, same in classes[: RULES.unknown_beside]:
-        beside = unknown_beside(first, unknown, problem.residuals, problem.evidence)
-        if beside is not None:
-            total = singles.densities[first.name] + beside - np.log(k)
-            prior = np.log(RULES.prior_two * RULES.prior_unknown)
-            weighed.append(Explanation((first.name, UNKNOWN), (same, (UNKNOWN,)), total + prior))
-    return weighed
+    @cached_property
+    def _noises(self) -> tuple[list[Explanation], float]:
+        return _noises(self.problem, self.detection, self.chance)
 
 
 def _noises(

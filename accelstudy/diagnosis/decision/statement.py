@@ -1,28 +1,30 @@
-"""What a credible set says as a whole: what is certain, and what is open.
+"""What explanations say as a whole: what is certain, and what is open.
 
 Explanations of near rivals share the posterior, so that each has little of it. Together they may
 leave no doubt that a slow change in time is missing, say, and with it an even nonlinearity, while
-none of the four pairs that could be meant has 0.4. What rivals have in common is their family in
-the catalogue, such as drifts and jumps of the bias.
+none of the four pairs that could be meant has 0.4. So the statement is made of components: each
+effect of the most probable explanation, with whatever stands in its place in the others. A
+component is certain if the explanations that have it hold 0.9, and its names are alike; its names
+are a credible set of their own, as those of Wang et al. (2020, J. R. Stat. Soc. B 82, 1273).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, permutations
+from typing import TypeAlias
 
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.hypotheses import cosines
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 
 Names = tuple[str, ...]
+Cosine: TypeAlias = Callable[[str, str], float]
 
 DIGITS = 9
 """Decimals to which sums of the same probabilities agree."""
@@ -69,18 +71,20 @@ class Part:
     Attributes
     ----------
     family : str, what its names have in common in plain words; "" if they have nothing
-    names : tuple of Name, most probable first
-    posterior : float, that it is one of these
+    names : tuple of Name, most probable first: its credible set
+    posterior : float, that it is missing, whatever its name is
+    purity : float, smallest canonical cosine of two of its names; None if it has one name
     """
 
     family: str
     names: tuple[Name, ...]
     posterior: float
+    purity: float | None
 
     @property
     def is_effect(self) -> bool:
-        """Whether it is an effect or a gross error: no noise, and nothing unknown."""
-        return self.family != "noise" and self.names[0].name != UNKNOWN
+        """Whether it is an effect or a gross error, and nothing unknown."""
+        return self.names[0].name != UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -99,97 +103,99 @@ class Statement:
 
 
 def statement(
-    explanations: Sequence[Explanation], probability: float = RULES.credible
+    explanations: Sequence[Explanation], cosine: Cosine, probability: float = RULES.credible
 ) -> Statement:
     """Say what explanations leave no doubt of, and what they leave open.
 
-    A name is certain if the explanations that have it hold enough together. A family is certain if
-    those that have one of its effects do. Of a credible set, which does not hold all explanations,
-    these probabilities are lower bounds.
+    Of a credible set, which does not hold all explanations, the probabilities are lower bounds.
 
     Parameters
     ----------
     explanations : Explanations that exclude each other
+    cosine : function of two names, the canonical cosine of their signatures
     probability : float, that is enough to be certain
     """
-    left, certain = list(explanations), []
-    while (part := _certain(left, probability)) is not None:
-        certain.append(part)
-        left = [_without(one, [name.name for name in part.names]) for one in left]
-    return Statement(tuple(certain), beside(explanations, certain))
+    effects = [one for one in explanations if not one.of_noise]
+    if not effects:
+        return Statement((), tuple(explanations))
+    top = max(effects, key=lambda one: one.posterior)
+    matches = [_match(top, one, cosine) for one in explanations]
+    parts = dict[int, Part]()
+    for k in range(len(top.names)):
+        having = [
+            (one, match[k]) for one, match in zip(explanations, matches, strict=True) if k in match
+        ]
+        part = _component(having, cosine, probability)
+        if part is not None:
+            parts[k] = part
+    certain = sorted(parts.values(), key=lambda part: -round(part.posterior, DIGITS))
+    taken = [{match[k] for k in parts if k in match} for match in matches]
+    return Statement(tuple(certain), _open(explanations, taken) if parts else tuple(explanations))
 
 
-def beside(explanations: Sequence[Explanation], parts: Iterable[Part]) -> tuple[Explanation, ...]:
-    """What explanations have beside some parts, most probable first; empty if they have nothing."""
-    left = list(explanations)
-    for part in parts:
-        left = [_without(one, [name.name for name in part.names]) for one in left]
-    rest: dict[Names, Explanation] = {}
-    for one in left:
-        same = rest.get(one.names)
-        p = one.posterior + (0.0 if same is None else same.posterior)
-        rest[one.names] = replace(one, posterior=p)
-    return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
+def _match(top: Explanation, one: Explanation, cosine: Cosine) -> dict[int, int]:
+    """Places of what stands in an explanation for the effects of another one, by their places."""
+    if one.of_noise:
+        return {}
+    alike = [
+        [
+            1.0 if own == other else cosine(name, rival)
+            for rival, other in zip(one.names, one.classes, strict=True)
+        ]
+        for name, own in zip(top.names, top.classes, strict=True)
+    ]
+    count = len(one.names)
+    # Places beyond those of the explanation stand for nothing.
+    orders = permutations(range(max(count, len(top.names))), len(top.names))
+
+    def sum_of(order: Sequence[int]) -> float:
+        return sum(alike[k][i] for k, i in enumerate(order) if i < count)
+
+    best = max(orders, key=sum_of)
+    return {k: i for k, i in enumerate(best) if i < count and alike[k][i] >= RULES.rival}
 
 
-def _certain(explanations: Sequence[Explanation], probability: float) -> Part | None:
-    """The most specific thing that is certain: a name or, if none is, a family."""
-    members: dict[str, Names] = {}
+def _component(
+    having: Sequence[tuple[Explanation, int]], cosine: Cosine, probability: float
+) -> Part | None:
+    """What explanations have in common, each at a place; None if that is not certain."""
     names: dict[str, float] = defaultdict(float)
-    families: dict[str, float] = defaultdict(float)
-    for one in explanations:
-        members.update(zip(one.names, one.classes, strict=True))
-        for name in dict.fromkeys(one.names):
-            names[name] += one.posterior
-        for common in dict.fromkeys(family_of(*alike) for alike in one.classes):
-            families[common] += one.posterior
-    families.pop("", None)
-    if (surest := _surest(names, probability)) is not None:
-        chosen, p = [surest], names[surest]
-    elif (kind := _surest(families, probability)) is not None:
-        chosen = [name for name, alike in members.items() if family_of(*alike) == kind]
-        chosen, p = sorted(chosen, key=lambda name: -names[name]), families[kind]
-    else:
+    members: dict[str, Names] = {}
+    for one, place in having:
+        names[one.names[place]] += one.posterior
+        members[one.names[place]] = one.classes[place]
+    total = sum(names.values())
+    if round(total, DIGITS) < round(probability, DIGITS):
+        return None
+    held: list[str] = []
+    for name in sorted(names, key=lambda name: -round(names[name], DIGITS)):
+        held.append(name)
+        if sum(names[one] for one in held) >= probability:
+            break
+    purity = min((cosine(*pair) for pair in combinations(held, 2)), default=None)
+    if purity is not None and purity < RULES.rival:
         return None
     return Part(
-        family=family_of(*members[chosen[0]]),
-        names=tuple(Name(name, members[name], names[name]) for name in chosen),
-        posterior=p,
+        family=family_of(*(each for name in held for each in members[name])),
+        names=tuple(Name(name, members[name], names[name]) for name in held),
+        posterior=total,
+        purity=purity,
     )
 
 
-def _surest(posteriors: Mapping[str, float], probability: float) -> str | None:
-    """Most probable key, if it is certain; of equal ones the first."""
-    if not posteriors:
-        return None
-    most = max(posteriors, key=lambda key: round(posteriors[key], DIGITS))
-    return most if round(posteriors[most], DIGITS) >= round(probability, DIGITS) else None
-
-
-def _without(explanation: Explanation, names: Sequence[str]) -> Explanation:
-    """Take the first of some names out of an explanation."""
-    first = next((name for name in names if name in explanation.names), None)
-    kept = [i for i, name in enumerate(explanation.names) if name != first]
-    return replace(
-        explanation,
-        names=tuple(explanation.names[i] for i in kept),
-        classes=tuple(explanation.classes[i] for i in kept),
-    )
-
-
-def purity(part: Part, examined: ExaminedFit) -> float | None:
-    """Smallest canonical cosine of two of the names of a part; None if it has one name.
-
-    It tells whether they are rivals, or what happened to be left over. Of two effects it is that of
-    the shapes that are most alike, and 0 of what is no effect.
-    """
-
-    def cosine(one: str, other: str) -> float:
-        shapes = [examined.candidates.get(name, ()) for name in (one, other)]
-        return max((float(cosines(a.ideal, b.ideal)[0]) for a, b in product(*shapes)), default=0.0)
-
-    pairs = combinations([name.name for name in part.names], 2)
-    return min((cosine(*pair) for pair in pairs), default=None)
+def _open(
+    explanations: Sequence[Explanation], taken: Sequence[Collection[int]]
+) -> tuple[Explanation, ...]:
+    """What explanations have beside some of their places, most probable first; empty if nothing."""
+    rest: dict[Names, Explanation] = {}
+    for one, places in zip(explanations, taken, strict=True):
+        certain = {one.names[i] for i in places}
+        left = [i for i, name in enumerate(one.names) if name not in certain]
+        names = tuple(one.names[i] for i in left)
+        p = one.posterior + (rest[names].posterior if names in rest else 0.0)
+        classes = tuple(one.classes[i] for i in left)
+        rest[names] = replace(one, names=names, classes=classes, posterior=p)
+    return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
 
 
 def effects_and_others(

@@ -125,14 +125,14 @@ class Finding:
 
 def find(case: Case) -> Finding:
     """Say what is missing, given that something is."""
-    posterior = case.weighing.posterior
+    posterior = case.posterior
     single = next((one for one in posterior.all if len(one.best) == 1), None)
     if single is not None and _is_large(case.problem, single):
-        posterior = _judged_by_refits(case.problem, case.weighing, single, 1)
+        posterior = _judged_by_refits(case, single, 1)
     finding = _judged(case, posterior)
     if finding.code == "misfit" and single is not None:
         # To first order the best explanation was enough; the others were not asked by their refits.
-        posterior = _judged_by_refits(case.problem, case.weighing, single, RULES.refitted_pairs)
+        posterior = _judged_by_refits(case, single, RULES.refitted_sets)
         finding = _judged(case, posterior)
     return finding
 
@@ -208,7 +208,7 @@ def weak(case: Case, finding: Finding) -> Finding | None:
 
 def judge_noise(case: Case, worst: NoiseTest) -> Finding:
     """Judge a failed test of the noise, when no effect was significant."""
-    problem, posterior = case.problem, case.weighing.posterior
+    problem, posterior = case.problem, case.posterior
     verdict, name, noise = "noise_model", worst.name, posterior.of_noise
     reason = because("noise", name=name, remark=worst.remark)
     if lack_of_fit(problem) < REFUTED and name != STEPS:
@@ -242,7 +242,7 @@ def unrecorded(case: Case, finding: Finding) -> Reason | None:
     posterior, absent = finding.posterior, case.problem.absent
     if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
         return None
-    slow, probability = case.weighing.slow, coloured(case, finding)
+    slow, probability = case.slow, coloured(case, finding)
     if finding.verdict == "noise_model":
         enough = probability >= posterior.of_noise / 2
     else:
@@ -276,29 +276,26 @@ def _is_large(problem: Problem, top: Explanation) -> bool:
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
 
 
-def _judged_by_refits(
-    problem: Problem, weighing: Weighing, single: Explanation, count: int
-) -> Posterior:
-    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of pairs.
+def _judged_by_refits(case: Case, single: Explanation, count: int) -> Posterior:
+    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of sets.
 
     To first order a large effect leaves so much that anything would seem to be beside it.
 
     Parameters
     ----------
-    problem : Problem
-    weighing : Weighing
+    case : Case
     single : Explanation, the effect
-    count : int, pairs of candidates that are refitted, the most probable to first order
+    count : int, sets of candidates that are refitted, the most probable to first order
     """
-    pairs = [one for one in weighing.pairs if one.best]
-    tried = [single, *sorted(pairs, key=lambda one: -one.log_weight)[:count]]
+    problem, weighing = case.problem, case.weighing
+    tried = [single, *sorted(weighing.sets, key=lambda one: -one.log_weight)[:count]]
     refitted = [_refitted(problem, weighing, one) for one in tried]
     weighed = [one for one, _ in refitted]
     alone, solution = refitted[0]
     if solution is not None:
         weighed += _beside(problem, len(weighing.classes), alone, solution)
     others = [one for one in weighing.alone if one.names != single.names]
-    return Posterior.of([*weighed, *others, *weighing.noises])
+    return Posterior.of([*weighed, *others, *case.noises])
 
 
 def _refitted(

@@ -23,7 +23,7 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.statement import Part, purity
+from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.forms import TARGETS
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.report.words import reason, warnings
@@ -138,7 +138,7 @@ def _certain(part: Part, d: Diagnosis) -> dict[str, Any]:
         "family": part.family,
         "names": names,
         "posterior": part.posterior,
-        "purity": purity(part, d.problem.examined),
+        "purity": part.purity,
         "spec": None if added is None else added.spec,
         "parameters": () if added is None else added.parameters,
     }

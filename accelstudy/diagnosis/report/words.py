@@ -13,6 +13,7 @@ from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.wording import comma_list, grouped, probability, words
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
+    Cosine,
     Name,
     Part,
     Statement,
@@ -45,11 +46,13 @@ COORDINATES = {
 TARGETS = {
     "bias": "a bias",
     "scale": "a scale",
+    "nonorthogonality": "a non-orthogonality",
     "reading": "an error of the robot's readings",
     "tilt": "a tilt of the base",
 }
 """What may be such a function."""
 FAMILIES = {
+    "": "an effect",
     "alignment of the axes": "a misalignment of the axes",
     "attitude of the rig": "an error in the attitude of the rig",
     "gross error": "a bumped position",
@@ -233,7 +236,7 @@ def name_words(name: str) -> str:
 
 def family_words(family: str) -> str:
     """Return a family as what is missing: a slow change in time."""
-    article = "an" if family[0] in "aeiou" else "a"
+    article = "an" if family[:1] in "aeiou" else "a"
     return FAMILIES.get(family, f"{article} {family}")
 
 
@@ -252,11 +255,13 @@ def explain(names: Sequence[str]) -> str:
     return f"{together(names)} explain{'s' if len(names) == 1 else ''}"
 
 
-def missing(credible_set: Sequence[Explanation]) -> str:
+def missing(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
     effects, others = effects_and_others(credible_set)
     unless = _or([one for one in others if one.posterior >= WORTH])
-    return _missing(_if_it_is_an_effect(effects)) + f", unless it is {unless}" * bool(unless)
+    return _missing(_if_it_is_an_effect(effects, cosine)) + f", unless it is {unless}" * bool(
+        unless
+    )
 
 
 def without_a_name(set_says: Statement, beside: str = "something else") -> str:
@@ -312,10 +317,10 @@ def _kind(name: str, members: tuple[str, ...]) -> str:
     return family_words(family) if family else name_words(name)
 
 
-def not_told_apart(credible_set: Sequence[Explanation]) -> str:
+def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
     effects, others = effects_and_others(credible_set)
-    set_says = _if_it_is_an_effect(effects)
+    set_says = _if_it_is_an_effect(effects, cosine)
     alike = [
         [(_names([name]), name.posterior) for name in part.names]
         for part in set_says.certain
@@ -341,7 +346,8 @@ def _missing(set_says: Statement) -> str:
         return _or(set_says.open)
     more = _or([one for one in set_says.open if one.names and one.posterior >= WORTH])
     if not more and len(set_says.certain) == 1:
-        return _part(set_says.certain[0], "{family}: {names}")
+        (part,) = set_says.certain
+        return _part(part, "{family}: {names}" if part.family else "{names}")
     parts = comma_list([_part(part) for part in set_says.certain])
     if not more:
         return parts
@@ -369,9 +375,10 @@ def _or(explanations: Sequence[Explanation]) -> str:
     return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
 
 
-def _if_it_is_an_effect(effects: Sequence[Explanation]) -> Statement:
+def _if_it_is_an_effect(effects: Sequence[Explanation], cosine: Cosine) -> Statement:
     """What is certain given that it is one of these explanations."""
-    return statement(effects, probability=RULES.credible * sum(one.posterior for one in effects))
+    probability = RULES.credible * sum(one.posterior for one in effects)
+    return statement(effects, cosine, probability)
 
 
 def _surely_more(set_says: Statement, probability: float) -> bool:

@@ -201,7 +201,7 @@ class _Coordinate:
     priors: Array
 
 
-SLOW = ("bias", "scale", "square", "reading", "tilt")
+SLOW = ("bias", "scale", "square", "nonorthogonality", "reading", "tilt")
 """Targets of anything that changes from hold to hold, whatever the attitude."""
 
 
@@ -344,6 +344,11 @@ def _change(h: Array, target: str, frame: Frame) -> Array:
         for k, (i, j) in enumerate(PAIRS):
             parts[:, i, k] = h[:, j]
         return parts.reshape(len(f), 3, -1)
+    if target == "nonorthogonality":
+        # Each function is that of one of the three angles.
+        axes = np.array([get_effect("nonorthogonality").axes(tuple(e), np) for e in np.eye(3)])
+        turned = np.einsum("aij,nj->nai", axes, f)
+        return np.einsum("nai,nk->niak", turned, h[:, 0]).reshape(len(f), 3, -1)
     if target == "scale":
         return _each(h, 3) * f[..., None]
     if target == "square":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,6 +201,15 @@ class Atlas:
     def parts(self, z: Array) -> Array:
         """Squares of what misclosures (..., m) have in each shape, (..., s)."""
         return np.asarray(np.add.reduceat((z @ self.together) ** 2, self.starts, axis=-1))
+
+    def cosines(self) -> dict[tuple[str, str], float]:
+        """Largest canonical cosine of any shapes of every two effects that can be seen."""
+        largest: dict[tuple[str, str], float] = {}
+        for one, other in combinations(self.shapes, 2):
+            pair = one.effect.name, other.effect.name
+            cosine = float(np.linalg.svd(one.basis.T @ other.basis, compute_uv=False)[0])
+            largest[pair] = max(cosine, largest.get(pair, 0.0))
+        return largest
 
     def same_as(self, shape: Shape) -> tuple[str, ...]:
         """Names of the effects with a shape that cannot be told from the given one."""

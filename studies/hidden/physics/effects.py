@@ -56,6 +56,9 @@ EFFECTS = table(
     Kind("thermal_bias", "output", "p * warmth(tau)", tau=LAG),
     Kind("thermal_curve", "output", "p * warmth() ** 2", typical=2e-4),
     Kind("thermal_scale", "output", "p * warmth() * f", typical=1e-4),
+    Kind("thermal_nonorthogonality", "output",
+         "warmth() * beside(p[..., 1:2] * f[..., 2:] - p[..., :1] * f[..., 1:2],"
+         " -p[..., 2:] * f[..., 2:], 0 * f[..., :1])", typical=1e-4),
     Kind("warm_up", "output", "p * exp(-time / tau)", typical=2e-2, tau=DECAY),
     Kind("bias_drift", "output", "p * time", typical=1e-6),
     Kind("bias_jump", "output", "p * (time > t)", typical=2e-2, t=MOMENT),

@@ -93,6 +93,8 @@ class Oracle:
         sizes : sequence of float, true noncentralities of what is missing
         """
         detected = bool(np.min(self._p_values(z)) < self.threshold)
+        if len(sizes) > 2:  # of which it would have to try too many
+            return Verdict(detected, (), (), 0)
         if len(sizes) == 2:
             told, alternatives = self._two(z, float(sum(sizes))), 0
         else:

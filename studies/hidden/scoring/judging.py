@@ -22,6 +22,7 @@ LARGE = 150.0
 LEARNABLE: Mapping[str, Sequence[str]] = {
     "bias": ("force", "previous", "next", "yaw", "vibration", "temperature", "dT/dt", "time"),
     "scale": ("vibration", "temperature", "dT/dt", "time"),
+    "nonorthogonality": ("temperature", "time"),
     "tilt": ("yaw", "vibration", "temperature", "time"),
     "reading": ("angle", "yaw", "move", "vibration", "temperature", "time"),
 }
@@ -90,6 +91,9 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
     has_oracle = bool(true and oracle)
     oracle_found = has_oracle and oracle["detected"]
     top: Row = explanations[0] if explanations else {"names": [], "posterior": np.nan}
+    certain = [{*names} for names in row.get("certain", ())]
+    stated = [any(names & {*one} for one in true) for names in certain]
+    covered = [any(names & {*one} for names in certain) for one in true]
     strange = NOWHERE.get(row["what"])
     true_noise = row["design"] in DESIGNS  # of a log it is not known
     judged = {
@@ -120,6 +124,8 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "explanation": "+".join(top["names"]),
         "top_posterior": top["posterior"],
         "top_right": any(hits[:1]),
+        "covered": np.mean(covered) if ok and true else np.nan,
+        "misstated": np.mean(np.logical_not(stated)) if stated else np.nan,
         "has_oracle": has_oracle,
         "oracle_found": oracle_found,
         "oracle_right": oracle_found and same_effects(oracle["best"], true),

@@ -1,0 +1,28 @@
+"""Thermal non-orthogonality: the angles between the sensitive axes depend on temperature."""
+
+from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
+
+
+@register
+class ThermalNonOrthogonality(Effect):
+    """Angles of the upper triangle of T (Thalmann & Neuner 2018, eq. 4) that grow with T − T0.
+
+    T0 is 20 °C. A package that warms bends; its three dies turn against each other.
+    """
+
+    name = "thermal_nonorthogonality"
+    family = "temperature"
+    parameters = (
+        Parameter("alpha_T_yz", "rad/K", r"$\alpha_{T,yz}$"),
+        Parameter("alpha_T_zy", "rad/K", r"$\alpha_{T,zy}$"),
+        Parameter("alpha_T_zx", "rad/K", r"$\alpha_{T,zx}$"),
+    )
+    equation = "(T − T0) times the upper triangle of T"
+    typical = (2e-6, 100e-6)
+
+    def output(self, f, p, g, hold, xp):
+        """Return the upper triangle of eq. (4), with angles α_T (T − T0), times f."""
+        warmer = hold.temperature - REFERENCE_TEMPERATURE
+        yz, zy, zx = (alpha * warmer for alpha in p)
+        return (zy * f[2] - yz * f[1], -zx * f[2], 0 * f[0])
