@@ -3,9 +3,9 @@
 1. Gross errors are recognised by their size, and mended (`recognise`).
 2. The base model is fitted, and all that it may lack set beside it (`fit_base`, `pose`).
 3. The evidence is judged by a table of rules (`decide`): the total evidence that anything is
-   missing is compared with noise alone (`detect`); if anything is, every hypothesis and every pair
-   is weighed (`weigh`, `find`), what is certain is added even if the whole has no name, and what
-   has none, but a plain place, is learned; if not, the tests of the noise decide.
+   missing is compared with noise alone (`detect`); if anything is, every hypothesis is weighed, and
+   sets of up to three (`Weighing`, `find`), what is certain is added even if the whole has no name,
+   and what has none, but a plain place, is learned; if not, the tests of the noise decide.
 4. Positions that were not used confirm an effect, or do not, or refute it (`confirm`).
 
 What follows from that, such as where the disagreement lives, what it is worth, and where to measure
