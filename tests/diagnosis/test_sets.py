@@ -121,6 +121,12 @@ def test_one_candidate_makes_no_set(problem):
     assert weigh_sets({}, residuals, evidence) == []
 
 
+def test_shapes_of_a_smooth_setting_weigh_by_its_logarithm(problem):
+    warm_up = problem[0]["warm_up"]
+    weights = np.gradient(np.log([one.value for one in warm_up]))
+    assert warm_up.prior == pytest.approx(weights / weights.sum())
+
+
 def test_priors_of_all_sets_of_a_size_have_a_fixed_sum():
     """C(k + j − 1, j) sets of j of k classes; each further member costs as much."""
     for k in (2, 7, 30):
