@@ -104,6 +104,7 @@ hidden-docs: $(READY) ## study hidden effects, and take score and figures into d
 	for name in naming methods sets calibration outside; do \
 	  cp results/hidden-effects/figures/$$name.png docs/figures/hidden-$$name.png; done
 	python tests/helpers/pictures.py drawn hidden
+	python tests/helpers/hidden_sample.py
 
 # Of the logs in FOLDER, or downloaded to it: make real-noise FOLDER=~/logs
 real-noise: $(READY) ## put known effects into public logs, find them again, and take the score into docs

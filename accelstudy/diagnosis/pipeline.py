@@ -1,15 +1,16 @@
 """The diagnosis of a campaign, stage after stage: each takes what those before it found.
 
 1. Gross errors are recognised by their size, and mended (`recognise`).
-2. The base model is fitted, and all that it may lack set beside it (`fit_base`, `pose`).
-3. The evidence is judged by a table of rules (`decide`): the total evidence that anything is
-   missing is compared with noise alone (`detect`); if anything is, every hypothesis is weighed, and
-   sets of up to three (`Weighing`, `find`), what is certain is added even if the whole has no name,
-   and what has none, but a plain place, is learned; if not, the tests of the noise decide.
-4. Positions that were not used confirm an effect, or do not, or refute it (`confirm`).
+2. The base model is fitted (`fit_base`). Its residuals, and every effect, function and kind of
+   noise that the model may lack, are the problem (`pose`), and with the campaign a `Case`, whose
+   properties are computed when a stage asks for them: the test for anything that is missing, the
+   evidence for each explanation and for sets of up to three effects, the posterior.
+3. The evidence is judged by rules, of which the first that matches decides (`decide`).
+4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
+   do not, or refute it (`confirm`).
 
-What follows from that, such as where the disagreement lives, what it is worth, and where to measure
-next, a `Diagnosis` finds when it is asked.
+Where the disagreement lives, what it is worth, and where to measure next, a `Diagnosis` computes
+when it is asked.
 """
 
 from __future__ import annotations
@@ -21,12 +22,18 @@ from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.certain import with_what_is_certain, without_the_refuted
-from accelstudy.diagnosis.decision.learned import learned
+from accelstudy.diagnosis.decision.certain import add_certain_effects, withdraw_refuted
+from accelstudy.diagnosis.decision.learned import learn_function
 from accelstudy.diagnosis.decision.noise import tests_of_noise, unit_variance, worst_of
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import fit_base, is_exact, pose
-from accelstudy.diagnosis.decision.verdict import Finding, because, find, judge_noise, weak
+from accelstudy.diagnosis.decision.verdict import (
+    Finding,
+    Reason,
+    dismiss_weak_evidence,
+    explain,
+    judge_noise,
+)
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.held_out import Gap, measured_gap, predicted_gap
 from accelstudy.diagnosis.result import Diagnosis
@@ -45,9 +52,9 @@ def diagnose(
     Parameters
     ----------
     campaign : Campaign
-    model : SensorModel, of the simulation that is to be checked
+    model : SensorModel, in which something may be missing
     approach : Approach; by default robot-aided if the campaign has the robot's angles
-    seed : int, of the null simulation, the split and the resampling
+    seed : int, of all that is simulated or drawn
 
     Raises
     ------
@@ -58,47 +65,73 @@ def diagnose(
     recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
         campaign = recognised.mended
-    # No stage changes what another one draws.
-    seeds = [np.random.SeedSequence(seed, spawn_key=(number,)) for number in range(5)]
+    null, split, resampling, threshold = (
+        # A stream for each, so that none changes what another one draws.
+        np.random.SeedSequence(seed, spawn_key=(key,))
+        for key in (0, 1, 2, 4)
+    )
     base = fit_base(campaign, model, approach)
-    case = Case(campaign, pose(base), Chance(seeds[0], len(base.solution.design)))
-    finding, gap = confirm(case, decide(case), [seeds[k] for k in (1, 2, 4)])
+    case = Case(campaign, pose(base), Chance(null, len(base.solution.design)))
+    finding, gap = confirm(case, decide(case), [split, resampling, threshold])
     return Diagnosis(case, finding, gap, recognised)
 
 
 def decide(case: Case) -> Finding:
-    """Judge the evidence: the first of these rules that matches."""
+    """Judge the evidence: the first of these rules that matches decides.
+
+    * Only rounding errors are left: nothing is missing.
+    * The evidence that anything is missing is significant, and one explanation, or a few, are
+      probable enough and leave no misfit: they are named.
+    * It is significant, and yet so weak that a calibration accepts its fit, and nothing is certain:
+      nothing is missing, unless a test of the noise fails.
+    * One coordinate and target have what is missing: its function is learned.
+    * Whatever else is significant is unknown; what is certain of it is added.
+    * A test of the noise fails: the noise is not as it is said to be, or an effect looks like it.
+    * Nothing is missing.
+    """
     problem = case.problem
     if is_exact(problem.base.solution):
-        return Finding("no_effect", problem.frame, because("exact"))
-    finding = Finding("no_effect", problem.frame)
+        return Finding("no_effect", problem.frame, Reason.of("exact"))
+    nothing = Finding("no_effect", problem.frame)
     if case.detection.p_value < RULES.level(problem.evidence.level.known):
-        found = find(case)
-        finding = with_what_is_certain(case, found)
-        if found.verdict == "unknown" and found.posterior is not None:
-            finding = weak(case, finding) or learned(case, found.posterior, finding) or finding
-    if finding.verdict == "no_effect":
-        worst = worst_of(tests_of_noise(case, problem.frame))
-        if worst is not None:
-            finding = with_what_is_certain(case, judge_noise(case, worst))
-    return finding
+        explained = explain(case)
+        finding = add_certain_effects(case, explained)
+        if finding.verdict != "unknown" or explained.posterior is None:
+            return finding
+        dismissed = dismiss_weak_evidence(case, finding)
+        if dismissed is None:
+            return learn_function(case, explained.posterior, finding) or finding
+        nothing = dismissed
+    worst = worst_of(tests_of_noise(case, problem.frame))
+    return nothing if worst is None else add_certain_effects(case, judge_noise(case, worst))
 
 
 def confirm(
     case: Case, finding: Finding, seeds: list[np.random.SeedSequence]
 ) -> tuple[Finding, Gap]:
-    """Ask held-out positions about what was added; what they refute is not said."""
+    """Predict held-out positions; what they refute is withdrawn, and what is left is tried again.
+
+    Parameters
+    ----------
+    case : Case
+    finding : Finding
+    seeds : of the split, the resampling and the simulated threshold
+
+    Returns
+    -------
+    finding : Finding, without what was refuted: first a learned function, then all effects
+    gap : Gap, how far the disagreement shrinks, and whether that is confirmed
+    """
     problem = case.problem
-    stated, first = problem.evidence.level.known, problem.base.solution
-    gap = measured_gap(finding, first)
+    sigma_stated, base = problem.evidence.level.known, problem.base.solution
+    gap = measured_gap(finding, base)
     while finding.chosen and finding.verdict != "gross_error":
         with stage("held-out positions"):
-            beyond = case.detection.by_chance.beyond(RULES.level(stated))
-            given = unit_variance(problem, finding.frame) if stated else None
-            gap = predicted_gap(gap, problem, case.weighing, finding, beyond, given, seeds)
+            significant = case.detection.by_chance.beyond(RULES.level(sigma_stated))
+            variance = unit_variance(problem, finding.frame) if sigma_stated else None
+            gap = predicted_gap(gap, problem, case.weighing, finding, significant, variance, seeds)
         if gap.held_out is None or not gap.held_out.refutes:
             break
-        # Without a learned function, what is certain is left.
-        finding = finding.unlearned or without_the_refuted(case, finding, gap.held_out)
-        gap = measured_gap(finding, first)
+        finding = finding.without_function or withdraw_refuted(case, finding, gap.held_out)
+        gap = measured_gap(finding, base)
     return finding, gap

@@ -34,7 +34,6 @@ from accelstudy.diagnosis.decision.verdict import (
     Choice,
     Finding,
     Reason,
-    because,
     coloured,
     unrecorded,
 )
@@ -200,7 +199,7 @@ class Diagnosis:
     def reason(self) -> Reason | None:
         """Why the verdict is what it is."""
         if self.recognised is not None:
-            return because("recognised", reason=self.recognised.reason)
+            return Reason.of("recognised", reason=self.recognised.reason)
         return unrecorded(self.case, self.finding) or self.finding.reason
 
     @cached_property

@@ -292,7 +292,7 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
     found = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
     assert found.verdict == "gross_error"
     assert [(named.name, named.position) for named in found.found] == [("outlier_position", 17)]
-    told = re.search(r"position 17 is wrong by ([\d.]+) m/s\^2", found.reason.of["reason"])
+    told = re.search(r"position 17 is wrong by ([\d.]+) m/s\^2", found.reason.facts["reason"])
     assert float(told[1]) == pytest.approx(size, rel=0.05)
     np.testing.assert_allclose(found.base.parameters, right.base.parameters, atol=0.01)
 

@@ -10,11 +10,11 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision.certain import without_the_refuted
+from accelstudy.diagnosis.decision.certain import withdraw_refuted
 from accelstudy.diagnosis.decision.posterior import Case, Explanation, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, because
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, Reason
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
@@ -109,9 +109,9 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
         posterior=Posterior.of([weighed]),
     )  # fmt: skip
     case = Case(campaign, problem, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
-    said = without_the_refuted(case, finding, gap)
+    said = withdraw_refuted(case, finding, gap)
     assert said.verdict == "unknown"
-    assert said.reason == because(
+    assert said.reason == Reason.of(
         "refuted", names=["quadratic_scale"], before=gap.before, after=gap.after
     )
     assert [one.posterior for one in said.credible_set] == pytest.approx([0.5, 0.5])

@@ -12,7 +12,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.diagnosis import prediction
-from accelstudy.diagnosis.decision.verdict import because
+from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
@@ -99,7 +99,7 @@ def test_hard_clipping_without_a_robot_has_no_solution_and_no_other_name():
     measured, _ = campaign(1, effects=("saturation(knee=9.4): 1, 1, 1",), approach="gravity")
     found = diagnose(measured, NINE)
     assert found.verdict == "unknown"
-    assert found.reason == because("no solution", names=("saturation",))
+    assert found.reason == Reason.of("no solution", names=("saturation",))
 
 
 def test_two_hidden_effects_are_named_both():

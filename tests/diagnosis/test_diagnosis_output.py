@@ -33,7 +33,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
 from accelstudy.diagnosis.decision.statement import statement
-from accelstudy.diagnosis.decision.verdict import Finding, because
+from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
@@ -202,7 +202,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     ]
     posterior = Posterior.of(weighed)
     finding = Finding(
-        "unknown", named.final, because("not in the catalogue"), named.finding.chosen, posterior,
+        "unknown", named.final, Reason.of("not in the catalogue"), named.finding.chosen, posterior,
         statement(posterior.all, named.case.cosine),
     )  # fmt: skip
     diagnosis = otherwise(named, finding, next_positions=())

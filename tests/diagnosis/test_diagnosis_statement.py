@@ -181,6 +181,7 @@ def test_the_unknown_is_said_by_families():
 
 def test_names_that_are_not_alike_are_no_component():
     """Each is like the most probable one, and not like the other."""
+
     def chain(one, other):
         return 0.3 if {one, other} == {"bias_drift", "hysteresis"} else 0.7
 

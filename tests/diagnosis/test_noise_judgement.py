@@ -114,7 +114,7 @@ def test_what_a_significant_test_means(monkeypatch, case, said, code):
     assert (found.verdict, found.code) == (said, code)
     assert found.posterior is not None
     if code != "lack of fit":
-        assert (found.reason.of["name"], found.reason.of["remark"]) == (
+        assert (found.reason.facts["name"], found.reason.facts["remark"]) == (
             case["name"],
             "what it says",
         )
@@ -122,8 +122,8 @@ def test_what_a_significant_test_means(monkeypatch, case, said, code):
 
 def test_an_effect_that_is_not_excluded_is_named(monkeypatch):
     found = judged(monkeypatch, LEVEL, of_noise=0.3)
-    assert found.reason.of["p"] == pytest.approx(0.3)
-    assert found.reason.of["other"] == "hysteresis"
+    assert found.reason.facts["p"] == pytest.approx(0.3)
+    assert found.reason.facts["other"] == "hysteresis"
 
 
 # --- sigma and repeats ---------------------------------------------------------------------------

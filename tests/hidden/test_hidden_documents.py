@@ -2,15 +2,17 @@
 
 import sys
 
+import pandas as pd
 import pytest
+from hidden_sample import SAMPLE, answers
 from places import ROOT
 
 from accelstudy.files.reading import read_layer
 from studies.hidden.baselines import METHODS
 from studies.hidden.campaigns import parse_hidden, row_of
 from studies.hidden.physics.generate import Case
-from studies.hidden.scoring.page import frames, markdown
-from studies.hidden.scoring.tables import SCORES, table
+from studies.hidden.scoring.page import frames
+from studies.hidden.scoring.tables import SCORES
 from studies.hidden.study import SETS
 
 sys.path.insert(0, str(ROOT / "docs" / "hooks"))
@@ -36,14 +38,12 @@ def test_the_score_is_that_of_the_study(study):
 
 def test_the_score_is_that_of_the_code():
     """Of a sample of its campaigns a third, as the golden set has 400 more, gets the answers."""
-    told = [*quotes.rows(SCORE.partition("## A sample")[2])][::3]
+    told = pd.read_csv(SAMPLE, keep_default_na=False).to_dict("records")[::3]
     assert len(told) > 10
     asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
     job = CONFIG.simulated(asked)._replace(baselines_every=0)
-    answers = [row_of(job, case, k) for case, k in asked]
-    section = SCORES["score"]["page"]["A sample"]
-    listed = table({"list": section["list"]}, frames(answers, CONFIG))
-    now = [*quotes.rows(markdown(listed) + "\n")]
+    judged = frames([row_of(job, case, k) for case, k in asked], CONFIG)["campaigns"]
+    now = answers(judged).fillna("").to_dict("records")
     changed = [
         f"{old}\n  now {new}" for old, new in zip(told, now, strict=True) if not alike(old, new)
     ]
@@ -65,27 +65,27 @@ def case_of(name):
 
 def alike(old, new):
     """Whether two rows of the sample say the same; processors may round another way."""
-    numbers = {"posterior": {"abs": 0.02}, "σ₀²": {"rel": 0.02}}
+    numbers = {"posterior": {"abs": 0.02}, "sigma0": {"rel": 0.02}}
     for head, told in old.items():
-        if head in numbers and "–" not in (told, new[head]):
+        if head in numbers and "" not in (told, new[head]):
             if float(told) != pytest.approx(float(new[head]), **numbers[head]):
                 return False
-        elif told != new[head]:
+        elif str(told) != str(new[head]):
             return False
     return True
 
 
 @pytest.mark.parametrize(("head", "new", "same"), [
-    ("posterior", "0.715", True),
-    ("posterior", "0.68", False),
-    ("posterior", "–", False),
+    ("posterior", 0.715, True),
+    ("posterior", 0.68, False),
+    ("posterior", "", False),
     ("verdict", "narrowed", False),
-    ("explanation", "warm up", False),
-    ("σ₀²", "1.31", True),
-    ("σ₀²", "1.4", False),
+    ("explanation", "warm_up", False),
+    ("sigma0", 1.31, True),
+    ("sigma0", 1.4, False),
 ])  # fmt: skip
 def test_another_answer_is_noticed(head, new, same):
-    row = {"verdict": "named", "explanation": "bias drift", "posterior": "0.71", "σ₀²": "1.30"}
+    row = {"verdict": "named", "explanation": "bias_drift", "posterior": 0.71, "sigma0": 1.30}
     assert alike(row, {**row, head: new}) == same
 
 

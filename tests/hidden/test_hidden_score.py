@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hidden_sample import sample
 
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -311,8 +312,7 @@ def test_a_page_with_every_target_and_every_error(judged, targets):
 
 
 def test_the_sample_has_a_campaign_of_each_kind_or_size(judged):
-    sample = table(PAGE["A sample"], judged)
-    sets = judged["campaigns"].set_index("cell")["set"].loc[sample["cell"]]
+    sets = sample(judged["campaigns"])["set"]
     assert sets.value_counts()["one"] == len({*judged["campaigns"].query("set == 'one'")["what"]})
     assert sets.value_counts()["outside"] == 3
 

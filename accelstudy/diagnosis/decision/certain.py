@@ -18,7 +18,7 @@ from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, because
+from accelstudy.diagnosis.decision.verdict import Choice, Finding, Reason
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
@@ -27,7 +27,7 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
 
-def with_what_is_certain(case: Case, finding: Finding) -> Finding:
+def add_certain_effects(case: Case, finding: Finding) -> Finding:
     """Say what is certain, and add it to the fit whatever else is missing."""
     posterior = finding.posterior
     assert posterior is not None
@@ -98,7 +98,7 @@ def _disagreement(problem: Problem, fit: tuple[list[Hypothesis], Solution] | Non
     return max(solution.omega - noise, 1e-9)
 
 
-def without_the_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
+def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
     """What is said where the held-out positions refute what was chosen: nothing of it is certain.
 
     Parameters
@@ -110,7 +110,7 @@ def without_the_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Findi
     reason = finding.reason
     if finding.verdict != "unknown":
         names = [choice.best.name for choice in finding.chosen]
-        reason = because("refuted", names=names, before=held.before, after=held.after)
+        reason = Reason.of("refuted", names=names, before=held.before, after=held.after)
     assert finding.posterior is not None
     doubted = [name for choice in finding.chosen for name in choice.members]
     posterior = finding.posterior.doubting(doubted)

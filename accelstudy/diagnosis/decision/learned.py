@@ -41,8 +41,8 @@ FOLLOWS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
 
-def learned(case: Case, posterior: Posterior, finding: Finding) -> Finding | None:
-    """Learn the function where nothing has a name, and yet it is plain where it lives; else None.
+def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Finding | None:
+    """Learn a function where nothing has a name, and one coordinate and target have it; else None.
 
     Beside it is what is certain or, where that leaves a misfit, all of the explanation that has it,
     such as the mean of what it changes.
@@ -70,7 +70,7 @@ def learned(case: Case, posterior: Posterior, finding: Finding) -> Finding | Non
                 frame=Frame.of(fitted[1]),
                 chosen=chosen,
                 place=found.place,
-                unlearned=finding,
+                without_function=finding,
             )
     return None
 

@@ -133,7 +133,7 @@ class Problem:
 
 
 def pose(base: BaseFit) -> Problem:
-    """Set all that the model of a fit may lack side by side.
+    """Return the problem that a fit poses: its residuals, and all that its model may lack.
 
     The axes are weighted by their noise where unequal axes explain the residuals better than equal
     ones do, with nothing missing, with any single effect, or with something unknown.

@@ -39,16 +39,16 @@ class Reason(NamedTuple):
     Attributes
     ----------
     code : str
-    of : mapping, names and numbers of the sentence for it, which `report/words.txt.j2` has
+    facts : mapping, names and numbers of the sentence for it, which `report/words.txt.j2` has
     """
 
     code: str
-    of: Mapping[str, Any]
+    facts: Mapping[str, Any]
 
-
-def because(code: str, **of: Any) -> Reason:
-    """Return a reason with its names and numbers."""
-    return Reason(code, of)
+    @classmethod
+    def of(cls, code: str, **facts: Any) -> Reason:
+        """Reason with its names and numbers."""
+        return cls(code, facts)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Finding:
     posterior : Posterior or None, where something is missing
     says : Statement, what is missing whatever else is open, and what may be missing beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
-    unlearned : Finding or None, what is said without that function
+    without_function : Finding or None, what is said without that function
     """
 
     verdict: str
@@ -91,7 +91,7 @@ class Finding:
     posterior: Posterior | None = None
     says: Statement = field(default=Statement((), ()))
     place: Place | None = None
-    unlearned: Finding | None = None
+    without_function: Finding | None = None
 
     @property
     def code(self) -> str:
@@ -123,21 +123,21 @@ class Finding:
 # --- something is missing -----------------------------------------------------------------------
 
 
-def find(case: Case) -> Finding:
-    """Say what is missing, given that something is."""
+def explain(case: Case) -> Finding:
+    """Find the explanation, or the few, of what is missing; "unknown" where none is enough."""
     posterior = case.posterior
     single = next((one for one in posterior.all if len(one.best) == 1), None)
     if single is not None and _is_large(case.problem, single):
-        posterior = _judged_by_refits(case, single, 1)
-    finding = _judged(case, posterior)
+        posterior = _posterior_by_refits(case, single, 1)
+    finding = _judge(case, posterior)
     if finding.code == "misfit" and single is not None:
         # To first order the best explanation was enough; the others were not asked by their refits.
-        posterior = _judged_by_refits(case, single, RULES.refitted_sets)
-        finding = _judged(case, posterior)
+        posterior = _posterior_by_refits(case, single, RULES.refitted_sets)
+        finding = _judge(case, posterior)
     return finding
 
 
-def _judged(case: Case, posterior: Posterior) -> Finding:
+def _judge(case: Case, posterior: Posterior) -> Finding:
     """Judge the explanations of a posterior: the first rule that matches."""
     frame, top = case.problem.frame, posterior.told[0]
     if top.best:
@@ -158,11 +158,11 @@ def _judged(case: Case, posterior: Posterior) -> Finding:
         if verdict:
             return Finding(verdict, Frame.of(fit[1]), None, tuple(found), posterior)
     if top.of_noise and top.posterior >= RULES.sure:
-        reason = because("noise", name=top.names[0], remark=NOISES[top.names[0]])
+        reason = Reason.of("noise", name=top.names[0], remark=NOISES[top.names[0]])
         return Finding("noise_model", frame, reason, posterior=posterior)
-    reason = because("not in the catalogue")
+    reason = Reason.of("not in the catalogue")
     if UNKNOWN not in top.names:
-        reason = because("undecided", first=top, second=posterior.told[1])
+        reason = Reason.of("undecided", first=top, second=posterior.told[1])
     return Finding("unknown", frame, reason, posterior=posterior)
 
 
@@ -171,11 +171,11 @@ def _against(
 ) -> Reason | None:
     """Why an explanation cannot be the answer, however probable; None if it can."""
     if fit is None:
-        return because("no solution", names=top.names)
+        return Reason.of("no solution", names=top.names)
     if left := misfit(problem, fit[1]):
-        return because("misfit", names=top.names, left=left)
+        return Reason.of("misfit", names=top.names, left=left)
     if beyond := impossible(fit[1]):
-        return because("impossible", names=top.names, beyond=beyond)
+        return Reason.of("impossible", names=top.names, beyond=beyond)
     return None
 
 
@@ -186,8 +186,8 @@ def impossible(solution: Solution) -> list[str]:
     return impossible_parameters(solution.model.effects, solution.parameters[:u], sigma[:u])
 
 
-def weak(case: Case, finding: Finding) -> Finding | None:
-    """Take back that something is missing, where the calibration is right to accept its fit.
+def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
+    """Find "no effect" where the calibration is right to accept its fit; None elsewhere.
 
     The evidence for something is wider than the test of the calibration, and its level less strict.
     What it finds beyond that level counts if something of it has a name, or is certain.
@@ -200,7 +200,7 @@ def weak(case: Case, finding: Finding) -> Finding | None:
         return None
     if any(part.is_effect for part in finding.says.certain):
         return None
-    return Finding("no_effect", case.problem.frame, because("weak", p=case.detection.p_value))
+    return Finding("no_effect", case.problem.frame, Reason.of("weak", p=case.detection.p_value))
 
 
 # --- a test of the noise fails, though no effect was significant --------------------------------
@@ -210,13 +210,13 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
     """Judge a failed test of the noise, when no effect was significant."""
     problem, posterior = case.problem, case.posterior
     verdict, name, noise = "noise_model", worst.name, posterior.of_noise
-    reason = because("noise", name=name, remark=worst.remark)
+    reason = Reason.of("noise", name=name, remark=worst.remark)
     if lack_of_fit(problem) < REFUTED and name != STEPS:
-        verdict, reason = "unknown", because("lack of fit")
+        verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
     elif name == LEVEL and worst.estimate[0] >= 1 and noise < RULES.more_probable:
         other = next(n for e in posterior.told for n in e.names if n not in NOISES)
-        reason = because("noise or effect", name=name, remark=worst.remark, p=noise, other=other)
+        reason = Reason.of("noise or effect", name=name, remark=worst.remark, p=noise, other=other)
         verdict = "unknown"
     return Finding(verdict, problem.frame, reason, posterior=posterior)
 
@@ -253,7 +253,9 @@ def unrecorded(case: Case, finding: Finding) -> Reason | None:
     if finding.verdict != "unknown" and slow < RULES.sure:
         noise = "by hold" if slow <= 1 - RULES.sure else "either"
     repeated = case.problem.repeated
-    return because("unrecorded", noise=noise, absent=absent, repeated=repeated, why=finding.reason)
+    return Reason.of(
+        "unrecorded", noise=noise, absent=absent, repeated=repeated, why=finding.reason
+    )
 
 
 def _of_courses(problem: Problem, posterior: Posterior) -> float:
@@ -276,7 +278,7 @@ def _is_large(problem: Problem, top: Explanation) -> bool:
     return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
 
 
-def _judged_by_refits(case: Case, single: Explanation, count: int) -> Posterior:
+def _posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterior:
     """Posterior by refits: of an effect alone, with more in what its refit leaves, and of sets.
 
     To first order a large effect leaves so much that anything would seem to be beside it.

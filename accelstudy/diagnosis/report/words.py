@@ -109,9 +109,9 @@ def clauses(diagnosis: Diagnosis) -> list[str]:
     return clauses_of(diagnosis.reason)
 
 
-def clauses_of(because: Reason | None) -> list[str]:
+def clauses_of(of: Reason | None) -> list[str]:
     """Clauses of a reason; none where there is none."""
-    return [] if because is None else said("reason", because)
+    return [] if of is None else said("reason", of)
 
 
 def sentence(text: str) -> str:

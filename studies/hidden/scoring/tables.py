@@ -8,8 +8,7 @@ real noise.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -123,8 +122,6 @@ def table(section: Mapping[str, Any], frames: Mapping[str, pd.DataFrame]) -> pd.
         kept = pd.DataFrame(lines)
         return kept if kept["target"].any() else kept.drop(columns=["target", "met"])
     if "list" in section:
-        if "sample" in section:
-            rows = sample(rows, section["sample"])
         columns = section["list"].items()
         return pd.DataFrame({head: rows[column].map(label) for head, column in columns})
     heads, lines = [*section["by"]], []
@@ -176,12 +173,3 @@ def bounds_text(least: float | None, most: float | None, oracle: str) -> str:
     if least == most:
         return f"{most:.2f}"
     return f"{(least + most) / 2:.2f} ± {(most - least) / 2:.2f}"
-
-
-def sample(rows: pd.DataFrame, by_kind: Sequence[str]) -> pd.DataFrame:
-    """A campaign of each size or, in some sets, of each kind, as good as at random."""
-    kind = rows["what"].where(rows["set"].isin(by_kind), rows["size"])
-    keys = rows["cell"] + " " + rows["campaign"].astype(str)
-    digest = keys.map(lambda key: hashlib.sha256(key.encode()).hexdigest())
-    mixed = rows.assign(kind=kind, digest=digest).sort_values("digest")
-    return mixed.drop_duplicates(["set", "kind"]).sort_values("cell", kind="stable")
