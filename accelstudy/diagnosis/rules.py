@@ -155,6 +155,8 @@ class Rules:
     """Sets to which every candidate is added, at most."""
     sets_within: float = 7.0
     """Log evidence by which a set may be weaker than the strongest one and still be extended."""
+    negligible: float = 20.0
+    """Log evidence by which a set may be weaker than the strongest one and still be weighed."""
     set_positions: int = 100
     """Outlying positions that are tried in sets, at most."""
     bounds_within: float = 8.0

@@ -49,8 +49,6 @@ from accelstudy.effects import effect_names
 
 SLOW = (("time", "bias"), ("time", "scale"))
 """Places of what follows something that was not recorded, and that slow noise may be, too."""
-NEGLIGIBLE = 20.0
-"""Log weight by which an explanation may fall short of another one and still be worth its time."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +229,7 @@ class Weighing:
             return []
         sets = weigh_sets(self.singles.shapes, problem.residuals, problem.evidence)
         logs = [one.log_density + set_prior(len(one.best), k) for one in sets]
-        least = max(logs, default=0.0) - NEGLIGIBLE
+        least = max(logs, default=0.0) - RULES.negligible
         called = {name: best.name for best, names in self.classes for name in names}
         strength = self.singles.densities
         for one, log in zip(sets, logs, strict=True):
@@ -248,36 +246,22 @@ class Weighing:
     @cached_property
     def with_unknown(self) -> list[Explanation]:
         """Something unknown beside the strongest effects, and beside the strongest pairs."""
-        if len(self.classes) < 2:
-            return []
+        problem, weighed = self.problem, list[Explanation]()
+        unknown = problem.field.unknown
+        if len(self.classes) < 2 or unknown is None:
+            return weighed
         singles = [one for one in self.alone if one.best]
         least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
         pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
         pairs.sort(key=lambda one: -one.log_weight)
-        return with_unknown(
-            self.problem, [*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]]
-        )
-
-
-def with_unknown(problem: Problem, explanations: Iterable[Explanation]) -> list[Explanation]:
-    """Weigh explanations with something unknown beside them.
-
-    Parameters
-    ----------
-    problem : Problem
-    explanations : of effects or outlying positions
-    """
-    unknown, weighed = problem.field.unknown, list[Explanation]()
-    if unknown is None:
+        prior = float(np.log(RULES.prior_two * RULES.prior_unknown))
+        for one in (*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]):
+            basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
+            log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
+            if log is not None:
+                names, classes = (*one.names, UNKNOWN), (*one.classes, (UNKNOWN,))
+                weighed.append(Explanation(names, classes, one.log_weight + log + prior))
         return weighed
-    prior = float(np.log(RULES.prior_two * RULES.prior_unknown))
-    for one in explanations:
-        basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
-        log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
-        if log is not None:
-            names, classes = (*one.names, UNKNOWN), (*one.classes, (UNKNOWN,))
-            weighed.append(Explanation(names, classes, one.log_weight + log + prior))
-    return weighed
 
 
 @dataclass(frozen=True)
