@@ -187,7 +187,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xscale("log")
     left.set_xlim(2, min(0.3 * smallest, 1e-3))
     left.xaxis.set_minor_locator(NullLocator())
-    left.set_xlabel("p-value, all candidates counted")
+    left.set_xlabel("p-value of each alone, all candidates counted")
     left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)
     _draw_shares(right, place, [probabilities.get(name) for name in shown], colours)
