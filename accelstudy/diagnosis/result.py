@@ -300,7 +300,7 @@ class Diagnosis:
 
     @cached_property
     def probabilities(self) -> dict[str, float]:
-        """Posterior of each name, alone or with another; a class stands under its first name.
+        """Posterior of each name, alone or with others; a class stands under its first name.
 
         Where nothing is missing, they only show which name would come first, each by itself.
         """

@@ -77,9 +77,10 @@ def weigh_sets(
     evidence : Evidence
     most : int, members of a set; of two every pair is weighed
     """
-    if not candidates:
+    shown = {name: shapes for name, shapes in candidates.items() if len(shapes)}
+    if not shown:
         return []
-    search = _Search(candidates, residuals, evidence)
+    search = _Search(shown, residuals, evidence)
     search.extend(())
     singles = sorted(search.weights, key=search.weights.__getitem__, reverse=True)
     for one in singles if most == 2 else singles[: RULES.sets_started]:
@@ -107,10 +108,8 @@ class _Search:
     ) -> None:
         self.z, self.evidence = residuals.z, evidence
         self.square = float(self.z @ self.z)
-        self.prior = [
-            0.0,
-            *(set_prior(j, len(candidates)) for j in range(1, RULES.set_members + 1)),
-        ]
+        count, sizes = len(candidates), range(1, RULES.set_members + 1)
+        self.priors = {size: set_prior(size, count) for size in sizes}
         self.shapes: list[Hypothesis] = []
         priors: list[Array] = []
         for name, shapes in candidates.items():
@@ -121,17 +120,17 @@ class _Search:
             tried = [shapes[int(place)] for place in places]
             self.shapes += tried
             priors.append(np.log(shapes.prior[places]) + self._bounds(tried))
-        self.shape_priors = np.concatenate(priors) if priors else np.zeros(0)
+        self.shape_priors = np.concatenate(priors)
         self.counts = [len(each) for each in priors]
         self.owners = np.repeat(np.arange(len(self.counts)), self.counts)
         self.firsts = np.cumsum([0, *self.counts[:-1]])
         self.outliers = list(candidates).index(OUTLIER) if OUTLIER in candidates else -1
         self.dims = np.array([shape.dim for shape in self.shapes], dtype=int)
         self.starts = np.cumsum(self.dims) - self.dims
+        # Shapes of one dimension are projected together.
         self.alike = [
-            (some, self.starts[some][:, None] + np.arange(dim))
+            (some := np.flatnonzero(self.dims == dim), self.starts[some][:, None] + np.arange(dim))
             for dim in np.unique(self.dims)
-            for some in (np.flatnonzero(self.dims == dim),)
         ]
         self.gram, self.seen = _products(self.shapes, self.z)
         nothing = float(np.logaddexp.reduce(evidence.of_noise(self.square)))
@@ -158,7 +157,7 @@ class _Search:
                 first = int(self.firsts[k])
                 best = first + int(np.argmax(logs[first : first + self.counts[k]]))
                 self.found[more] = log, (*chosen, best)
-                self.weights[more] = log + self.prior[len(more)]
+                self.weights[more] = log + self.priors[len(more)]
 
     def next(self, most: int) -> Places | None:
         """Strongest set that was not extended yet, or such a set without one of its members."""
@@ -229,7 +228,7 @@ def _products(shapes: Sequence[Hypothesis], z: Array) -> tuple[Array, Array]:
     size = sum(shape.dim for shape in shapes)
     gram, seen = np.zeros((size, size)), np.zeros(size)
     # In blocks of conditions: all bases together would need twice the memory.
-    for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1) if size else ():
+    for rows in np.array_split(np.arange(len(z)), len(z) // ROWS + 1):
         part = np.concatenate([shape.basis[rows[0] : rows[-1] + 1] for shape in shapes], axis=1)
         gram += part.T @ part
         seen += z[rows] @ part

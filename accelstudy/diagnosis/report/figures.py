@@ -187,11 +187,11 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xscale("log")
     left.set_xlim(2, min(0.3 * smallest, 1e-3))
     left.xaxis.set_minor_locator(NullLocator())
-    left.set_xlabel("p-value of each alone, all candidates counted")
+    left.set_xlabel("p-value alone, all candidates counted")
     left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)
     _draw_shares(right, place, [probabilities.get(name) for name in shown], colours)
-    right.set(xlim=(0, 115), xlabel="posterior probability, alone or with another / %")
+    right.set(xlim=(0, 115), xlabel="posterior probability, alone or with others / %")
     return figure
 
 
