@@ -43,7 +43,7 @@ def test_the_score_is_that_of_the_code():
     asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
     job = CONFIG.simulated(asked)._replace(baselines_every=0)
     judged = frames([row_of(job, case, k) for case, k in asked], CONFIG)["campaigns"]
-    now = answers(judged).fillna("").to_dict("records")
+    now = answers(judged).astype(object).fillna("").to_dict("records")
     changed = [
         f"{old}\n  now {new}" for old, new in zip(told, now, strict=True) if not alike(old, new)
     ]
