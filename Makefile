@@ -10,7 +10,8 @@ ENV := .venv
 READY := $(ENV)/.ready
 TEST = pytest --numprocesses $(CORES) --dist loadfile --no-loadscope-reorder
 OLD_NUMPY := NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
-INSTALL := pip install --quiet --no-build-isolation --require-hashes --requirement requirements.lock
+# The lock is complete. Resolving it again, pip alone would miss the hash of coverage with its extra.
+INSTALL := pip install --quiet --no-deps --no-build-isolation --require-hashes --requirement requirements.lock
 
 # The workflow's shell commands find the environment's python by the path alone.
 export PATH := $(CURDIR)/$(ENV)/bin:$(PATH)
