@@ -8,7 +8,7 @@ from time import process_time
 import numpy as np
 
 from accelstudy.study.config import read_study
-from accelstudy.study.estimate import LEAST
+from accelstudy.study.estimate import MIN_REPLICATES
 from accelstudy.study.replicates import Replicates, simulate
 from accelstudy.study.statistics import TILT, simulated_statistics, statistics
 from problem import APPROACHES, SCHEME
@@ -47,7 +47,7 @@ def run(speeds):
         few = _needed(simulated_statistics(some, 1, leveling), 1000)
         controlled = {}
         for what, count in few.items():
-            own = replace(cell, replicates=max(LEAST, math.ceil(count)), compiled=False)
+            own = replace(cell, replicates=max(MIN_REPLICATES, math.ceil(count)), compiled=False)
             simulated_statistics(own, 1, leveling)  # what is traced is kept
             start = process_time()
             simulated_statistics(own, 1, leveling)

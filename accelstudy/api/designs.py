@@ -13,7 +13,7 @@ import pandas as pd
 from accelstudy.api.given import drawing, path_of
 from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import LONGEST
+from accelstudy.basics.names import MAX_BYTES
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import (
     angle_note,
@@ -167,7 +167,7 @@ class Design(Result):
         """Write a file that becomes `place`, by which the scheme is named."""
         proposal = self.proposal
         extra = {"turn_about": proposal.axes} if proposal.axes else None
-        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: LONGEST // 2] or "scheme"
+        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: MAX_BYTES // 2] or "scheme"
         kind = proposal.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {proposal.request.seed}"

@@ -3,7 +3,7 @@
 Apart from all code that calculates, so that a change there does not make an overview anew.
 """
 
-REFUTED = 0.01
+REFUTATION_LEVEL = 0.01
 """Level at which residuals refute a stated sigma."""
 
 ACCEPTED, REJECTED = "accepted", "rejected"

@@ -14,9 +14,9 @@ from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DIGITS = 3
 """Significant digits of a number."""
-GIVEN = 4
+MAX_ROUND_DIGITS = 4
 """Significant digits up to which a quantity is round: given rather than computed."""
-HUGE = 9
+MAX_EXPONENT = 9
 """Exponent from which a number is written with a power of ten."""
 
 
@@ -64,7 +64,7 @@ def number(value: float | None) -> str:
     if value == 0:
         return "0"
     text, exponent = _rounded(value, DIGITS)
-    if exponent < HUGE:
+    if exponent < MAX_EXPONENT:
         text = f"{value:.{max(0, DIGITS - 1 - exponent)}f}"
     return text.replace("-", "−")
 
@@ -83,7 +83,7 @@ def quantity_text(value: float, unit: str) -> str:
     shown, of = float(to_display(value, unit)), display_unit(unit)
     if unit == "rad" and abs(to_attitude(value)) >= 1:
         shown, of = float(to_attitude(value)), attitude_unit()
-    given = f"{shown:.{GIVEN}g}"
+    given = f"{shown:.{MAX_ROUND_DIGITS}g}"
     is_round = "e" not in given and math.isclose(float(given), shown, rel_tol=1e-9)
     text = given.replace("-", "−") if is_round else number(shown)
     return f"{text} {of}".removesuffix(" 1")

@@ -45,9 +45,9 @@ Array = NDArray[np.float64]
 HEADER = "campaign.yaml"
 TABLES = ("positions.csv", "positions.parquet")
 
-MOST = 1e12
+MAX_VALUE = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
-ANY = Range(-MOST, MOST)
+ANY = Range(-MAX_VALUE, MAX_VALUE)
 
 
 class Columns(NamedTuple):
@@ -94,7 +94,7 @@ COLUMNS = {
         ("sd_fx", "sd_fy", "sd_fz"),
         "standard deviations of the samples within the hold",
         "unit",
-        Range(0.0, MOST),
+        Range(0.0, MAX_VALUE),
     ),
     "temperature": Columns(("temperature_degC",), "mean temperature", "°C", bounds.TEMPERATURE),
     "angles": Columns(
@@ -244,12 +244,12 @@ class Header(Block):
     nominal: Nominal | None = None
     gravity: _Gravity
     sensor_noise: _SensorNoise | None = None
-    range_mps2: Annotated[Positive, Field(le=MOST)] | None = Field(
+    range_mps2: Annotated[Positive, Field(le=MAX_VALUE)] | None = Field(
         None, description="the sensor measures ± this; where it can saturate"
     )
-    resolution_mps2: Annotated[list[Annotated[NotNegative, Field(le=MOST)]], PerAxis] | None = (
-        Field(None, description="steps in which x, y and z are read; where rounding counts")
-    )
+    resolution_mps2: (
+        Annotated[list[Annotated[NotNegative, Field(le=MAX_VALUE)]], PerAxis] | None
+    ) = Field(None, description="steps in which x, y and z are read; where rounding counts")
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None
     reference: ReferenceSensor | None = None

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TYPE_FILE = "type.yaml"
 TYPE_KEYS = ("schema_version", "models", "sensors", "parameters", "plugins")
 """Keys of a file of a type that data sheets do not have."""
-FEWEST = 5
+MIN_SENSORS = 5
 """Sensors whose scatter tells how far the next one may be away."""
 
 
@@ -88,10 +88,10 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
             f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "
             f"{', '.join(model.parameter_names)}; give `model` {path}"
         )
-    if read.sensors < FEWEST:
+    if read.sensors < MIN_SENSORS:
         raise InputError(
             f"{path}: sensors: {read.sensors} are too few to tell how far the next one may be "
-            f"away; {FEWEST} or more do"
+            f"away; {MIN_SENSORS} or more do"
         )
     known_of = {
         name: (p.mean, p.sigma_next)

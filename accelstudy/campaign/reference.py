@@ -22,7 +22,7 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-NEAREST = 1e-4
+MIN_POLE_DISTANCE = 1e-4
 """rad; nearer to the pole of roll its derivatives are those at this distance."""
 
 
@@ -75,7 +75,7 @@ class ReferenceSensor(Block):
         sigma : (n, 2) array, rad, standard deviations by the noise of its readings
         common : (n, 2, u) array, rad, derivatives J L by the errors of its calibration
         """
-        most = np.pi / 2 - NEAREST
+        most = np.pi / 2 - MIN_POLE_DISTANCE
         roll, pitch = angles[:, 0], np.clip(angles[:, 1], -most, most)
         forces = np.column_stack(specific_force(roll, pitch, gravity))
         own, model, p = self.axes.from_frd(forces), self.model, np.array(self.parameters)

@@ -17,7 +17,7 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.detection import WANDERING, Holds, at_range, scatter
+from accelstudy.campaign.importing.detection import MAX_WANDER, Holds, at_range, scatter
 from accelstudy.campaign.importing.noise import hold_noise, shown
 from accelstudy.campaign.importing.recording import AXES, Log, Recording, place_of, read_log
 from accelstudy.campaign.importing.windows import Windows
@@ -28,13 +28,13 @@ from accelstudy.sensors.frames import FRD, Frame
 
 Array = NDArray[np.float64]
 
-COVERED = 0.5
+MIN_COVERAGE = 0.5
 """Share of a hold, below which the reference has not enough samples of it."""
-FEWEST = 4
+MIN_SAMPLES = 4
 """Samples of the reference in a hold, at least."""
-APART = 0.03
+MIN_MISFIT = 0.03
 """Misfit of the turns of both sensors, in parts of gravity, that no pair on one plate has."""
-TURNED = 20 * GON
+MAX_ROTATION = 20 * GON
 """Rotation between the sensors, beside quarter turns, up to which it is small."""
 QUARTER_TURNS = tuple(
     frame
@@ -42,7 +42,7 @@ QUARTER_TURNS = tuple(
     for name in product(*letters)
     if (frame := Frame("".join(name))) and np.linalg.det(frame.matrix) > 0
 )
-LEAST = 8
+MIN_HOLDS = 8
 """Holds from which on it is checked that both sensors turn together."""
 
 
@@ -116,7 +116,7 @@ class ReferenceLog:
         for n, t0, t1 in holds.table[["t0", "t1"]].itertuples():
             inside = slice(*np.searchsorted(time, [t0, t1 + log.step / 2]).tolist())
             count = inside.stop - inside.start
-            if count * read.step < COVERED * (t1 - t0) or count < FEWEST:
+            if count * read.step < MIN_COVERAGE * (t1 - t0) or count < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
             elif at_range(forces[inside], full_range):
                 lost[n] = "the reference is saturated"
@@ -140,7 +140,7 @@ class ReferenceLog:
                 f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
                 "`reference` was made"
             ) from None
-        limit = WANDERING * Windows.lasting(read).threshold().sd
+        limit = MAX_WANDER * Windows.lasting(read).threshold().sd
         sds = {n: scatter(record) for n, record in records.items()}
         moving = {n: sd for n, sd in sds.items() if sd > limit}
         if len(moving) > len(records) / 2:
@@ -223,11 +223,11 @@ class ReferenceLog:
             If a rotation does not explain them, or it is not small beside the quarter turns.
         """
         log = f"`reference_log` {self.path}"
-        if len(own) >= LEAST:
+        if len(own) >= MIN_HOLDS:
             design = np.column_stack([own, np.ones(len(own))])
             left = forces - design @ np.linalg.lstsq(design, forces, rcond=None)[0]
             misfit = np.sqrt(np.mean(np.sum(left**2, axis=1))) / self.calibration.gravity
-            if misfit > APART:
+            if misfit > MIN_MISFIT:
                 raise InputError(
                     f"{log}: the two sensors do not turn together: their forces differ by "
                     f"{misfit:.2g} g, whatever the rotation between them; are they on one plate, "
@@ -238,11 +238,11 @@ class ReferenceLog:
         traces = {frame: np.trace(frame.matrix.T @ turn) for frame in QUARTER_TURNS}
         best = max(traces, key=lambda frame: traces[frame])
         rest = float(np.arccos(np.clip((traces[best] - 1) / 2, -1, 1)))
-        if rest > TURNED:
+        if rest > MAX_ROTATION:
             raise InputError(
                 f"{log}: besides quarter turns, the reference is turned by {rest / GON:.0f} gon "
-                f"against the sensor; mount it within {TURNED / GON:.0f} gon, as only a small "
-                "rotation is estimated"
+                f"against the sensor; mount it within {MAX_ROTATION / GON:.0f} gon, "
+                "as only a small rotation is estimated"
             )
         return best
 

@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.allan import RELIABLE, AllanDeviation
+from accelstudy.campaign.importing.allan import MIN_DIFFERENCES, AllanDeviation
 from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, DataSheet
@@ -23,7 +23,7 @@ from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Finite, NotNegative, Number, checked
 
 NO_HISTORY = "not a history.json of accelstudy"
-SEEN = 0.02
+MIN_VARIANCE_SHARE = 0.02
 """A kind of noise must make up this part of the Allan variance at some averaging time."""
 
 
@@ -53,14 +53,14 @@ def sheet_of_allan(curve: AllanDeviation, name: str, source: str) -> DataSheet:
     InputError
         If there are too few values.
     """
-    usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
+    usable = (curve.differences >= MIN_DIFFERENCES) & (curve.pooled > 0)
     if np.count_nonzero(usable) < 3:
         raise InputError(f"{source}: too short at rest for an Allan deviation")
     tau, variance = curve.tau[usable], curve.pooled[usable] ** 2
     kinds = np.column_stack([1 / tau, np.ones_like(tau), tau])
     weight = np.sqrt(curve.differences[usable] / 2) / variance
     squares, _ = nnls(kinds * weight[:, None], variance * weight)
-    seen = np.max(kinds * squares / variance[:, None], axis=0) > SEEN
+    seen = np.max(kinds * squares / variance[:, None], axis=0) > MIN_VARIANCE_SHARE
     longest = f"Allan deviation of {source} up to {tau[-1]:.3g} s"
     values: dict[str, Any] = {
         "velocity_random_walk": math.sqrt(squares[0]),

@@ -20,12 +20,12 @@ from accelstudy.design.task import Task
 
 Array = NDArray[np.float64]
 
-COARSE, FINE = 600, 6000
+SHARED_ATTITUDES, BOUND_ATTITUDES = 600, 6000
 """Number of attitudes that have shares, and of those on which the bound is evaluated."""
 ROUNDS = 8
 UPDATES = 2000
 """Number of updates of all shares in a round."""
-ENOUGH = 1e-4
+MAX_GAP = 1e-4
 """Relative gap between the criterion and its bound at which the search stops."""
 
 
@@ -61,9 +61,11 @@ def continuous_optimum(
         holds with and without them
     n : int
     """
-    fine = allowed(space, constraints, FINE)
+    fine = allowed(space, constraints, BOUND_ATTITUDES)
     fine_flat = _flat(task, fine)
-    points = fine if len(fine) <= COARSE else allowed(space, constraints, COARSE)
+    points = (
+        fine if len(fine) <= SHARED_ATTITUDES else allowed(space, constraints, SHARED_ATTITUDES)
+    )
     flat, shares = _flat(task, points), np.full(len(points), 1 / len(points))
     u = len(task.names)
     best = Continuous(points, shares, np.inf, -np.inf)
@@ -80,7 +82,7 @@ def continuous_optimum(
         least = min(least, float(here.min()))
         bound = max(best.bound, value + n * (least - float(shares @ here)))
         best = Continuous(points, shares, value, bound)
-        if value - bound < ENOUGH:
+        if value - bound < MAX_GAP:
             break
         points = np.concatenate([points, lowest])
         flat = np.concatenate([flat, _flat(task, lowest)])
@@ -125,7 +127,7 @@ def _lowest(
 ) -> tuple[Array, float]:
     """Attitudes with the smallest derivatives, also between those of the grid; and the smallest."""
     points = fine[np.argsort(slopes, kind="stable")[:60]]
-    step = np.sqrt(4 * np.pi / FINE)
+    step = np.sqrt(4 * np.pi / BOUND_ATTITUDES)
     for _ in range(12):
         tangents = space.tangents(points)
         if not tangents.shape[2]:

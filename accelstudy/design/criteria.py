@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""
-HIDDEN = 1e8
+MAX_VARIANCE = 1e8
 """Scaled variance of a parameter above which its effect does not show."""
 POWER = 16
 """Exponent of the power mean that stands for the larger of several mean squares."""
@@ -242,7 +242,7 @@ class Discrimination(MeanSquare):
 
     def blind(self, normal: Array) -> str:
         """Whether a parameter of one of the effects looks like the other, or like nothing."""
-        hidden = self.squares(normal).max() > HIDDEN
+        hidden = self.squares(normal).max() > MAX_VARIANCE
         return "they do not tell the two effects apart" if hidden else ""
 
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 ABOVE_NOISE = 3.0
 """How far a combination of parameters must show above what the noise of readings makes of it. Where
 positions do not determine it, it shows by noise alone, at about 1 whatever the noise is."""
-MANY = 60
+SUFFICIENT_POSITIONS = 60
 """Positions that determine whatever an approach can determine at all."""
 EVERYTHING_VARIES = HoldPlan(60.0, (0.0, 40.0), "random", (0.0, 1.0), "random")
 
@@ -165,6 +165,8 @@ def _design(
 def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: float) -> bool:
     """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
     ideal = np.zeros(model.n_parameters)
-    hold = EVERYTHING_VARIES.hold(MANY)
-    a = _design(evenly_spread(MANY), model, approach, noise, ideal, gravity, hold, {})
+    hold = EVERYTHING_VARIES.hold(SUFFICIENT_POSITIONS)
+    a = _design(
+        evenly_spread(SUFFICIENT_POSITIONS), model, approach, noise, ideal, gravity, hold, {}
+    )
     return rank_of(a)[0] < a.shape[1]

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 SINGULAR = 1e-7
 """Singular values of the scaled design matrix below this fraction of the largest count as zero."""
-INVOLVED, IN_NOISE = 1e-3, 0.1
+MIN_INVOLVED, IN_NOISE = 1e-3, 0.1
 """Share of a parameter in a combination from which on that combination hides it: of one that does
 not show at all, and of one that noise shows, and blurs."""
 ROUNDING = 1e-14
@@ -138,7 +138,7 @@ def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[n
     rank = int(np.count_nonzero(ratios > 1))
     condition = float(values[0] / values[-1]) if rank == u else np.inf
     null, _ = np.linalg.qr(back @ vt[rank:].T)
-    share = IN_NOISE if len(least) else INVOLVED
+    share = IN_NOISE if len(least) else MIN_INVOLVED
     return rank, condition, np.linalg.norm(null, axis=1) > share
 
 

@@ -21,19 +21,19 @@ from accelstudy.design.continuous import allowed, continuous_optimum
 from accelstudy.design.criteria import Criterion
 from accelstudy.design.spaces import Constraints, Space, Sphere
 from accelstudy.design.task import Task
-from accelstudy.positions.choice import TIED, first_best, in_order
+from accelstudy.positions.choice import CRITERION_TOLERANCE, first_best, in_order
 
 Array = NDArray[np.float64]
 
 CANDIDATES = 600
 STARTS = 8
-REFINED = 3
+REFINED_STARTS = 3
 """Number of starts that are refined: the best ones after the exchange, which is cheap."""
 PARTS = 10
 """Number of parts of a space that are searched in full."""
 DIGITS = 9
 """Decimals of the directions, 1e-9 rad."""
-EQUAL = 1e-6
+DESIGN_TOLERANCE = 1e-6
 """Relative difference below which two designs are equally good, and the first one is taken."""
 
 
@@ -98,7 +98,9 @@ def optimal_design(
     parts = space.parts(np.random.default_rng(np.random.SeedSequence([seed, 0])))
     if len(parts) > PARTS:  # the best ones after a single exchange
         tried = [search.best(part, 1, ()) for part in parts]
-        parts = [parts[i] for i in in_order([value for _, value in tried], EQUAL)[:PARTS]]
+        parts = [
+            parts[i] for i in in_order([value for _, value in tried], DESIGN_TOLERANCE)[:PARTS]
+        ]
     found = [search.best(part, starts, STEPS if refined else ()) for part in parts]
     directions, _ = _first_best(found)
     directions = rounded(with_repeats(task, criterion, constraints, directions))
@@ -137,18 +139,18 @@ def _check_determined(task: Task, criterion: Criterion, directions: Array, n: in
 
 def _first_best(designs: list[tuple[Array, float]]) -> tuple[Array, float]:
     """First of the designs that are equally good, so that rounding does not choose."""
-    return designs[first_best([value for _, value in designs], EQUAL)]
+    return designs[first_best([value for _, value in designs], DESIGN_TOLERANCE)]
 
 
-TRIED = 24
+MAX_TRIED = 24
 """Number of places that are tried for a position, in the order in which the derivative of the
 criterion ranks them: the KL exchange of Atkinson & Donev (1989)."""
 LEAST_GAIN = 1e-9
 """Relative improvement below which a position is not exchanged."""
-KNOWN = 1e-6
+PRIOR_INFORMATION = 1e-6
 """Scaled information that is known of each parameter during an exchange. Where a choice does not
 determine all parameters, rounding would decide without it."""
-SWEEPS = 100
+MAX_SWEEPS = 100
 """Most sweeps through all positions."""
 DRAWS = 200
 """Number of random sets that are drawn to find one that keeps its distances."""
@@ -157,7 +159,7 @@ STEPS = tuple(0.081 / 3.0**k for k in range(5))
 the candidates to 0.06 gon. All move on grids, and a move must gain more than rounding can: so no
 last digit decides where the search ends, as it would where a minimum is flat and derivatives are
 followed."""
-GAIN = 0.1
+MIN_GAIN = 0.1
 """Smallest gain of a move, of the square of the step."""
 FURTHER = np.array([0.0, 1.0, 2.0, 4.0, 8.0, 16.0])
 """Times that the moves of two sweeps are repeated at once by all positions, if that is better."""
@@ -187,9 +189,9 @@ class _Search:
             rng = np.random.default_rng(np.random.SeedSequence([self.seed, start]))
             chosen = self.exchanged(candidates, informations, self.random(candidates, rng))
             designs.append((candidates[chosen], self.value(candidates[chosen])))
-        order = in_order([value for _, value in designs], EQUAL)
+        order = in_order([value for _, value in designs], DESIGN_TOLERANCE)
         refined = []
-        for i in order[:REFINED]:
+        for i in order[:REFINED_STARTS]:
             directions = designs[i][0]
             for step in steps if space.tangents(directions).shape[2] else ():
                 directions = self.settled(directions, step * space.tangents(directions), step)
@@ -216,8 +218,8 @@ class _Search:
     def exchanged(self, candidates: Array, informations: Array, chosen: list[int]) -> list[int]:
         """Exchange positions until none can be exchanged for a better one."""
         flat = informations.reshape(len(candidates), -1)
-        before = self.task.prior + KNOWN * np.eye(len(self.task.prior))
-        for _ in range(SWEEPS):
+        before = self.task.prior + PRIOR_INFORMATION * np.eye(len(self.task.prior))
+        for _ in range(MAX_SWEEPS):
             # Computed anew, without the rounding of many exchanges.
             normal = before + informations[chosen].sum(axis=0)
             value, order = float(self.criterion.value(normal)), None
@@ -225,9 +227,9 @@ class _Search:
             for i, old in enumerate(chosen):
                 if order is None:  # the rank of the candidates, until a position is exchanged
                     rank = flat @ self.criterion.gradient(normal).ravel()
-                    order = in_order(rank, TIED * float(np.abs(rank).max()))
+                    order = in_order(rank, CRITERION_TOLERANCE * float(np.abs(rank).max()))
                 others = candidates[chosen[:i] + chosen[i + 1 :]]
-                tried = order[self.constraints.apart(candidates, others)[order]][:TRIED]
+                tried = order[self.constraints.apart(candidates, others)[order]][:MAX_TRIED]
                 if not len(tried):
                     continue
                 rest = normal - informations[old]
@@ -250,13 +252,13 @@ class _Search:
 
         moves = np.array(list(product((0.0, -1.0, 1.0), repeat=tangents.shape[2])))
         t = before = np.zeros((self.n, moves.shape[1]))
-        for _ in range(SWEEPS):
-            moved = moves[self.swept(directions(t + moves[:, None, :]), GAIN * step**2)]
+        for _ in range(MAX_SWEEPS):
+            moved = moves[self.swept(directions(t + moves[:, None, :]), MIN_GAIN * step**2)]
             if not moved.any():
                 break
             tried = t + moved + FURTHER[:, None, None] * (t + moved - before)
             before = t + moved
-            t = tried[self.furthest(directions(tried), GAIN * step**2)]
+            t = tried[self.furthest(directions(tried), MIN_GAIN * step**2)]
         return directions(t)
 
     def swept(self, around: Array, gain: float) -> NDArray[np.int_]:
@@ -296,9 +298,9 @@ class _Search:
         return best if values[best] < values[0] - gain else 0
 
 
-NEAR = 1 * GON
+MAX_JOINED_ANGLE = 1 * GON
 """Angle up to which two positions may be joined."""
-COST = 1e-4
+MAX_JOINING_LOSS = 1e-4
 """Largest loss of the criterion, a logarithm, by joining."""
 
 
@@ -323,7 +325,7 @@ def with_repeats(
     (n, 3) array of unit vectors, all of them among `directions`
     """
     cosines = directions @ directions.T
-    near = cosines > np.cos(NEAR)
+    near = cosines > np.cos(MAX_JOINED_ANGLE)
     if constraints.least_angle is not None or np.count_nonzero(near) == len(directions):
         return directions
     # A position that is near another one by way of others, too, is in its group.
@@ -334,4 +336,4 @@ def with_repeats(
         middle = first_best(-cosines[np.ix_(members, members)].sum(axis=1))
         joined[members] = directions[members[middle]]
     before, after = (float(criterion.value(task.normal(u))) for u in (directions, joined))
-    return joined if after <= before + COST else directions
+    return joined if after <= before + MAX_JOINING_LOSS else directions

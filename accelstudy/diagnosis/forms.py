@@ -16,13 +16,13 @@ from accelstudy.effects.learned import WAVES
 
 Array = NDArray[np.float64]
 
-PLACES = 60
+MAX_PLACES = 60
 """Places of a step that are tried at most."""
 MOST_CYCLES, EACH = 10.0, 3
 """Periods of a sine in the range of its coordinate at most; each needs as many different values."""
-APART = 100
+DISTINCT_VALUES = 100
 """Parts of its range in which values of a coordinate count as one."""
-FINE = 1 / 16
+PERIOD_STEP = 1 / 16
 """Step of the number of periods that are tried."""
 TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
          4: "four times per turn"}  # fmt: skip
@@ -179,7 +179,7 @@ def forms(coordinate: str, c: Array) -> list[Form]:
 def distinct(c: Array) -> Array:
     """Values of a coordinate that differ by more than a small part of its range."""
     values = np.unique(c)
-    part = np.floor((values - values[0]) / np.ptp(values) * APART * (1 - 1e-9))
+    part = np.floor((values - values[0]) / np.ptp(values) * DISTINCT_VALUES * (1 - 1e-9))
     chosen = values[np.diff(part, prepend=-1) > 0]
     chosen[-1] = values[-1]
     return chosen
@@ -188,7 +188,7 @@ def distinct(c: Array) -> Array:
 def _of_a_range(of: Coordinate, values: Array) -> list[Form]:
     """A sine in the range of some values (n,) and, of a course, a decay from its start on."""
     low, length = values[0], np.ptp(values)
-    cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, FINE)
+    cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, PERIOD_STEP)
     found = []
     if len(cycles):
         words, turns = "as a sine with a period of {}", 2 * np.pi * cycles / length
@@ -203,7 +203,7 @@ def _step(of: Coordinate, c: Array) -> Form:
     """A step between any two values of a coordinate."""
     values = np.unique(c)
     between = (values[1:] + values[:-1]) / 2
-    some = np.unique(np.linspace(0, len(between) - 1, PLACES).round().astype(int))
+    some = np.unique(np.linspace(0, len(between) - 1, MAX_PLACES).round().astype(int))
 
     def gap(place: float) -> str:
         after = int(np.searchsorted(values, place))

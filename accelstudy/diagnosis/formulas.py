@@ -29,8 +29,8 @@ from accelstudy.effects.learned import OF_EACH, WAVES, Learned
 
 Array = NDArray[np.float64]
 
-OTHER = "as another smooth function"
-WORTH = 0.01
+OTHER_FORM = "as another smooth function"
+MIN_POSTERIOR = 0.01
 """Posterior from which on a formula is worth a line."""
 AT_ONCE = 20
 """Settings that are weighed together."""
@@ -96,9 +96,9 @@ def ranked(
     if found:
         best, setting, _ = found[int(np.argmax(posterior[:-1]))]
         *_, taking = functions.fit(best, setting, taking)
-    formulas = [Formula(OTHER, posterior[-1])]
+    formulas = [Formula(OTHER_FORM, posterior[-1])]
     for (form, setting, _), p in zip(found, posterior, strict=False):
-        if p >= WORTH:
+        if p >= MIN_POSTERIOR:
             sizes, sigmas, _ = functions.fit(form, setting, taking)
             shown = _said(sizes, sigmas, target.unit, [target.components[i] for i in taking])
             by = "" if form.is_sine else "by "

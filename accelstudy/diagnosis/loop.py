@@ -34,9 +34,9 @@ COLUMNS = [
     *("simulation", "calibration", "replicate"),
     *("sigma0_squared", "tilt_error_rad", "converged"),
 ]
-POSITIONS = 500_000
+MAX_POSITIONS = 500_000
 """Most positions in all sessions of a simulation together; they are drawn at once."""
-LEAST = 100
+MIN_SESSIONS = 100
 """Least number of sessions of a simulation, however many positions they have."""
 
 
@@ -88,7 +88,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     Parameters
     ----------
     diagnosis : Diagnosis
-    replicates : int, sessions of each simulation; `POSITIONS` limits them, but to `LEAST`
+    replicates : int, sessions of each simulation, limited by `MAX_POSITIONS`, but to `MIN_SESSIONS`
     seed : int
 
     Returns
@@ -115,7 +115,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     if not _comparable(list(measured.values())).all():
         return None
     n = d.campaign.n_positions
-    replicates = min(replicates, max(LEAST, POSITIONS // n))
+    replicates = min(replicates, max(MIN_SESSIONS, MAX_POSITIONS // n))
     tables = []
     for stream, simulation in enumerate(("old", "new")):
         simulated = fits["base" if simulation == "old" else "extended"]
@@ -126,7 +126,7 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
         directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
         ideal = session(simulated.model, p, directions, simulated.gravity, hold)
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
-        size = max(1, POSITIONS // n)
+        size = max(1, MAX_POSITIONS // n)
         for first in track(range(0, replicates, size), f"{simulation} simulation"):
             numbers = np.arange(first, min(first + size, replicates))
             drawn = ideal.draw(noise, len(numbers), rng)

@@ -30,19 +30,19 @@ from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.learned import Learned
 from accelstudy.leveling.angles import angles_of
-from accelstudy.positions.choice import TIED, first_best
+from accelstudy.positions.choice import CRITERION_TOLERANCE, first_best
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
 
 COUNT = 3
-GRID = "fibonacci-60"
-LATER = (0.0, 0.5, 1.0)
+CANDIDATE_SCHEME = "fibonacci-60"
+DELAYS = (0.0, 0.5, 1.0)
 """How long after the session further positions may be measured, in lengths of the session."""
-ANYWHERE = 0.7
+MIN_EVEN_RATIO = 0.7
 """Ratio of the smallest to the largest gain of all attitudes from which on any of them will do."""
-DIFFERENT = 0.5
+MIN_FORCE_CHANGE = 0.5
 """Change of force, in parts of gravity, beyond which attitudes clearly differ."""
 
 Explanation = Sequence[Hypothesis]
@@ -96,7 +96,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     g = frame.solution.gravity
     repeated = frame.forces[_apart(frame.forces, g)]
-    attitudes = np.concatenate([repeated, -g * get_scheme(GRID).directions])
+    attitudes = np.concatenate([repeated, -g * get_scheme(CANDIDATE_SCHEME).directions])
     forces, hold = _grid(frame, attitudes, needed, frame.forces[-1])
     rivals = [_fitted(frame, one) for one in (first, second)]
     told = [one.values for one in rivals]
@@ -110,15 +110,19 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
         gains = (rivals[1].growth(rows[1], seen[0]) + rivals[0].growth(rows[0], seen[1])) / 2
         if not chosen:
             alone = np.sqrt(gains)
-            start = first_best(-alone, TIED * alone.max()) // len(attitudes) * len(attitudes)
+            start = (
+                first_best(-alone, CRITERION_TOLERANCE * alone.max())
+                // len(attitudes)
+                * len(attitudes)
+            )
             there = alone[start : start + len(attitudes)]  # at the best temperature and time
-            if anywhere := bool(there.min() >= ANYWHERE * there.max()):
+            if anywhere := bool(there.min() >= MIN_EVEN_RATIO * there.max()):
                 chosen = [start + i for i in range(len(repeated))]
                 break
         gains = np.where(free, gains, -np.inf)
-        i = first_best(-gains, TIED * gains.max())
+        i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
         chosen.append(i)
-        free &= np.linalg.norm(forces - forces[i], axis=1) > DIFFERENT * g
+        free &= np.linalg.norm(forces - forces[i], axis=1) > MIN_FORCE_CHANGE * g
         rivals = [one.after(rows[k][i], seen[1 - k][i]) for k, one in enumerate(rivals)]
     names = [[one.name for one in explanation] for explanation in (first, second)]
     only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
@@ -178,7 +182,7 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
         return []
     model, solution = frame.solution.model, frame.solution
     needed = {*compose(learned.spec, (learned.spec,)).hold_columns}
-    attitudes = -solution.gravity * get_scheme(GRID).directions
+    attitudes = -solution.gravity * get_scheme(CANDIDATE_SCHEME).directions
     yaws, by_heat = YAWS if "yaw" in needed else np.zeros(1), "temperature" in needed
     weights = np.zeros_like(solution.cofactors)
     own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
@@ -189,7 +193,7 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
         forces, hold = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
         rows = _rows(frame, forces, hold)
         gains = fit.fall(rows, weights)
-        i = first_best(-gains, TIED * gains.max())
+        i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
         gain, of = np.sqrt(gains[i] / whole), ((learned.name,), ())
         chosen.append(_position(frame, hold, i, needed - {"time"}, gain, False, of))
         fit, before = fit.after(rows[i], rows[i] @ fit.values), forces[i]
@@ -210,7 +214,7 @@ def _apart(forces: Array, gravity: float) -> list[int]:
     """Return the first places whose attitudes clearly differ."""
     chosen: list[int] = []
     for i in range(len(forces)):
-        near = np.linalg.norm(forces[chosen] - forces[i], axis=1) <= DIFFERENT * gravity
+        near = np.linalg.norm(forces[chosen] - forces[i], axis=1) <= MIN_FORCE_CHANGE * gravity
         if len(chosen) < COUNT and not near.any():
             chosen.append(i)
     return chosen
@@ -234,7 +238,7 @@ def _grid(
     delays: Array = np.zeros(1)
     levels: Array = np.zeros(1)
     if measured.time is not None:
-        shares = LATER if "time" in needed else LATER[:1]
+        shares = DELAYS if "time" in needed else DELAYS[:1]
         delays = np.ptp(measured.time) * (np.array(shares) + 1 / max(n - 1, 1))
     if measured.temperature is not None:
         of_all = [0.0, 0.5, 1.0] if "temperature" in needed else [0.5]

@@ -15,7 +15,7 @@ from scipy import special
 from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, suspects
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
-from accelstudy.campaign.calibration.assessment import SUSPECT
+from accelstudy.campaign.calibration.assessment import OUTLIER_LEVEL
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
@@ -447,7 +447,7 @@ class Diagnosis:
         if is_exact(base):
             return {}
         trusted = sigma_holds(self.problem, self.frame)
-        marked = suspects(base.model, base.approach, base.observed, SUSPECT, trusted)
+        marked = suspects(base.model, base.approach, base.observed, OUTLIER_LEVEL, trusted)
         return {int(self.campaign.positions[s.position]): s.p_value for s in marked}
 
     @cached_property

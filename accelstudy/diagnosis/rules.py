@@ -6,7 +6,7 @@ bumped position share it evenly. Each diagnosis.json quotes the rules that it wa
 
 from dataclasses import dataclass
 
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Rules:
     takes a part."""
     level_noise: float = 0.01
     """Family-wise level of all tests of the noise but that of its size."""
-    level_sigma: float = REFUTED
+    level_sigma: float = REFUTATION_LEVEL
     """Level of the test of the size of the noise, and of any fit that is accepted."""
     level_confirmed: float = 0.05
     """Probability that something is confirmed on held-out positions though nothing is missing."""

@@ -20,9 +20,9 @@ Array = NDArray[np.float64]
 
 POINTS = 121
 """Values of the coordinate in the table of a function."""
-FEW, APART = 3, 0.15
+MAX_PLACES, MIN_PLACE_DISTANCE = 3, 0.15
 """Places where a function is known least, and how far apart they are, in parts of the range."""
-KNOWN = 0.8
+MIN_SIGMA_SHARE = 0.8
 """Part of the largest sigma from which on a function is known least."""
 
 
@@ -117,9 +117,9 @@ def _left(frame: Frame, effect: Learned, variance: float) -> tuple[Array, Array]
 def _least_known(grid: Array, sigma: Array) -> tuple[float, ...]:
     """Places where a function is known least, in order."""
     places: list[float] = []
-    far = APART * (grid[-1] - grid[0])
+    far = MIN_PLACE_DISTANCE * (grid[-1] - grid[0])
     for i in np.argsort(-sigma, kind="stable"):
-        if len(places) == FEW or sigma[i] < KNOWN * sigma.max():
+        if len(places) == MAX_PLACES or sigma[i] < MIN_SIGMA_SHARE * sigma.max():
             break
         if all(abs(grid[i] - other) > far for other in places):
             places.append(float(grid[i]))

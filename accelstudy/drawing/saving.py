@@ -23,7 +23,7 @@ PAGE_DPI = 150
 """Dots per inch of the figures of a page, which shows them as SVG."""
 COMPRESSION = 4
 """Level of zlib. The default takes up to twice as long, and saves a twentieth."""
-MANY = 1000
+MAX_VECTOR_POINTS = 1000
 """An artist with more points or lines is drawn as an image inside of the SVG."""
 
 
@@ -93,8 +93,12 @@ def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
 def _simplify(figure: Figure) -> None:
     """Draw artists of very many points as images, or a page would have many megabytes."""
     drawn = [artist for axes in figure.axes for artist in (*axes.lines, *axes.collections)]
-    lines = [a for a in drawn if isinstance(a, Line2D) and np.size(a.get_xdata()) > MANY]
-    collections = [a for a in drawn if isinstance(a, LineCollection) and len(a.get_paths()) > MANY]
+    lines = [
+        a for a in drawn if isinstance(a, Line2D) and np.size(a.get_xdata()) > MAX_VECTOR_POINTS
+    ]
+    collections = [
+        a for a in drawn if isinstance(a, LineCollection) and len(a.get_paths()) > MAX_VECTOR_POINTS
+    ]
     for artist in (*lines, *collections):
         artist.set_rasterized(True)
     if lines or collections:

@@ -35,7 +35,7 @@ from accelstudy.symbolic.tracing import symbolic, symbols
 
 COURSES = ("slow change in time", "temperature")
 """Families of effects that change with time or temperature."""
-USUAL = (1e-4, 1e-3)
+USUAL_SHARES = (1e-4, 1e-3)
 """Parts of g by which an effect of typical size changes a reading."""
 
 Texts = list[str]
@@ -140,7 +140,7 @@ class Effect(WithSettings):
                 ),
             ]
             reach = max(reach, *(float(np.max(np.abs(part))) for part in added))
-        low, high = (part * g / reach if 0 < reach < np.inf else part for part in USUAL)
+        low, high = (part * g / reach if 0 < reach < np.inf else part for part in USUAL_SHARES)
         return low, high
 
     @property

@@ -4,7 +4,7 @@ from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 
-LEAST = 2
+MIN_HOLDS = 2
 """Holds on either side of a jump."""
 
 
@@ -27,7 +27,7 @@ class BiasJump(Effect):
 
     def candidates(self, hold, f, g):
         """Return times between the holds."""
-        return tuple(BiasJump(t=t) for t in step_times(hold.column("time"), LEAST))
+        return tuple(BiasJump(t=t) for t in step_times(hold.column("time"), MIN_HOLDS))
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""

@@ -13,7 +13,7 @@ from accelstudy.effects.lag import Course
 
 REFERENCE_TEMPERATURE = 20.0
 """°C, at which the bias and the scale are what their own parameters say."""
-STILL = 0.02
+MIN_STEP = 0.02
 """m/s², a change of force from hold to hold below this counts as noise and not as a step."""
 OF_ALL = ("course", "full_range")
 """Attributes of `HoldConditions` that are one for the whole session."""
@@ -68,7 +68,7 @@ class HoldConditions:
         These are the steps of forces (n, 3), m/s², and `order` unless it is known.
         """
         step = np.diff(forces, axis=0, prepend=forces[:1])
-        step = np.where(np.abs(step) < STILL, 0.0, step)
+        step = np.where(np.abs(step) < MIN_STEP, 0.0, step)
         order = self.order
         if order is None:
             order = np.arange(1.0, len(forces) + 1) if self.time is None else self.time

@@ -15,8 +15,8 @@ from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
 from accelstudy.effects.components import AXES, Number
 from accelstudy.effects.smooth import (
     EDGE,
+    MIN_LENGTHS,
     ORDERS,
-    WIDE,
     frequencies,
     harmonics,
     sines,
@@ -26,7 +26,7 @@ from accelstudy.effects.smooth import (
 Array = NDArray[np.float64]
 
 LEARNED = "learned"
-LEAST = 5e-3
+MIN_VARIANCE_SHARE = 5e-3
 """Share of the largest prior variance below which a function is left out."""
 
 UNITS = {
@@ -207,10 +207,10 @@ def _needed(coordinate: str, length: float) -> tuple[int, float]:
     """Number of sines, or of harmonics, that a length scale needs, and where sines vanish."""
     if coordinate in WAVES:
         return 1, EDGE
-    edge = max(EDGE, float(f"{WIDE * length:.3g}"))
+    edge = max(EDGE, float(f"{MIN_LENGTHS * length:.3g}"))
     omega = ORDERS if coordinate in ANGLES else frequencies(edge)
     density = spectrum(omega, length)
-    return int(np.count_nonzero(density >= LEAST * density[0])), edge
+    return int(np.count_nonzero(density >= MIN_VARIANCE_SHARE * density[0])), edge
 
 
 @cache

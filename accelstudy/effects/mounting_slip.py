@@ -4,7 +4,7 @@ from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, after, per_axis, register
 from accelstudy.effects.step_times import step_times, times_between
 
-LEAST = 3
+MIN_HOLDS = 3
 """Holds on either side of a slip: two hardly show a rotation."""
 
 
@@ -32,7 +32,7 @@ class MountingSlip(Effect):
 
     def candidates(self, hold, f, g):
         """Return times between the holds."""
-        return tuple(MountingSlip(t=t) for t in step_times(hold.column("order"), LEAST))
+        return tuple(MountingSlip(t=t) for t in step_times(hold.column("order"), MIN_HOLDS))
 
     def between(self, other, hold):
         """Return some times between those of two candidates."""

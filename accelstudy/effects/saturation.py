@@ -8,9 +8,9 @@ from accelstudy.effects.base import Effect, per_axis, register
 from accelstudy.effects.components import Number
 from accelstudy.effects.hold_conditions import HoldConditions
 
-FIRST = 0.25
+MIN_KNEE_SHARE = 0.25
 """Part of a stated range up to which a sensor certainly does not saturate."""
-ROUND = 0.005
+ROUND_WIDTH = 0.005
 """m/s² on either side of the knee over which it is round, as the noise of its samples makes that of
 a mean. At a sharp corner an adjustment may not settle."""
 
@@ -39,9 +39,9 @@ class Saturation(Effect):
         def excess(f_i: Number) -> Number:
             e = xp.abs(f_i) - self.settings["knee"]
             # Exactly zero below the knee, or an axis that never reaches it would seem to.
-            begun = (e + ROUND + xp.abs(e + ROUND)) / 2
-            near = (begun + 2 * ROUND - xp.abs(begun - 2 * ROUND)) / 2
-            return near**2 / (4 * ROUND) + (e - ROUND + xp.abs(e - ROUND)) / 2
+            begun = (e + ROUND_WIDTH + xp.abs(e + ROUND_WIDTH)) / 2
+            near = (begun + 2 * ROUND_WIDTH - xp.abs(begun - 2 * ROUND_WIDTH)) / 2
+            return near**2 / (4 * ROUND_WIDTH) + (e - ROUND_WIDTH + xp.abs(e - ROUND_WIDTH)) / 2
 
         return tuple(-k * xp.sign(f_i) * excess(f_i) for k, f_i in zip(p, f, strict=True))
 
@@ -55,4 +55,4 @@ class Saturation(Effect):
     def possible(self, hold: HoldConditions) -> bool:
         """Return whether the knee is within a stated range, and not far within it."""
         full, knee = hold.full_range, self.settings["knee"]
-        return full is None or FIRST * full <= knee <= full
+        return full is None or MIN_KNEE_SHARE * full <= knee <= full

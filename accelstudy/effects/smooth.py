@@ -23,7 +23,7 @@ HARMONICS = 4
 CYCLES = np.arange(1.0, 5.01, 0.25)
 """Cycles of a periodic function of time in a session."""
 
-WIDE = 3.2
+MIN_LENGTHS = 3.2
 """Length scales from the middle at which sines may vanish, so that they are a Gaussian process in
 all of the range (Riutort-Mayol et al. 2023, Stat. Comput. 33, 17)."""
 ORDERS = np.arange(1, HARMONICS + 1)

@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ALL = 100
+MAX_TIMES = 100
 """Number of times up to which all are tried."""
-SOME = 50
+FIRST_TIMES = 50
 """Of more times, number of those tried at first; times between them follow where it matters."""
-STEPS = 7
+NEXT_TIMES = 7
 """Number of times that are tried next between two of them."""
 
 
@@ -31,7 +31,7 @@ def times_between(low: float, high: float, when: Array) -> Array:
     left = middles[(middles > min(low, high)) & (middles < max(low, high))]
     if not len(left):
         return left
-    return left[np.unique(np.linspace(0, len(left) - 1, STEPS).round().astype(int))]
+    return left[np.unique(np.linspace(0, len(left) - 1, NEXT_TIMES).round().astype(int))]
 
 
 def _middles(when: Array, least: int) -> Array:
@@ -43,7 +43,7 @@ def _middles(when: Array, least: int) -> Array:
 
 def _spread(count: int) -> NDArray[np.int_]:
     """Indices of all middles or, of very many, of some, which lie closer together near the ends."""
-    if count <= ALL:
+    if count <= MAX_TIMES:
         return np.arange(count)
-    part = np.geomspace(1, (count + 1) / 2, SOME // 2) - 1
+    part = np.geomspace(1, (count + 1) / 2, FIRST_TIMES // 2) - 1
     return np.unique(np.concatenate([part, count - 1 - part]).round().astype(int))

@@ -33,13 +33,13 @@ POWER = 0.8
 """Probability with which a detectable change is found."""
 POINTS = 10
 """Binary logarithm of the number of variances that are tried for each estimated one."""
-SMALLEST = 1e-300
+MIN_PROBABILITY = 1e-300
 """Probability of which there is a logarithm."""
 MIDPOINTS = 200
 """Number of variances in the power of a test that has estimated one."""
-NEAR = 1e-7
+FREEDOM_TOLERANCE = 1e-7
 """Relative error of ν and of the quantile that it follows from."""
-ALIKE = 1e-9
+STATISTIC_TOLERANCE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
 
 
@@ -147,7 +147,7 @@ class Epochs:
     def _explains_most(self, left: Sequence[int]) -> int:
         """Place of the parameter without which the others are the most congruent."""
         rest = [np.sum(self.of([i for i in left if i != one])._split[0]) for one in left]
-        return first_best(rest, ALIKE * rest[0])
+        return first_best(rest, STATISTIC_TOLERANCE * rest[0])
 
 
 def noncentrality(p: int, nu: float, level: float = LEVEL) -> float:
@@ -192,7 +192,7 @@ def dof_of_squares(
     def too_often(log: float) -> float:
         """Log of the probability beyond a limit, in parts of the level."""
         beyond = np.mean(special.gammaincc(mean / scale / 2, np.exp(log) / scale / 2))
-        return float(np.log(max(beyond, SMALLEST) / level))
+        return float(np.log(max(beyond, MIN_PROBABILITY) / level))
 
     least = float(np.log(stats.chi2.isf(level, f)))
     if too_often(least) <= 0:
@@ -200,7 +200,7 @@ def dof_of_squares(
     most = least + 1
     while too_often(most) > 0:
         most += 2 * (most - least)
-    limit = np.exp(optimize.brentq(too_often, least, most, xtol=NEAR)) / f
+    limit = np.exp(optimize.brentq(too_often, least, most, xtol=FREEDOM_TOLERANCE)) / f
 
     def beyond_that(log: float) -> float:
         return float(np.log(special.fdtri(f, np.exp(log), 1 - level) / limit))
@@ -208,7 +208,7 @@ def dof_of_squares(
     fewest, many = np.log([max(0.1, min(dof) / 4), 1e9])
     if beyond_that(many) > 0:
         return np.inf
-    return float(np.exp(optimize.brentq(beyond_that, fewest, many, xtol=NEAR)))
+    return float(np.exp(optimize.brentq(beyond_that, fewest, many, xtol=FREEDOM_TOLERANCE)))
 
 
 @cache

@@ -37,9 +37,9 @@ Array = NDArray[np.float64]
 
 YEAR = 365.25 * 86400.0
 """s"""
-FEWEST = 3
+MIN_CALIBRATIONS = 3
 """Calibrations of which a line leaves a degree of freedom."""
-NOTHING = 1e-12
+MIN_DIFFERENCE = 1e-12
 """rad, difference that is rounding alone."""
 POSITIONS = 60
 """Attitudes of the calibration that leaves out effects."""
@@ -116,7 +116,9 @@ class History:
         hold = session_like(last, -forces / g).hold
         error = tilt_error(self.model, first, self.model, self.values[-1], forces, g, hold)
         by_chance = np.einsum("auw,uw->a", error.quadratic, self.change.covariance)
-        return np.sqrt([np.where(error.constant > NOTHING**2, error.constant, 0.0), by_chance])
+        return np.sqrt(
+            [np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0), by_chance]
+        )
 
     @cached_property
     def years(self) -> Array:
@@ -162,10 +164,10 @@ def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[dateti
         effect in common, or if their parameters do not mean the same because the readings were
         converted in another way. The line names the calibration by its number and its campaign.
     """
-    if len(calibrations) < FEWEST:
+    if len(calibrations) < MIN_CALIBRATIONS:
         raise InputError(
-            f"CALIBRATION: a history has {FEWEST} or more, not {len(calibrations)}; `compare` "
-            "takes two"
+            f"CALIBRATION: a history has {MIN_CALIBRATIONS} or more, not {len(calibrations)}; "
+            "`compare` takes two"
         )
     if len(set(dates)) < 2:
         raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")

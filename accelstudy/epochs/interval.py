@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 DRAWS = 4000
 SEED = 1
-LONGEST = 10.0
+MAX_YEARS = 10.0
 """Years beyond which nothing is promised."""
-SHOWN = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
+SHOWN_YEARS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 """Years at which errors are told."""
 
 
@@ -60,13 +60,13 @@ class Interval:
 
     @cached_property
     def years(self) -> float:
-        """Years until the error exceeds the accuracy; 0 if it does at once, at most `LONGEST`."""
+        """Years until the error exceeds the accuracy; 0 if it does at once, at most `MAX_YEARS`."""
         if self.error(0.0) > self.accuracy:
             return 0.0
-        steps = np.linspace(0.0, LONGEST, 201)
+        steps = np.linspace(0.0, MAX_YEARS, 201)
         too_large = [t for t in steps if self.error(t) > self.accuracy]
         if not too_large:
-            return LONGEST
+            return MAX_YEARS
         first = too_large[0]
         return float(
             optimize.brentq(lambda t: self.error(t) - self.accuracy, first - steps[1], first)

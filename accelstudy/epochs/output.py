@@ -21,7 +21,7 @@ from accelstudy.drawing.style import COLUMN, FULL, INK, group_colour, group_of, 
 from accelstudy.effects import Parameter
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.history import YEAR, History
-from accelstudy.epochs.interval import LONGEST, SHOWN, Interval
+from accelstudy.epochs.interval import MAX_YEARS, SHOWN_YEARS, Interval
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines, write_page
 
@@ -31,7 +31,7 @@ COLUMNS = 3
 """Panels side by side."""
 WRONG = "#C2247A"
 """Colour of what must not be exceeded."""
-GRID = 50
+LINE_POINTS = 50
 """Points of a line."""
 
 
@@ -174,7 +174,7 @@ def history_document(history: History, interval: Interval | None = None) -> dict
             "accuracy_mgon": interval.accuracy / MGON,
             "max_tilt_gon": interval.tilt_range / GON,
             "confidence": interval.confidence,
-            "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN],
+            "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN_YEARS],
         },
         "verdict": " ".join(history_said(h, interval)),
     }
@@ -304,8 +304,8 @@ def _draw_line(ax: Axes, history: History, k: int) -> None:
     """Draw the line of a parameter over time, with the band that holds 95 %."""
     parameter, course = history.parameters[k], history.courses[k]
     colour, unit = group_colour(group_of(parameter.name)), parameter.unit
-    years = np.linspace(history.years[0], 0.0, GRID)
-    design = np.column_stack([np.ones(GRID), years])
+    years = np.linspace(history.years[0], 0.0, LINE_POINTS)
+    design = np.column_stack([np.ones(LINE_POINTS), years])
     last = np.datetime64(history.dates[-1], "us")
     between = last + (years * YEAR * 1e6).astype("timedelta64[us]")
     line = to_display(design @ course.line.estimates, unit)
@@ -325,8 +325,8 @@ def interval_figure(interval: Interval) -> Figure:
     """Draw the tilt error that is not exceeded, over the time since the last calibration."""
     figure = new_figure(COLUMN, 55)
     ax = figure.subplots()
-    last = min(LONGEST, max(1.0, 1.5 * interval.years))
-    years = np.linspace(0.0, last, GRID)
+    last = min(MAX_YEARS, max(1.0, 1.5 * interval.years))
+    years = np.linspace(0.0, last, LINE_POINTS)
     error = to_display([interval.error(t) for t in years], "rad")
     ax.plot(years, error, color=INK)
     ax.axhline(float(error[0]), color=INK, linewidth=0.8, linestyle=":")

@@ -20,7 +20,7 @@ from accelstudy.basics.errors import InputError, printable_line, shown
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.wording import one_line
 
-LARGEST = 100_000_000
+MAX_BYTES = 100_000_000
 """Bytes of the largest text that is read as a whole, more than a campaign of 100 000 positions."""
 LARGEST_YAML = 1_000_000
 """Bytes of the largest YAML file: what people write, and what is slow to read."""
@@ -56,12 +56,12 @@ def read_text(path: str | Path, largest: int | None = None) -> str:
     Raises
     ------
     InputError
-        If it cannot be read, or has more than `largest` bytes, by default `LARGEST`, as a device
+        If it cannot be read, or has more than `largest` bytes, by default `MAX_BYTES`, as a device
         that never ends.
     UnicodeDecodeError
         If it is not UTF-8; the caller knows what it should be.
     """
-    largest = LARGEST if largest is None else largest
+    largest = MAX_BYTES if largest is None else largest
     with readable(path), Path(path).open("rb") as file:
         content = file.read(largest + 1)
     if len(content) > largest:

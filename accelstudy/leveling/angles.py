@@ -17,7 +17,7 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-CURVED = 0.2
+MAX_CURVATURE = 0.2
 """Size of the terms of second order, beside those of first order, beyond which standard deviations
 of roll and pitch do not hold. With equal noise on all axes it is nearer than 5 sigmas then."""
 
@@ -85,9 +85,9 @@ def near_pole(angles: ArrayLike, sigma: ArrayLike) -> NDArray[np.bool_]:
     σ_φ (1 ± σ_θ/δ). An error of the roll makes the distance longer by up to σ_φ² sin δ cos δ / 2,
     whatever its sign, and so the pitch smaller. For equal noise σ on all axes both terms, the
     second without its half and beside σ_θ, are σ/(g sin δ), the reciprocal of the distance in
-    sigmas. Up to `CURVED`, 93 to 97 % of the errors are below two standard deviations, where 95.4 %
-    are expected. That is over attitudes all around the pole, also for unequal noise, and it is what
-    simulations find (tests/leveling).
+    sigmas. Up to `MAX_CURVATURE`, 93 to 97 % of the errors are below two standard deviations, where
+    95.4 % are expected. That is over attitudes all around the pole, also for unequal noise, and it
+    is what simulations find (tests/leveling).
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def near_pole(angles: ArrayLike, sigma: ArrayLike) -> NDArray[np.bool_]:
     with np.errstate(divide="ignore", invalid="ignore"):
         on_roll = pitch / distance
         on_pitch = roll**2 * np.sin(distance) * np.cos(distance) / pitch
-    return (distance == 0) | (on_roll > CURVED) | (on_pitch > CURVED)
+    return (distance == 0) | (on_roll > MAX_CURVATURE) | (on_pitch > MAX_CURVATURE)
 
 
 def tilt_slope(

@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 LINEAR_UP_TO = 0.01
 """Sd of roll and pitch, rad, up to which linear theory gives their variance to 3e-4 of it. Beyond,
 near the roll pole, the shares are not defined."""
-NOTABLE = 0.01
+MIN_SHARE = 0.01
 """Share below which it does not matter which of two inputs is the larger."""
-TIED = 0.02
+SHARE_TOLERANCE = 0.02
 """Relative difference of two shares up to which they count as equal.
 
 With the sds of 100 000 calibrations the shares are uncertain by 0.6 %.
@@ -104,7 +104,7 @@ def overtaken(table: pd.DataFrame) -> pd.DataFrame:
     """Find the pairs of inputs whose order the correlations change.
 
     An input overtakes another if its Shapley effect is the larger of the two and its total effect
-    the smaller, by more than `TIED` either way, and one of the two shares is `NOTABLE`.
+    the smaller, by more than `SHARE_TOLERANCE` either way, and one of the shares is `MIN_SHARE`.
 
     Parameters
     ----------
@@ -119,9 +119,9 @@ def overtaken(table: pd.DataFrame) -> pd.DataFrame:
     labels = [c for c in ("analysis", "output", "roll_gon", "pitch_gon") if c in table]
     shares = ["input", "shapley_effect", "total_effect"]
     rows = table.loc[table["defined"].astype(bool), labels + shares]
-    rows = rows[rows[shares[1:]].max(axis=1) >= NOTABLE]
+    rows = rows[rows[shares[1:]].max(axis=1) >= MIN_SHARE]
     pairs = rows.merge(rows, on=labels, suffixes=("", "_over"))
-    factor = 1 + TIED
+    factor = 1 + SHARE_TOLERANCE
     now = pairs["shapley_effect"] > factor * pairs["shapley_effect_over"]
     before = factor * pairs["total_effect"] < pairs["total_effect_over"]
     pairs = pairs.loc[now & before, [*labels, "input", "input_over"]]

@@ -33,13 +33,13 @@ DRAWS = 1000
 """Sets of residuals without any effect, of each campaign."""
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
-SMALLEST = 1e-300
+MIN_VARIANCE = 1e-300
 """Variance that can be divided by."""
-NEAR = 0.3
+MAX_LOG_DIFFERENCE = 0.3
 """Largest difference of the logarithms of settings that are nearly the same."""
-LIKE = 0.2
+MAX_CONDITION_DIFFERENCE = 0.2
 """Largest difference of conditions that are the same, in parts of their range."""
-SAME = 0.15
+MAX_DIRECTION_DIFFERENCE = 0.15
 """Largest difference of the directions of forces in positions that are the same."""
 
 
@@ -84,7 +84,7 @@ class Shown:
         with np.errstate(divide="ignore", invalid="ignore"):
             apart = np.max(abs(np.nan_to_num(np.log(self.settings / settings))), axis=1)
         best = int(np.argmin(apart))
-        return best if apart[best] < NEAR else None
+        return best if apart[best] < MAX_LOG_DIFFERENCE else None
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ def sensor_evidence(
             one, other = effects
             pairs[one.name, other.name] = pair.log_density - nothing
             pair_specs[one.name, other.name] = one.spec, other.spec
-    of_unit_weight = max(problem.evidence.variance(float(z @ z)), SMALLEST)
+    of_unit_weight = max(problem.evidence.variance(float(z @ z)), MIN_VARIANCE)
     variance = of_unit_weight if noise is None else 1.0
     evidence = SensorEvidence(
         campaign=campaign.name,
@@ -336,10 +336,12 @@ def _alike(one: Campaign, other: Campaign) -> bool:
         return False
     for name in COLUMNS:
         column, its = getattr(one, name), getattr(other, name)
-        if column is not None and np.max(abs(its - column)) > LIKE * np.ptp(column):
+        if column is not None and np.max(abs(its - column)) > MAX_CONDITION_DIFFERENCE * np.ptp(
+            column
+        ):
             return False
     a, b = (c.forces / np.linalg.norm(c.forces, axis=1, keepdims=True) for c in (one, other))
-    return bool(np.max(abs(a - b)) < SAME)
+    return bool(np.max(abs(a - b)) < MAX_DIRECTION_DIFFERENCE)
 
 
 def called(place: tuple[str, str]) -> str:

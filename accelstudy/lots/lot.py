@@ -40,9 +40,9 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEFT = 0.01
+LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
-PASSES = 3
+MAX_PASSES = 3
 """Most times that what was found is added to the model."""
 
 
@@ -157,7 +157,7 @@ def weigh_lot(
         passes, whole = [sensors.weighed([model] * n, model, [None] * n)], model
         effects: list[tuple[Found, str | None]] = []
         new = _new(passes[-1], whole, effects)
-        for _ in range(PASSES):
+        for _ in range(MAX_PASSES):
             specs = passes[-1].specs(k for k, _ in new)
             effects += [(one, specs.get(k)) for k, one in new]
             whole = extended(whole, specs.values())
@@ -287,12 +287,12 @@ def _has(model: SensorModel, names: Sequence[str]) -> bool:
 def _explained(sensors: _Sensors, passes: Sequence[Pass], whole: SensorModel, known: int) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     now = passes[-1]
-    while (rest := now.without_odd()).p_value < LEFT:
+    while (rest := now.without_odd()).p_value < LEVEL_OF_REST:
         best = int(np.argmax(rest.given))
         spec = rest.specs([best])
         if is_noise(rest.classes[best][0]) or _has(whole, rest.classes[best]):
             return True
-        if not spec or known >= PASSES:
+        if not spec or known >= MAX_PASSES:
             return False
         whole, known = extended(whole, spec.values()), known + 1
         if (after := sensors.again(whole, passes)) is None:

@@ -34,19 +34,19 @@ from accelstudy.lots.sizes import OfType
 Array = NDArray[np.float64]
 Names = tuple[int, ...]
 
-ODD = 0.01
+PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""
-MISSING = 0.5
+PRIOR_MISSING = 0.5
 """Prior probability that the model of the lot lacks anything."""
-ALL = 0.5
+PRIOR_ALL = 0.5
 """Prior probability that all sensors have an effect of the lot."""
-ALIKE = 0.5
+PRIOR_EQUAL = 0.5
 """Prior probability that an effect is equally large in all sensors."""
-MORE = 0.3
+PRIOR_FURTHER = 0.3
 """Prior probability of two effects rather than one, and of three rather than two."""
-STRONGEST, FURTHER = 12, 3
+MAX_SINGLES, MAX_EXTENDED = 12, 3
 """Effects of which pairs are tried, and pairs to which a third one is added."""
-LEAST = 1e-6
+MIN_POSTERIOR = 1e-6
 """Posterior below which a set does not count."""
 NODES = {1: 64, 2: 24, 3: 12}
 """Nodes of the integral over each share below 1, by the number of effects."""
@@ -102,24 +102,26 @@ class Mixture:
         """Weigh the sets of effects, the strongest first."""
         empty = cls(odds, pairs, prior, common or {}, typical, [])
         k = odds.shape[1]
-        found: dict[Names, float] = {(): np.log(1 - MISSING) + empty._evidence(())}
+        found: dict[Names, float] = {(): np.log(1 - PRIOR_MISSING) + empty._evidence(())}
         for i in range(k):
-            weight = np.log(MISSING * (1 - MORE)) + np.log(prior[i])
+            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER)) + np.log(prior[i])
             found[(i,)] = weight + empty._evidence((i,))
-        singles = sorted(((i,) for i in range(k)), key=lambda s: -found[s])[:STRONGEST]
+        singles = sorted(((i,) for i in range(k)), key=lambda s: -found[s])[:MAX_SINGLES]
         strongest: list[Names] = [*singles]
         for size in (2, 3):
             tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
             if size == 2:
                 # What is small beside the strongest one may be nothing by itself.
-                first = strongest[:FURTHER]
+                first = strongest[:MAX_EXTENDED]
                 tried |= {tuple(sorted({*s, i})) for s in first for i in range(k) if i not in s}
             if not tried:
                 break
-            log = np.log(MISSING * MORE ** (size - 1)) - np.log(special.comb(k, size))
+            log = np.log(PRIOR_MISSING * PRIOR_FURTHER ** (size - 1)) - np.log(
+                special.comb(k, size)
+            )
             for names in sorted(tried):
                 found[names] = log + empty._evidence(names)
-            strongest = sorted(tried, key=lambda s: -found[s])[:FURTHER]
+            strongest = sorted(tried, key=lambda s: -found[s])[:MAX_EXTENDED]
         ordered = sorted(found.items(), key=lambda item: -item[1])
         return replace(empty, sets=[Weighted(n, float(w)) for n, w in ordered])
 
@@ -151,7 +153,7 @@ class Mixture:
         """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""
         grid, density = np.linspace(0, 1, 401), np.zeros(401)
         for one, p in zip(self.sets, self.probabilities, strict=True):
-            if k in one.names and p > LEAST:
+            if k in one.names and p > MIN_POSTERIOR:
                 nodes, weights = self._posterior(one.names)
                 # A mixture of narrow steps between the nodes of the integral.
                 place = one.names.index(k)
@@ -174,7 +176,7 @@ class Mixture:
         of_sets: dict[Names, Array] = {}
         odd = np.zeros(n)
         for one, p in zip(self.sets, self.probabilities, strict=True):
-            if p < LEAST:
+            if p < MIN_POSTERIOR:
                 continue
             of_set, odd_in_set = self.sensors_under(one.names)
             for subset, mass in of_set.items():
@@ -234,14 +236,14 @@ class Mixture:
         rho = np.meshgrid(*[_nodes(size)[0]] * size, indexing="ij") if size else []
         prior = {}
         for subset in (s for r in range(min(size, 2) + 1) for s in combinations(names, r)):
-            prior[subset] = np.full(nodes, np.log(1 - ODD))
+            prior[subset] = np.full(nodes, np.log(1 - PRIOR_ODD))
             for place, i in enumerate(names):
                 prior[subset] += np.log(rho[place]) if i in subset else _log_of_rest(rho[place])
         odds = {subset: odds_of(subset) for subset in prior}
         for first in range(0, len(self.odds), BLOCK):
             some = slice(first, first + BLOCK)
             parts = {s: odds[s][some].reshape(-1, *[1] * size) + prior[s] for s in prior}
-            strange = (np.log(ODD) + self._anything[some]).reshape(-1, *[1] * size)
+            strange = (np.log(PRIOR_ODD) + self._anything[some]).reshape(-1, *[1] * size)
             yield parts, np.broadcast_to(strange, (len(strange), *nodes))
 
     def _log_likelihood(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
@@ -260,7 +262,7 @@ class Mixture:
             alike = self.common[names]
         else:
             return own
-        return float(np.logaddexp(own + np.log(1 - ALIKE), alike + np.log(ALIKE)))
+        return float(np.logaddexp(own + np.log(1 - PRIOR_EQUAL), alike + np.log(PRIOR_EQUAL)))
 
     def _own_way(self, names: Names) -> float:
         """Log evidence with sizes of each sensor."""
@@ -298,7 +300,7 @@ def _nodes(size: int) -> tuple[Array, Array]:
     if not size:
         return np.zeros(0), np.zeros(0)
     nodes, weights = np.polynomial.legendre.leggauss(NODES[size])
-    return np.append((nodes + 1) / 2, 1.0), np.append((1 - ALL) * weights / 2, ALL)
+    return np.append((nodes + 1) / 2, 1.0), np.append((1 - PRIOR_ALL) * weights / 2, PRIOR_ALL)
 
 
 def _log_of_rest(share: Array) -> Array:

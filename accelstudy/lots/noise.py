@@ -31,17 +31,17 @@ LEAST_SIGMA = 1e-9
 """m/s², of readings that are their own model."""
 FREEDOMS = (RULES.freedom_given, 60.0, 20.0, 8.0, RULES.freedom_doubted)
 """ν of a lot, the most first; with the last one sensors have nothing in common."""
-ALIKE = 1.0
+MIN_LOG_RATIO = 1.0
 """Difference of log likelihoods that says nothing."""
 ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
-FEWEST = 3
+MIN_SENSORS = 3
 """Sensors that tell a noise in common."""
 STEP = 0.1
 """Of the logarithm of c² in the search for its most probable value: there may be several maxima."""
-AGREE = 0.02
+NOISE_TOLERANCE = 0.02
 """Relative change below which the noise of a lot is found."""
-REFITS = 8
+MAX_REFITS = 8
 """Most calibrations of all sensors for it."""
 
 
@@ -147,7 +147,7 @@ class Agreement:
             )
             found.append(cls(float(np.exp(best.x / 2)), freedom, -float(best.fun)))
         most = max(one.log_likelihood for one in found)
-        usual = next(one for one in found if one.log_likelihood > most - ALIKE)
+        usual = next(one for one in found if one.log_likelihood > most - MIN_LOG_RATIO)
         return replace(usual, log_likelihood=most)
 
 
@@ -171,7 +171,7 @@ def noises_of_lot(
         group = {
             i: fit for i, fit in enumerate(fits) if fit is not None and Source.of(fit) is source
         }
-        if len(group) < FEWEST:
+        if len(group) < MIN_SENSORS:
             continue
         agreement, said = _agreement(group, source, refit)
         if agreement.freedom > RULES.freedom_doubted:
@@ -201,17 +201,17 @@ def _agreement(
     fits = list(group.values())
     said = np.array([source.sigma(fit) for fit in fits])
     now, same = agreement(fits, said), agreement(fits, np.ones(len(fits)))
-    if same.log_likelihood > now.log_likelihood + ALIKE:
+    if same.log_likelihood > now.log_likelihood + MIN_LOG_RATIO:
         now, said = same, np.ones(len(fits))
     before = None
     beside = any(fit.solution.approach.uses_angles for fit in fits)
-    for _ in range(REFITS if beside else 0):
+    for _ in range(MAX_REFITS if beside else 0):
         factor = now.factor
         again = [refit(i, factor * u) for i, u in zip(group, said.tolist(), strict=True)]
         there = np.array([one is not None for one in again])
         now = agreement([one for one in again if one is not None], said[there])
         off = float(np.log(now.factor / factor))
-        if abs(off) < AGREE:
+        if abs(off) < NOISE_TOLERANCE:
             break
         step = off
         if before is not None and (off - before[1]) * (np.log(factor) - before[0]) < 0:

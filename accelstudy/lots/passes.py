@@ -33,16 +33,16 @@ LEVEL = 0.05
 its noise, and half by the noise of the lot."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
-FEW = 0.1
+MAX_ODD_SHARE = 0.1
 """Share of the sensors up to which what they have makes them odd, and is no matter of the type."""
-RIVAL = 0.02
+MIN_RIVAL = 0.02
 """Least posterior of what may be there in place of something else."""
-CERTAIN = 0.95
+MIN_CERTAIN = 0.95
 """Posterior from which on one name is told without those that it may be confused with."""
 UNTOLD, RESEMBLES = 6.0, 0.05
 """Noncentrality of what an effect leaves beside another one, absolute and as a share of its own, up
 to which they are told together: on average the right one is 0.95 probable then."""
-SETS = 12
+MAX_SETS = 12
 """Most probable sets of effects whose sizes are looked at."""
 EFFECT = "effect"
 WEIGHTS = {
@@ -56,9 +56,9 @@ WEIGHTS = {
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
 ODD = "odd"
 """Name of what a sensor has that the model and the other sensors have not."""
-NEVER = -30.0
+IMPOSSIBLE = -30.0
 """Log odds of what cannot be."""
-HAS = 0.5
+MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
 
@@ -123,7 +123,7 @@ class Pass:
     def mixture(self) -> Mixture:
         """Posterior of all sets of effects."""
         # One sensor alone never shows what has neither a name nor a shape.
-        unseen = [NEVER if members[0] == COMMON else 0.0 for members in self.classes]
+        unseen = [IMPOSSIBLE if members[0] == COMMON else 0.0 for members in self.classes]
         odds = [
             [
                 each.odds.get(members[0], no)
@@ -181,7 +181,7 @@ class Pass:
 
     def strongest(self) -> dict[frozenset[str], dict[str, str]]:
         """Return the most probable sets of effects and each of their effects, with best shapes."""
-        best = [one.names for one in self.mixture.sets[:SETS]]
+        best = [one.names for one in self.mixture.sets[:MAX_SETS]]
         sets = dict.fromkeys([*((k,) for names in best for k in names), *best])
         shapes = {}
         for names in sets:
@@ -241,9 +241,9 @@ class Pass:
             return []
         found, taken = [], set[int]()
         for k in np.argsort(-self.given, kind="stable").tolist():
-            if k in taken or self._rare[k] or self.given[k] < RIVAL:
+            if k in taken or self._rare[k] or self.given[k] < MIN_RIVAL:
                 continue
-            alike = [k] if self.given[k] >= CERTAIN else [k, *self._rivals(k)]
+            alike = [k] if self.given[k] >= MIN_CERTAIN else [k, *self._rivals(k)]
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
             if posterior >= RULES.sure:
                 taken.update(alike)
@@ -259,7 +259,7 @@ class Pass:
         if names is None or of_type is None or self.sizes is None:
             return []
         rivals = []
-        for j in np.flatnonzero(self.given >= RIVAL).tolist():
+        for j in np.flatnonzero(self.given >= MIN_RIVAL).tolist():
             if j in names or not (spec := self._shapes((j,))):
                 continue
             left, whole = self.sizes.apart(self._shapes(names), of_type, names.index(k), *spec)
@@ -276,13 +276,13 @@ class Pass:
     def _rare(self) -> NDArray[np.bool_]:
         """Whether few sensors have it, if it is one of the lot, (K,)."""
         of = np.maximum(self.mixture.of_effects, 1e-300)
-        surely = [np.sum(self.mixture.having(k) > HAS * of[k]) for k in range(len(of))]
+        surely = [np.sum(self.mixture.having(k) > MIN_HAVING * of[k]) for k in range(len(of))]
         return np.array(surely) <= self._few
 
     @property
     def _few(self) -> float:
         """Sensors up to which what they have makes them odd."""
-        return max(1, FEW * len(self.sensors))
+        return max(1, MAX_ODD_SHARE * len(self.sensors))
 
     @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:

@@ -30,7 +30,7 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-FEWEST = 2
+MIN_SENSORS = 2
 """Sensors of the smallest lot."""
 
 
@@ -72,7 +72,7 @@ def evaluate_lot(
             usable.append(campaign)
         except InputError as error:
             without[campaign.name] = str(error)
-    if len(usable) < FEWEST:
+    if len(usable) < MIN_SENSORS:
         why = next(iter(without.values()), "")
         raise InputError(why or "a lot has two sensors or more; `diagnose` takes one")
     for name, why in without.items():

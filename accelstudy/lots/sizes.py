@@ -37,11 +37,11 @@ SCATTERS = (0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size."""
 SHARES = (0.9, 0.35)
 """ρ from which the search begins, for each effect."""
-ENOUGH = 20
+MIN_FREEDOM = 20
 """Degrees of freedom that tell the noise."""
-STEPS = 60
+MAX_STEPS = 60
 """Most steps of the search for μ and ρ."""
-SETTLED = 1e-3
+LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which they are found."""
 
 
@@ -198,7 +198,7 @@ class TypeSizes:
             b = self.right[:, at]
             part = float(np.einsum("nk,nkl,nl->", b, inverse, b))
             rank = float(np.einsum("nkl,nlk->", inverse, self.normal[:, at[:, None], at]))
-            if redundancy - rank >= ENOUGH:
+            if redundancy - rank >= MIN_FREEDOM:
                 left.append((squares - part) / (redundancy - rank))
         return max(min(left), 1e-12)
 
@@ -292,7 +292,7 @@ class _Search:
     ) -> tuple[float, list[Array], Array, Array]:
         """Log likelihood, odds of each subset (n,), sizes and shares, from given ones on."""
         before, odds = -np.inf, list[Array]()
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             variances = np.array([
                 max(scatter**2 * float(np.mean(mean[self.of == k] ** 2)), 1e-12)
                 for k in range(len(self.counts))
@@ -315,7 +315,7 @@ class _Search:
             prior = np.where(self.has, np.log(shares), np.log1p(-shares)).sum(axis=1)
             logs = np.array([0 * odds[0], *odds]) + prior[:, None]
             total = np.logaddexp.reduce(logs)
-            if (now := float(total[self.usual].sum())) < before + SETTLED:
+            if (now := float(total[self.usual].sum())) < before + LIKELIHOOD_TOLERANCE:
                 break
             before = now
             weights = np.zeros((len(self.subsets), len(total)))

@@ -23,7 +23,7 @@ SHEET = {
     "thermal_scale": "scale_per_kelvin",
 }
 """Quantities of a data sheet, by the effect whose parameters are of that size."""
-BOUND = 0.9
+BOUND_PROBABILITY = 0.9
 """Probability with which the scatter is below its bound."""
 
 
@@ -80,7 +80,7 @@ def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalPara
     having = 0 if parameter.of_type is None else len(parameter.of_type.values)
     if not having:  # the campaigns of the other sensors tell of it
         parameter = replace(parameter, has=parameter.usual)
-    _, below = parameter.scatter_interval(2 * BOUND - 1)
+    _, below = parameter.scatter_interval(2 * BOUND_PROBABILITY - 1)
     return TypicalParameter(
         mean=parameter.mean,
         sigma=parameter.sigma,

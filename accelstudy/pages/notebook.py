@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-ROWS = 12
+MAX_ROWS = 12
 """Rows up to which all are shown; of more, the first and the last."""
 
 
@@ -18,6 +18,6 @@ def notebook_html(title: str, sentence: str, table: pd.DataFrame) -> str:
     if table.index.names != [None]:
         table = table.reset_index()
     rows = table.to_html(
-        border=0, index=False, float_format="{:.4g}".format, na_rep="–", max_rows=ROWS
+        border=0, index=False, float_format="{:.4g}".format, na_rep="–", max_rows=MAX_ROWS
     )
     return f"<p><b>{escape(title)}</b>: {escape(sentence)}</p>{rows}"

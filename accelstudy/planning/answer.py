@@ -11,13 +11,13 @@ from accelstudy.planning.optimised import Sought, by_time, cheapest, effort
 from accelstudy.planning.question import ROBOT, Question
 from accelstudy.planning.simulated import Simulated, simulate, study_of
 
-SHOWN = 8
+MAX_SHOWN = 8
 """Candidates in the table."""
-SIMULATED = 5
+MAX_SIMULATED = 5
 """Candidates that are simulated."""
 OTHER_CONFIDENCE = 0.95
 """Share of the calibrations that the plan also quotes if the user asked for the rms."""
-TRIES = 12
+MAX_TRIES = 12
 """Candidates of one kind that are simulated until one reaches the target."""
 
 
@@ -99,7 +99,7 @@ def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     in_front = _in_front(by_time(c for c in quickest if c is not None))
     for candidate in track(in_front, "simulated calibrations"):
         checked = [r.candidate.equipment.name for r in ranked if r.simulated]
-        if len(checked) >= SIMULATED and candidate.equipment.name in checked:
+        if len(checked) >= MAX_SIMULATED and candidate.equipment.name in checked:
             ranked.append(Ranked(candidate))
         elif good := simulation.confirmed(candidate, candidate.equipment.name not in checked):
             ranked.append(good)
@@ -141,7 +141,7 @@ def _shown(ranked: list[Ranked]) -> list[Ranked]:
     """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
     ranked = sorted(ranked, key=lambda r: effort(r.candidate))
     others = [r for r in ranked if r.simulated is None]
-    left_out = others[max(0, SHOWN - len(ranked) + len(others)) :]
+    left_out = others[max(0, MAX_SHOWN - len(ranked) + len(others)) :]
     return [r for r in ranked if r not in left_out]
 
 
@@ -196,7 +196,7 @@ class Simulation:
         n, target = candidate.scheme.n_positions, self.question.target
         sought = Sought(self.question, candidate.equipment, candidate.model.name, candidate.hold)
         reached, missed = None, None
-        for _ in range(TRIES):
+        for _ in range(MAX_TRIES):
             tried = candidate if n == candidate.scheme.n_positions else sought.candidate(n)
             if tried is None:
                 break

@@ -25,11 +25,11 @@ from accelstudy.simulation.sessions import Noise
 
 STARTS = 1
 """Random sets from which a search starts; more find designs that are better by 0.1 % at most."""
-USUALLY, AT_LEAST = 0.6, 0.4
+USUAL_SHARE, MIN_SHARE = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
-REFINED = 0.95
+REFINED_SHARE = 0.95
 """About as many of refined positions suffice as of others."""
-SURE = 0.99
+SURE_PROBABILITY = 0.99
 """Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
 
@@ -109,9 +109,9 @@ class Sought:
                     low = n
                 else:
                     high, found = n, candidate
-                    if SURE * share * math.sqrt(n / max(n - 1, 0.5)) > 1:
+                    if SURE_PROBABILITY * share * math.sqrt(n / max(n - 1, 0.5)) > 1:
                         break
-            needed *= REFINED
+            needed *= REFINED_SHARE
             if needed > self.most:
                 return None
         return found
@@ -140,7 +140,9 @@ def cheapest(
     for (model, hold), c in first.items():
         sought = Sought(question, c.equipment, model, hold)
         n = c.scheme.n_positions * (c.accuracy(confidence) / question.target) ** 2
-        likely, least = (max(sought.least, math.ceil(part * n)) for part in (USUALLY, AT_LEAST))
+        likely, least = (
+            max(sought.least, math.ceil(part * n)) for part in (USUAL_SHARE, MIN_SHARE)
+        )
         hopes.append((c.equipment.seconds(likely, hold), least, likely, sought))
     for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
         assert best is not None

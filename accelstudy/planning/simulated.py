@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 SIGNS = (1.0, -1.0, 1.0)
 """Signs of the parameters of the three axes of the simulated sensor; all have the usual size."""
 BOTH = TILTS[-1]
-USUAL = (0.025, 0.95, 0.975)
+QUOTED_SHARES = (0.025, 0.95, 0.975)
 """Shares of the calibrations that a plan quotes."""
-ALWAYS = ("bias", "scale", "nonorthogonality")
+BASE_EFFECTS = ("bias", "scale", "nonorthogonality")
 """Effects that every simulated sensor has."""
 
 
@@ -91,7 +91,7 @@ def study_of(
     """
     sigma = chosen[0].sigma
     planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
-    sensor = {effect: _quantity(question, effect) for effect in (*ALWAYS, *planned)}
+    sensor = {effect: _quantity(question, effect) for effect in (*BASE_EFFECTS, *planned)}
     names = [candidate.scheme.name for candidate in chosen if is_best(candidate.scheme)]
     of_files = {name: held(name) for name in names}
     has = [effect for effect in planned if any(sensor[effect]["value"])]
@@ -106,7 +106,7 @@ def study_of(
             "effects": [],
         },
         "sensor": sensor,
-        "simulated_effects": [*ALWAYS, *has],
+        "simulated_effects": [*BASE_EFFECTS, *has],
         **({"schemes": of_files} if of_files else {}),
         "leveling": {"max_tilt_gon": _tidy(question.tilt_range / GON), "attitudes": ATTITUDES},
         "presets": None,
@@ -132,7 +132,7 @@ def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simul
     and at the `levels`.
     """
     study = parse_study(config)
-    leveling, shares = study.leveling.model_dump(), np.unique([*USUAL, *levels])
+    leveling, shares = study.leveling.model_dump(), np.unique([*QUOTED_SHARES, *levels])
     by_cell: dict[str, Simulated] = {}
     order = []
     for grid in config["grids"]:

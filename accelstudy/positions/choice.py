@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-TIED = 1e-9
+CRITERION_TOLERANCE = 1e-9
 """Difference up to which two values are equal, of criteria that are logarithms."""
 
 
-def first_best(values: ArrayLike, tied: float = TIED) -> int:
+def first_best(values: ArrayLike, tied: float = CRITERION_TOLERANCE) -> int:
     """Index of the first value that is as small as the smallest one; NaN is no value.
 
     On another processor the last digits of a number differ. Of candidates that are equally good,
@@ -17,7 +17,7 @@ def first_best(values: ArrayLike, tied: float = TIED) -> int:
     return int(np.flatnonzero(values <= np.fmin.reduce(values) + tied)[0])
 
 
-def in_order(values: ArrayLike, tied: float = TIED) -> NDArray[np.int_]:
+def in_order(values: ArrayLike, tied: float = CRITERION_TOLERANCE) -> NDArray[np.int_]:
     """Indices from the smallest value to the largest; those of equal values as they stand."""
     values = np.asarray(values)
     order = np.argsort(values, kind="stable")

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 REFERENCE = "mclaren-24"
 PLACEMENT = np.radians(5.0)
 """rad, sd about each of two axes by which a block held by hand misses its attitude."""
-PLACED = 200
+MISPLACED_SETS = 200
 """Number of simulated sets of misplaced positions."""
 
 
@@ -90,8 +90,10 @@ class Proposal:
         """Rms of roll and of pitch, (2,), if a hand misses the attitudes; None without a hand."""
         if self.request.attitudes != "hand":
             return None
-        rng = np.random.default_rng(np.random.SeedSequence([self.request.seed, PLACED]))
-        missed = self.directions + PLACEMENT * rng.standard_normal((PLACED, *self.directions.shape))
+        rng = np.random.default_rng(np.random.SeedSequence([self.request.seed, MISPLACED_SETS]))
+        missed = self.directions + PLACEMENT * rng.standard_normal(
+            (MISPLACED_SETS, *self.directions.shape)
+        )
         missed /= np.linalg.norm(missed, axis=2, keepdims=True)
         squares = [self.request.task.rms_tilt(directions) ** 2 for directions in missed]
         return np.sqrt(np.mean(squares, axis=0))
@@ -161,7 +163,7 @@ def _brief(value: float) -> float:
 Order = NDArray[np.int_]
 
 TOURS = 12
-LONGER = 1.15
+MAX_TOUR_RATIO = 1.15
 """Length, relative to the shortest tour found, up to which a tour that separates drifts better is
 taken."""
 
@@ -189,7 +191,7 @@ def field_order(task: Task, directions: Array, groups: Order | None = None) -> O
     for _ in range(TOURS):
         parts = [_round_trip(angles, rng.permutation(group)) for group in members]
         trips.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
-    longest = LONGER * min(length for length, _ in trips) + 1e-9
+    longest = MAX_TOUR_RATIO * min(length for length, _ in trips) + 1e-9
     turns = range(len(directions) if len(members) == 1 else 1)
     near = [[np.roll(tour, turn) for turn in turns] for length, tour in trips if length <= longest]
     shown = np.concatenate([_drift_shown(task, directions[tours]) for tours in near])

@@ -12,7 +12,7 @@ from accelstudy.basics.units import SENSOR_UNITS, UNITS
 
 Array = NDArray[np.float64]
 
-LARGEST = 1e15
+MAX_VALUE = 1e15
 """No acceleration or time is larger, and squares of larger numbers overflow."""
 
 
@@ -63,10 +63,10 @@ def conversion_of(
         if scale is None:
             raise InputError("unit counts needs a nominal scale, in m/s² per count")
         factor = _triple(scale, "scale")
-        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= LARGEST)):
+        if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= MAX_VALUE)):
             raise InputError("scale: must not be 0, and must be finite")
         zero = _triple(0.0 if offset is None else offset, "offset")
-        if not np.all(np.abs(zero) <= LARGEST):
+        if not np.all(np.abs(zero) <= MAX_VALUE):
             raise InputError("offset: must be finite")
         return Conversion(factor, zero)
     if scale is not None or offset is not None:

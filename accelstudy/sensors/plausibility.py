@@ -16,9 +16,9 @@ from accelstudy.effects import Effect, get_effect
 
 Array = NDArray[np.float64]
 
-FACTOR = 20.0
+MAX_FACTOR = 20.0
 """A parameter is implausible beyond so many times the typical size of cheap equipment."""
-CLEARLY = 3.0
+MIN_SIGMAS = 3.0
 """Standard deviations by which an estimate must be beyond its bound."""
 LARGEST = {
     "bias": 0.3 * STANDARD_GRAVITY,
@@ -40,13 +40,13 @@ USUAL_CAUSE = (
 def largest(effect: Effect) -> float:
     """Largest plausible size of a parameter of an effect, SI; infinite if nothing is known.
 
-    It is `FACTOR` times the size that the catalogue calls typical of cheap equipment.
+    It is `MAX_FACTOR` times the size that the catalogue calls typical of cheap equipment.
     """
     if effect.name in LARGEST:
         return LARGEST[effect.name]
     if isinstance(type(effect).typical, property):  # not stated: a default
         return np.inf
-    return FACTOR * float(effect.typical[1])
+    return MAX_FACTOR * float(effect.typical[1])
 
 
 def largest_tilt() -> float:
@@ -59,7 +59,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
 
     So does each that is beyond the bounds that physics sets. A large estimate that the positions
     hardly determine says nothing of the sensor, so it counts only if it is beyond the bound by
-    `CLEARLY` of its standard deviations.
+    `MIN_SIGMAS` of its standard deviations.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def implausible_parameters(effects: Sequence[Effect], parameters: Array, sigma: 
     parameters, sigma : (u,) arrays, SI, in the order of the effects; an unknown sigma (NaN)
         counts as 0
     """
-    doubt = CLEARLY * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
+    doubt = MIN_SIGMAS * np.nan_to_num(np.asarray(sigma, dtype=float), posinf=0.0)
     values = iter(zip(np.asarray(parameters, dtype=float), doubt, strict=True))
     descriptions = impossible_parameters(effects, parameters, sigma)
     for effect in effects:
@@ -90,7 +90,7 @@ def impossible_parameters(effects: Sequence[Effect], parameters: Array, sigma: A
     ----------
     effects, parameters, sigma : as of `implausible_parameters`
     """
-    values = iter(zip(parameters, CLEARLY * np.nan_to_num(sigma, posinf=0.0), strict=True))
+    values = iter(zip(parameters, MIN_SIGMAS * np.nan_to_num(sigma, posinf=0.0), strict=True))
     descriptions = []
     for effect in effects:
         low, high = effect.bounds

@@ -36,7 +36,7 @@ from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-KNOWN = 0.5
+KNOWN_RATIO = 0.5
 """Ratio of sigma to the typical size of a parameter, up to which it counts as known at all."""
 CONDITIONS = {"time", "temperature", "vibration"}
 """Columns of the holds that change by themselves from position to position."""
@@ -231,7 +231,7 @@ def _undetermined(
     sizes = typical_sizes(model, len(information))
     covariance = np.linalg.inv(information + np.diag(sizes**-2.0))
     sigma = np.sqrt(np.diag(covariance))[: len(names)]
-    vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN * size]
+    vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN_RATIO * size]
     if vague or not campaign.n_positions:
         return tuple(vague)
     theory = campaign_estimability(campaign, model, approach, sigma_to_show_above(campaign))

@@ -34,17 +34,17 @@ from accelstudy.sequential.promise import Promise, rms_of
 
 Array = NDArray[np.float64]
 
-ALIKE = 0.99
+EQUAL_GAIN = 0.99
 """Candidates whose gain is above this fraction of the largest are equally good, and the first is
 taken. So neither rounding nor noise decides, and simple attitudes can come first."""
-MOST = 500
+MAX_FORECAST = 500
 """Largest number of further positions that is forecast."""
-STEP = 25 * GON
+GRID_STEP = 25 * GON
 """Step of roll and pitch in the grid."""
 SETS = {"cube": "faces, edges and corners of a cube", "grid": "roll and pitch in steps of 25 gon"}
 DEFAULTS = {"gravity": "cube", "robot": "grid"}
 """Default set of attitudes of an approach: a block on a table, a grid for a robot."""
-SAME = 5 * GON
+SAME_ATTITUDE = 5 * GON
 """A position within this angle of another counts as the same attitude."""
 
 
@@ -71,7 +71,7 @@ def candidates(
     if name == "cube":
         directions = cube().directions(0)
     elif name == "grid":
-        directions = by_eye(STEP).directions(0)
+        directions = by_eye(GRID_STEP).directions(0)
     elif name.endswith(".csv"):
         directions = listed_in(Path(name)).directions(0)
     else:
@@ -90,7 +90,7 @@ def apart_from(directions: Array, last: Array) -> NDArray[np.bool_]:
 
     To repeat an attitude at once would repeat its errors too.
     """
-    return np.asarray(last @ directions.T < np.cos(SAME))
+    return np.asarray(last @ directions.T < np.cos(SAME_ATTITUDE))
 
 
 def typical_sizes(model: SensorModel, unknowns: int) -> Array:
@@ -123,7 +123,7 @@ def gains(cofactors: Array, rows: Array, weight: Array | None = None) -> Array:
 
 def best(gains: Array) -> NDArray[np.int_]:
     """First candidate of each session (R,) whose gain, of (R, k), is as good as the best."""
-    return np.asarray(np.argmax(gains >= ALIKE * gains.max(axis=1, keepdims=True), axis=1))
+    return np.asarray(np.argmax(gains >= EQUAL_GAIN * gains.max(axis=1, keepdims=True), axis=1))
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class Chooser:
     def positions_to_go(
         self, so_far: Estimate, variance: float, rms: Array, last: Array | None
     ) -> int | None:
-        """Positions, each the best next one, until the promise is kept; None beyond `MOST`.
+        """Positions, each the best next one, until the promise is kept; None beyond `MAX_FORECAST`.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Chooser:
         """
         information, solved, rms = so_far.information, so_far.solved, rms[None]
         last = None if last is None else last[None]
-        for n in range(1, MOST + 1):
+        for n in range(1, MAX_FORECAST + 1):
             chosen = self.choose(information, solved, rms, last)
             last, rows = self.directions[chosen], self.rows[chosen]
             information = information + np.swapaxes(rows, 1, 2) @ rows

@@ -22,7 +22,7 @@ from accelstudy.campaign.header import HEADER, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
 
-SETTLED = 3
+MIN_LOOKS = 3
 """Number of looks after which a last line without an end is taken, as editors may leave it out."""
 
 
@@ -130,7 +130,7 @@ class Watch:
         files = b"".join(path.read_bytes() for path in _files(self.folder))
         self._rested = self._rested + 1 if files == self._files else 0
         self._files, first_look = files, self._count < 0
-        if self._rested not in (0, SETTLED):
+        if self._rested not in (0, MIN_LOOKS):
             return
         try:
             now = read_running(self.folder, settled=self._rested > 0)

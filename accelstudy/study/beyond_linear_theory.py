@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from accelstudy.study.config import Study
 
-OFF = 0.01
+MIN_NONLINEAR_SHARE = 0.01
 """Share of the variance from which linear theory counts as off."""
 
 
@@ -62,4 +62,4 @@ def noise_when_off(noise: Any, excess: Any) -> Any:
     All other noise grows in proportion. It is infinite where there is no excess.
     """
     with np.errstate(divide="ignore"):
-        return noise * np.sqrt(OFF / np.asarray(excess))
+        return noise * np.sqrt(MIN_NONLINEAR_SHARE / np.asarray(excess))

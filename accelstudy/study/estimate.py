@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LEAST = 20
+MIN_REPLICATES = 20
 """Replicates from which on a coefficient is estimated; fewer are only averaged."""
-INFLUENCES = 10_000
+MAX_INFLUENCES = 10_000
 """Replicates, the first ones, whose influences tell β and the standard error: to one percent."""
 HIGHEST_LEVERAGE = 0.9
 ROUNDING = 1e-12
@@ -144,13 +144,13 @@ def controlled(
     Estimates, (m,)
     """
     good = np.ones(len(own), bool) if converged is None else converged
-    n, some = len(good), good[:INFLUENCES]
+    n, some = len(good), good[:MAX_INFLUENCES]
     with np.errstate(divide="ignore", invalid="ignore"):
         plain = statistic.value(own)
         x = np.zeros((len(some), len(plain)))
         x[some] = statistic.influence(own[: some.sum()], plain) / some.mean()
         alone = _sd(x) / np.sqrt(n)
-        if theory is None or n < LEAST:
+        if theory is None or n < MIN_REPLICATES:
             return Estimates(plain, alone, np.ones_like(plain), plain)
         expected = statistic.value(theory)
         y = statistic.influence(theory[: len(some)], expected)

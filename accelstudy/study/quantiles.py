@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.study.estimate import LEAST, Estimates
+from accelstudy.study.estimate import MIN_REPLICATES, Estimates
 
 Array = NDArray[np.float64]
 
@@ -20,9 +20,9 @@ PROBABILITIES = np.array([*LOWER, 0.5, *(1 - p for p in reversed(LOWER))])
 """Probabilities of the quantiles of a study."""
 MEAN_OF_NORMAL = float(np.sqrt(2 / np.pi))
 """Mean absolute value of a standard normal variable."""
-ENOUGH = 10
+MIN_DIFFERENCES = 10
 """Differences from which an sd is taken."""
-SOME = 100_000
+DIFFERENCE_REPLICATES = 100_000
 """Replicates, the first ones, whose differences tell how far the two are apart."""
 
 
@@ -60,13 +60,13 @@ def controlled_quantiles(
     plain, low, high = _sample_quantiles(own, [p, p - wide, p + wide])
     slope = (high - low) / (2 * wide)
     # Too few values have no density: their error is unknown.
-    variance = p * (1 - p) / count * (slope**2 if count >= LEAST else np.nan)
-    if count < LEAST or theory is None or known is None or not np.isfinite(known).all():
+    variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
+    if count < MIN_REPLICATES or theory is None or known is None or not np.isfinite(known).all():
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
     paired = theory if converged is None else theory[converged]
     failed = len(theory) - count
     linear, low, high = _sample_quantiles(theory, [p, p - wide, p + wide])
-    sd = _sd_near((own - paired)[:SOME], paired[:SOME], p, wide)
+    sd = _sd_near((own - paired)[:DIFFERENCE_REPLICATES], paired[:DIFFERENCE_REPLICATES], p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
         # Share of the replicates that only one of the two has below its quantile.
         apart = MEAN_OF_NORMAL * sd / slope + failed / len(theory)
@@ -112,9 +112,9 @@ def _sd_near(differences: Array, theory: Array, p: Array, wide: Array) -> Array:
     n = len(theory)
     ordered = (differences - differences.mean())[np.argsort(theory)]
     sums = np.vstack([np.zeros(2), np.cumsum([ordered, ordered**2], axis=1).T])
-    half = np.maximum(wide * n, ENOUGH / 2)
-    first = np.clip(np.floor(p * n - half), 0, n - ENOUGH).astype(int)
-    last = np.clip(np.ceil(p * n + half), first + ENOUGH, n).astype(int)
+    half = np.maximum(wide * n, MIN_DIFFERENCES / 2)
+    first = np.clip(np.floor(p * n - half), 0, n - MIN_DIFFERENCES).astype(int)
+    last = np.clip(np.ceil(p * n + half), first + MIN_DIFFERENCES, n).astype(int)
     total, square = (sums[last] - sums[first]).T
     count = last - first
     return np.sqrt(np.maximum(square - total**2 / count, 0.0) / (count - 1))

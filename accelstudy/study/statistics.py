@@ -16,8 +16,8 @@ from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import (
     CORRELATION,
-    LEAST,
     MEAN,
+    MIN_REPLICATES,
     RATIO,
     ROOT_MEAN,
     SD,
@@ -96,7 +96,7 @@ class CellStatistics:
     @property
     def control(self) -> str:
         """Which control variate the estimates have: `linear` or `none`."""
-        if self.replicates is None or self.simulated < LEAST:
+        if self.replicates is None or self.simulated < MIN_REPLICATES:
             return "none"
         return "none" if np.isnan(self.replicates.linear.omega).any() else "linear"
 

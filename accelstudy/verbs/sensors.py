@@ -152,11 +152,11 @@ def lot(
     """
     from accelstudy.api.calibrations import as_campaign, chosen
     from accelstudy.api.lots import Lot
-    from accelstudy.lots.run import FEWEST, evaluate_lot
+    from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
 
     given = [one for each in campaigns for one in folders_of(each)]
     _once(paths(given), "sensor")
-    if len(given) < FEWEST:
+    if len(given) < MIN_SENSORS:
         raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
     measured = [as_campaign(one) for one in given]
     return Lot(evaluate_lot(measured, *chosen(model, approach), seed, cores))

@@ -112,9 +112,9 @@ def test_variance_components_solve_their_equations_with_whole_matrices(sigma_gra
 @BOTH
 def test_predictions_by_derivatives_are_those_of_refits(approach, monkeypatch):
     """From so many positions on, one changes next to nothing by second order."""
-    observed = draw(3, f"fibonacci-{prediction.REFITTED}", noise=Noise(sigma_gravity=1e-3))
+    observed = draw(3, f"fibonacci-{prediction.MAX_REFITS}", noise=Noise(sigma_gravity=1e-3))
     refitted = held_out(NINE, approach, observed)
-    monkeypatch.setattr(prediction, "REFITTED", 10)
+    monkeypatch.setattr(prediction, "MAX_REFITS", 10)
     derived = held_out(NINE, approach, observed)
     np.testing.assert_allclose(derived.misclosures, refitted.misclosures, rtol=0, atol=2e-4 * SIGMA)
     np.testing.assert_allclose(derived.cofactors, refitted.cofactors, rtol=0, atol=5e-4 * SIGMA**2)

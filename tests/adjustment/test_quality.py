@@ -38,7 +38,7 @@ from accelstudy.adjustment.quality import (
     suspects,
 )
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.leveling.error import cap_forces
@@ -85,7 +85,8 @@ def test_the_global_test_is_two_sided_and_uniform(approach):
     p = [t.p_value for t in tests]
     assert kstest(p, "uniform").pvalue > 1e-4
     assert np.mean([not t.accepted for t in tests]) == pytest.approx(
-        REFUTED, abs=STANDARD_ERRORS * math.sqrt(REFUTED * (1 - REFUTED) / 2000)
+        REFUTATION_LEVEL,
+        abs=STANDARD_ERRORS * math.sqrt(REFUTATION_LEVEL * (1 - REFUTATION_LEVEL) / 2000),
     )
 
 

@@ -29,7 +29,7 @@ def test_an_error_of_the_disk_names_the_file(read, tmp_path):
 
 @pytest.mark.parametrize("read", [read_layer, read_calibration])
 def test_a_device_that_never_ends_is_refused(read, monkeypatch):
-    for name in ("LARGEST", "LARGEST_YAML"):
+    for name in ("MAX_BYTES", "LARGEST_YAML"):
         monkeypatch.setattr(reading, name, 3_000_000)
     with pytest.raises(InputError, match=r"^/dev/zero: larger than 3 MB; is"):
         read("/dev/zero")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
 
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
@@ -82,8 +82,8 @@ def test_a_diagnosis_decides_at_the_levels(monkeypatch, known, level):
     for p, verdict, weak in (
         (level + 1e-6, "no_effect", False),
         (level - 1e-6, "no_effect" if known else "unknown", known),
-        (REFUTED + 1e-6, "no_effect" if known else "unknown", known),
-        (REFUTED - 1e-6, "unknown", False),
+        (REFUTATION_LEVEL + 1e-6, "no_effect" if known else "unknown", known),
+        (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
         monkeypatch.setattr(
             posterior, "detect", lambda *given, p=p: replace(detect(*given), p_value=p)

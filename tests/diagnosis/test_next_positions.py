@@ -11,7 +11,7 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.next_positions import GRID, _rows, next_positions
+from accelstudy.diagnosis.next_positions import CANDIDATE_SCHEME, _rows, next_positions
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
@@ -73,7 +73,7 @@ def test_each_position_adds_most_of_all_candidates(rivals):
     for i in range(len(u)):
         if len(own) < 3 and all(np.linalg.norm(u[i] - u[k]) > 0.5 for k in own):
             own.append(i)
-    candidates = np.concatenate([u[own], -get_scheme(GRID).directions])
+    candidates = np.concatenate([u[own], -get_scheme(CANDIDATE_SCHEME).directions])
     alone = separations(u, old, np.empty((0, 3)), candidates)
     taken = np.empty((0, 3))
     for position in found:

@@ -8,7 +8,7 @@ from diagnosis_helpers import GRAVITY, ROBOT, campaign, design, shuffled, some_h
 
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.shapes import LEAST, LearnedShapes
+from accelstudy.diagnosis.space.shapes import MIN_TRACE_SHARE, LearnedShapes
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import LENGTHS
 from accelstudy.sensors.models import get_model
@@ -92,9 +92,9 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
     assert len(beside.places) == len(shapes.places)
     for before, after in zip(covariances(shapes), covariances(beside), strict=True):
         expected = left @ before @ left
-        # Directions with a share of less than LEAST are dropped.
+        # Directions with a share of less than MIN_TRACE_SHARE are dropped.
         off = np.linalg.norm(after - expected / np.trace(expected))
-        assert off < 20 * LEAST
+        assert off < 20 * MIN_TRACE_SHARE
 
 
 def test_physics_that_is_not_in_the_catalogue_is_told_by_its_place():

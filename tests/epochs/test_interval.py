@@ -10,7 +10,7 @@ from session_helpers import document
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.epochs.history import YEAR, history_of
-from accelstudy.epochs.interval import LONGEST, Interval
+from accelstudy.epochs.interval import MAX_YEARS, Interval
 
 G = 9.80665
 N = 40
@@ -85,5 +85,5 @@ def test_a_sensor_that_drifts_is_good_until_the_drift_is_as_large(session):
     interval = Interval(history, 0.01 / G * 2.5, small, CONFIDENCE)
     assert interval.years == pytest.approx(2.5, rel=5e-3)  # the scale of x is not 1
     assert (interval.until - dates[-1]).total_seconds() / YEAR == pytest.approx(interval.years)
-    assert Interval(history, 0.01 / G * 20, small, CONFIDENCE).years == LONGEST
+    assert Interval(history, 0.01 / G * 20, small, CONFIDENCE).years == MAX_YEARS
     assert Interval(history_of([session] * 3, dates[:3]), 1e-6, small, CONFIDENCE).years == 0

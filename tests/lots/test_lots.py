@@ -27,7 +27,15 @@ from accelstudy.lots.evidence import (
     together,
 )
 from accelstudy.lots.lot import Lot, weigh_lot
-from accelstudy.lots.mixture import ALIKE, ALL, MISSING, MORE, ODD, Anything, Mixture
+from accelstudy.lots.mixture import (
+    PRIOR_ALL,
+    PRIOR_EQUAL,
+    PRIOR_FURTHER,
+    PRIOR_MISSING,
+    PRIOR_ODD,
+    Anything,
+    Mixture,
+)
 from accelstudy.lots.noise import Agreement
 from accelstudy.lots.passes import LEVEL, Pass
 from accelstudy.lots.run import _own_names
@@ -82,20 +90,22 @@ def test_the_evidence_of_a_set_is_its_integral():
     odds, prior = rng.normal(0, 2, (4, 2)), np.array([0.7, 0.3])
     pairs = {(0, 1): odds.sum(axis=1) - 0.5}
     mixture = Mixture.of(odds, pairs, prior)
-    strange = ODD * (np.exp(odds) @ prior)
+    strange = PRIOR_ODD * (np.exp(odds) @ prior)
 
     def likelihood(a, b=0.0):
         sets = (1 - a) * (1 - b) + a * (1 - b) * np.exp(odds[:, 0])
         sets = sets + (1 - a) * b * np.exp(odds[:, 1]) + a * b * np.exp(pairs[0, 1])
-        return np.prod((1 - ODD) * sets + strange)
+        return np.prod((1 - PRIOR_ODD) * sets + strange)
 
     def over_shares(function):
-        return (1 - ALL) * integrate.quad(function, 0, 1)[0] + ALL * function(1.0)
+        return (1 - PRIOR_ALL) * integrate.quad(function, 0, 1)[0] + PRIOR_ALL * function(1.0)
 
     expected = {
-        (): (1 - MISSING) * likelihood(0.0),
-        (0,): MISSING * (1 - MORE) * 0.7 * over_shares(likelihood),
-        (0, 1): MISSING * MORE * over_shares(lambda a: over_shares(partial(likelihood, a))),
+        (): (1 - PRIOR_MISSING) * likelihood(0.0),
+        (0,): PRIOR_MISSING * (1 - PRIOR_FURTHER) * 0.7 * over_shares(likelihood),
+        (0, 1): PRIOR_MISSING
+        * PRIOR_FURTHER
+        * over_shares(lambda a: over_shares(partial(likelihood, a))),
     }
     found = {one.names: np.exp(one.log_weight) for one in mixture.sets}
     for names, value in expected.items():
@@ -103,7 +113,9 @@ def test_the_evidence_of_a_set_is_its_integral():
     # An effect may as well be equally large in all sensors; then their mean tells.
     alike = Mixture.of(odds, pairs, prior, {(0,): 3.0})
     (one,) = (one for one in alike.sets if one.names == (0,))
-    value = (1 - ALIKE) * expected[0,] + ALIKE * MISSING * (1 - MORE) * 0.7 * np.exp(3.0)
+    value = (1 - PRIOR_EQUAL) * expected[0,] + PRIOR_EQUAL * PRIOR_MISSING * (
+        1 - PRIOR_FURTHER
+    ) * 0.7 * np.exp(3.0)
     assert np.exp(one.log_weight) == pytest.approx(value, rel=1e-6)
     # Each sensor lacks some set, or is odd.
     lacks, odd = mixture.sensors
@@ -115,7 +127,7 @@ def test_intervals_of_the_share_hold_it():
     rng, n = np.random.default_rng(2), 100
     inside = []
     for _ in range(n):
-        share = 1.0 if rng.random() < ALL else rng.random()
+        share = 1.0 if rng.random() < PRIOR_ALL else rng.random()
         odds = odds_of(shown_by(rng, np.column_stack([rng.random(20) < share, np.zeros(20)])))
         _, low, high = Mixture.of(odds, {}, np.array([0.5, 0.5])).share(0)
         inside.append(low <= share <= high)
@@ -126,7 +138,7 @@ def test_probabilities_of_sensors_are_right():
     """Of what is said with a probability of p, a part p is so."""
     rng, said, true = np.random.default_rng(3), [], []
     for _ in range(40):
-        lacks = rng.random(20) < (1.0 if rng.random() < ALL else rng.random())
+        lacks = rng.random(20) < (1.0 if rng.random() < PRIOR_ALL else rng.random())
         odds = odds_of(shown_by(rng, np.column_stack([lacks, np.zeros(20)])))
         said += Mixture.of(odds, {}, np.array([0.5, 0.5])).having(0).tolist()
         true += lacks.tolist()
@@ -177,7 +189,7 @@ def test_sizes_of_the_type_say_which_sensors_have_it():
     """Of what is said with a probability of p, a part p is so, and intervals hold the share."""
     rng, said, true, inside, n = np.random.default_rng(9), [], [], [], 60
     for _ in range(n):
-        share = 1.0 if rng.random() < ALL else rng.random()
+        share = 1.0 if rng.random() < PRIOR_ALL else rng.random()
         lacks = rng.random(20) < share
         sizes = np.array([0.35, -0.25]) * (1 + 0.25 * rng.standard_normal((20, 2)))
         each = told_by(rng, sizes * lacks[:, None])

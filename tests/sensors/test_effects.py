@@ -16,8 +16,8 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
-from accelstudy.effects.hold_conditions import STILL
-from accelstudy.effects.saturation import ROUND
+from accelstudy.effects.hold_conditions import MIN_STEP
+from accelstudy.effects.saturation import ROUND_WIDTH
 from accelstudy.leveling.angles import roll_pitch, specific_force
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme
@@ -193,7 +193,7 @@ def test_the_formula_of_the_catalogue(name):
     p = np.random.default_rng(3).normal(0, effect.typical[1], len(effect.parameters))
     f_prev = np.concatenate([FORCES[:1], FORCES[:-1]])
     # No step of these forces is so small that it counts as none.
-    assert np.abs(FORCES - f_prev)[1:].min() > STILL
+    assert np.abs(FORCES - f_prev)[1:].min() > MIN_STEP
     angles = np.stack([HOLD.roll, HOLD.pitch], axis=1)
     zero = np.zeros_like(FORCES)
     found = added(effect, p)
@@ -239,7 +239,7 @@ def test_a_sensor_clips_what_it_reads():
     values = {"b_x": 0.3, "b_z": -0.2, "s_x": 0.03, "s_y": -0.02, "alpha_yz": 0.01, "k2_y": 5e-3}
     free, clipping = SensorModel.of("free", names[1:]), SensorModel.of("clipping", names)
     read = free.sense(FORCES, free.vector(values), G)
-    sharp = np.all(np.abs(np.abs(read) - 9) > ROUND, axis=1)
+    sharp = np.all(np.abs(np.abs(read) - 9) > ROUND_WIDTH, axis=1)
     assert sharp.sum() > 20
     assert np.sum(np.abs(read[sharp]) > 9) > 5
     hard = {**values, **dict.fromkeys(("k_sat_x", "k_sat_y", "k_sat_z"), 1.0)}

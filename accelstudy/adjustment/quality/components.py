@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 
 MAX_STEPS = 300
 MAX_FITS = 10
-STEP = 1e-6
+STEP_TOLERANCE = 1e-6
 """Convergence with given derivatives: a step below this fraction of a standard deviation."""
-REFIT = 1e-3
+REFIT_TOLERANCE = 1e-3
 """Convergence with adjustments repeated: changes of a factor below this fraction of sigma."""
 
 
@@ -91,7 +91,7 @@ def variance_components(
         before = estimate
         estimate = _estimate(solve(model, approach, rescaled), groups, before.factors)
         if estimate is not None and np.all(
-            np.abs(estimate.factors - before.factors) <= REFIT * estimate.sigma
+            np.abs(estimate.factors - before.factors) <= REFIT_TOLERANCE * estimate.sigma
         ):
             return estimate
     return None if estimate is None else replace(estimate, converged=False)
@@ -148,7 +148,7 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         step = target - factors
         factors = target
         sigma = np.sqrt(np.diag(covariance))
-        if np.all(np.abs(step) <= STEP * sigma):
+        if np.all(np.abs(step) <= STEP_TOLERANCE * sigma):
             return VarianceComponents(factors, sigma, factors * trace, True)
     return VarianceComponents(factors, sigma, factors * trace, False)
 

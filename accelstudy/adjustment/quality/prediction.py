@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 NEAR_POLE = 0.1
 """Cosine of pitch below which an error of roll says nothing of the tilt."""
-REFITTED = 200
+MAX_REFITS = 200
 """Number of positions up to which each is left out in an adjustment of its own. Among more, one
 position changes the parameters so little that the derivatives at the common solution suffice."""
 
@@ -73,7 +73,7 @@ def held_out(model: SensorModel, approach: Approach, observed: Observations) -> 
     n, c, u = observed.forces.shape[1], approach.n_conditions, len(problem.weights)
     if n * c + np.count_nonzero(problem.weights) - u < c:
         return None
-    if n > REFITTED:
+    if n > MAX_REFITS:
         x, misclosures, cofactors = _derived(solve(model, approach, observed))
     else:
         x, misclosures, cofactors = _refitted(problem, c)

@@ -32,7 +32,7 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-CONTROLLED = 1e-6
+MIN_REDUNDANCY = 1e-6
 """A direction of a position with a smaller redundancy is not checked by the other positions."""
 
 
@@ -139,7 +139,7 @@ def diagonal_blocks(basis: Array, n: int, c: int) -> Array:
 def root_of(blocks: Array) -> tuple[Array, NDArray[np.int_]]:
     """H (n, c, c) with H Hᵀ = R⁺ of blocks R (n, c, c), and their ranks (n,)."""
     values, vectors = np.linalg.eigh(blocks)
-    seen = values > CONTROLLED
+    seen = values > MIN_REDUNDANCY
     scale = np.where(seen, 1 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
     return vectors * scale[:, None], np.count_nonzero(seen, axis=1)
 

@@ -11,7 +11,7 @@ from scipy import special
 from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ class GlobalTest:
 def global_test(
     omega: float,
     redundancy: int,
-    alpha: float = REFUTED,
+    alpha: float = REFUTATION_LEVEL,
     variance: float = 1.0,
     sigma_dof: float = np.inf,
 ) -> GlobalTest | None:

@@ -14,7 +14,7 @@ from accelstudy.basics.levels import (
     ACCEPTED,
     BLIND,
     IMPLAUSIBLE,
-    REFUTED,
+    REFUTATION_LEVEL,
     REJECTED,
     UNCHECKED,
 )
@@ -174,7 +174,7 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         failed=[row for row in rows if row["status"] != "ok"],
         implausible=[row for row in rows if row["state"] == IMPLAUSIBLE],
         calibrated=[row for row in rows if row["status"] == "ok" and row["state"] != IMPLAUSIBLE],
-        level=REFUTED,
+        level=REFUTATION_LEVEL,
         robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
         next_steps=_next_steps(rows),

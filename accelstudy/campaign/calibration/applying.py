@@ -38,14 +38,14 @@ Array = NDArray[np.float64]
 
 
 NO_CALIBRATION = "not a calibration.json of accelstudy"
-MARGIN = 0.1
+RANGE_MARGIN = 0.1
 """A log may leave a range by this part of its width without a warning."""
 REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
 LEAST_VARIANCE = 1e-40
 """SI; no estimate is as sure."""
 LEAST_REGULAR = 1e12
 """Condition of a matrix beyond which it has no inverse."""
-ROUNDED = 1e-6
+CORRELATION_TOLERANCE = 1e-6
 """Parts of a correlation by which a matrix may miss what it should be."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
@@ -285,9 +285,9 @@ def _check_covariance(covariance: Array) -> None:
     if not np.isfinite(covariance).all() or not (variances > LEAST_VARIANCE).all():
         raise ValueError("covariance: expected variances above 0")
     correlation = covariance / np.outer(np.sqrt(variances), np.sqrt(variances))
-    if np.abs(correlation - correlation.T).max() > ROUNDED:
+    if np.abs(correlation - correlation.T).max() > CORRELATION_TOLERANCE:
         raise ValueError("covariance: must be symmetric")
-    if np.linalg.eigvalsh(correlation)[0] < -ROUNDED:
+    if np.linalg.eigvalsh(correlation)[0] < -CORRELATION_TOLERANCE:
         raise ValueError("covariance: no estimates have it; it is not positive semidefinite")
 
 

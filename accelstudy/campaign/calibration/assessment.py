@@ -22,7 +22,7 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-SUSPECT = 0.05
+OUTLIER_LEVEL = 0.05
 """Family-wise level of the tests of single positions."""
 
 
@@ -125,7 +125,7 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         redundancy=quality.redundancy_numbers(solution),
         tests=quality.position_tests(solution),
         reliability=quality.reliability(solution),
-        suspects=quality.suspects(*session, alpha=SUSPECT, sigma_known=fit.trusts_sigma),
+        suspects=quality.suspects(*session, alpha=OUTLIER_LEVEL, sigma_known=fit.trusts_sigma),
         held_out=quality.held_out(*session),
         components=variance_components(*session) if fit.sigma_known else None,
         tilt_shares=shares,

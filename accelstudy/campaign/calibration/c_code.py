@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.applying import MARGIN, SensorCalibration, affine_form
+from accelstudy.campaign.calibration.applying import RANGE_MARGIN, SensorCalibration, affine_form
 from accelstudy.campaign.calibration.device import in_use, must_be_known
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.effects.base import expressions
@@ -33,7 +33,7 @@ from accelstudy.symbolic.tracing import derivative, symbols
 
 Array = NDArray[np.float64]
 
-BOUND = 1e-6
+MAX_SOLUTION_ERROR = 1e-6
 """m/s², error of the solution where it takes steps."""
 MAX_STEPS = 25
 """Steps after which there is no solution."""
@@ -41,10 +41,10 @@ FORCES = (0.5, 1.0, 1.5)
 """Parts of g at which the steps are counted."""
 DIRECTIONS = 60
 """Directions in which they are counted."""
-ROUNDING = 1e-5
+MAX_ROUNDING_ERROR = 1e-5
 """m/s², of all in single precision, at 1 g."""
 FORCE = tuple(f"f_{axis}" for axis in AXES)
-LAGGED, SESSION_TIME = "temperature_lagged_", "time_kept"
+LAGGED_TEMPERATURE, SESSION_TIME = "temperature_lagged_", "time_kept"
 """Names in C: of a temperature that follows with a lag, before its time constant, and of the time
 of drifts, which end with the session."""
 
@@ -83,10 +83,10 @@ def c_header(calibration: SensorCalibration) -> str:
         layout=calibration.usual_layout,
         end=end,
         end_in_c=None if end is None else _number(end),
-        bound=BOUND,
-        bound_mgon=BOUND / calibration.gravity / MGON,
+        bound=MAX_SOLUTION_ERROR,
+        bound_mgon=MAX_SOLUTION_ERROR / calibration.gravity / MGON,
         largest=FORCES[-1],
-        rounding=ROUNDING,
+        rounding=MAX_ROUNDING_ERROR,
         stages=stages,
         columns={column for stage in stages for column in stage.columns},
         steps=max((stage.steps for stage in stages), default=1),
@@ -116,7 +116,7 @@ def _stages(calibration: SensorCalibration) -> list[_Stage]:
     """Stages of the output; the first is of the force in the sensitive axes."""
     model, g = calibration.model, calibration.gravity
     sizes = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
-    force, hold = in_use(calibration, sizes, model.hold_columns, MARGIN)
+    force, hold = in_use(calibration, sizes, model.hold_columns, RANGE_MARGIN)
     stages = []
     for name, last in (("accel_output", False), ("accel_last", True)):
         specs = tuple(effect.spec for effect in model.effects if effect.last == last)
@@ -144,12 +144,12 @@ def _steps(model: SensorModel, p: Array, output: Array, g: float, hold: HoldCond
     with np.errstate(all="ignore"):
         for _, step in islice(model.newton(output, p, g, hold), MAX_STEPS):
             sizes.append(np.abs(step).sum(axis=1))
-            if np.all(sizes[-1] < BOUND):
+            if np.all(sizes[-1] < MAX_SOLUTION_ERROR):
                 break
-    solved = sizes[-1] < BOUND
+    solved = sizes[-1] < MAX_SOLUTION_ERROR
     if not solved.any():
         raise InputError(f"the model {model.name!r} with these parameters has no inverse")
-    return 1 + int(np.argmax((np.array(sizes)[:, solved] < BOUND).all(axis=1)))
+    return 1 + int(np.argmax((np.array(sizes)[:, solved] < MAX_SOLUTION_ERROR).all(axis=1)))
 
 
 @cache
@@ -157,7 +157,7 @@ def _formulas(spec: str) -> tuple[Any, Any]:
     """What an effect adds to the output, (3, 1), and its derivative by the force, (3, 3)."""
     effect, hold = get_effect(spec), HoldSymbols()
     output, _, _ = expressions(effect, hold)
-    lags = [f"{LAGGED}{float(tau):g}".replace(".", "_") for tau in hold.lagged_by]
+    lags = [f"{LAGGED_TEMPERATURE}{float(tau):g}".replace(".", "_") for tau in hold.lagged_by]
     names = dict(zip(hold.lagged_by.values(), symbols(*lags), strict=True))
     if effect.drifts:
         names[hold.time] = symbols(SESSION_TIME)[0]

@@ -32,7 +32,7 @@ LEAST_RATIO = 1e-6
 """Smallest ratio of the noise of a direction to that of the robot's angles that double precision
 can weigh."""
 
-HARDLY = 10.0
+MAX_CONDITION = 10.0
 """Condition of the design beyond which too few different attitudes explain why an adjustment does
 not converge."""
 
@@ -392,10 +392,11 @@ def _cause(campaign: Campaign, theory: Estimability, diagnosing: bool) -> str:
         return f"beside what was mended this looks wrong ({words(gross.name)}): {gross.reason}"
     if gross is not None:
         return f"this looks like a gross error ({words(gross.name)}): {gross.reason}; {more}"
-    if theory.condition > HARDLY:
+    if theory.condition > MAX_CONDITION:
         return (
             f"the {campaign.n_positions} positions hardly determine it (condition "
-            f"{theory.condition:.0f}, up to {HARDLY:.0f} is usual); more attitudes are needed"
+            f"{theory.condition:.0f}, up to {MAX_CONDITION:.0f} is usual); "
+            "more attitudes are needed"
         )
     return f"a gross error in the data or a wrong unit is the usual cause; {more}"
 

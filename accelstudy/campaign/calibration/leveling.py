@@ -24,7 +24,7 @@ from accelstudy.basics.units import (
 from accelstudy.basics.wording import counted, quantity_text, short_list
 from accelstudy.campaign.calibration.applying import (
     FORCES,
-    MARGIN,
+    RANGE_MARGIN,
     SensorCalibration,
     noise_of_reading,
 )
@@ -41,7 +41,7 @@ from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
 
-CLIPPED = 0.999
+SATURATED_SHARE = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
 
@@ -267,7 +267,7 @@ def _leveled(
         angles, sigmas = calibration.level(forces, noise, hold)
     lost = ~np.isfinite(corrected + angles[:, :1]).all(axis=1)
     full = calibration.content.get("range_mps2") or np.inf
-    lost |= (np.abs(forces) >= CLIPPED * full).any(axis=1)
+    lost |= (np.abs(forces) >= SATURATED_SHARE * full).any(axis=1)
     corrected[lost] = np.nan
     shown = frame.from_frd(corrected)
     added = {f"{axis}_calibrated_mps2": shown[:, i] for i, axis in enumerate(AXES)}
@@ -336,7 +336,7 @@ def _of_log(
             f"of roll and pitch to hold ({NEAR_POLE} is true there); use the calibrated force"
         )
     end = calibration.ranges.get("time_s", [0.0, np.inf])[1]
-    if calibration.drifts and time is not None and (after := time > (1 + MARGIN) * end).any():
+    if calibration.drifts and time is not None and (after := time > (1 + RANGE_MARGIN) * end).any():
         yield (
             f"{short_list(calibration.drifts)}: kept constant after the end of the calibration "
             f"session ({end:.0f} s), in {after.sum()} {of_all}"
@@ -372,7 +372,7 @@ def _beyond_ranges(
         low, high = np.array([ranges[name] for name in names]).T[..., None]
         # In parts of the width, so that axes can be compared; NaN does not count.
         excess = np.fmax(low - values, values - high) / np.maximum(high - low, 1e-9)
-        beyond = excess > MARGIN
+        beyond = excess > RANGE_MARGIN
         if beyond.any():
             axis, row = np.unravel_index(np.nanargmax(excess), excess.shape)
             way = f" {FORCES[names[axis]]}" if names[axis] in FORCES else ""

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.suggested import HERE
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.document import (
@@ -27,7 +27,7 @@ from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
 
 SUSPECT = "#D55E00"
-LISTED = 200
+MAX_ROWS = 200
 """Positions up to which the page lists all of them; of more, those that fit worst."""
 
 
@@ -75,7 +75,7 @@ def write_calibration(
         lines=lines,
         angles_unused=fit.campaign.angles is not None and not fit.approach.uses_angles,
         positions=_listed(positions).to_dict("records"),
-        refuted=REFUTED,
+        refuted=REFUTATION_LEVEL,
         figures=drawn,
         next_steps=next_steps(fit, assessment.state, source, Path(place) / HERE),
     )
@@ -91,7 +91,7 @@ def calibration_content(assessment: Assessment) -> dict[str, Any]:
 def _listed(positions: pd.DataFrame) -> pd.DataFrame:
     """Positions that the page lists, in their order: all, or those that fit worst."""
     worst = positions.sort_values(["suspect", "p_value"], ascending=[False, True], kind="stable")
-    return worst.head(LISTED).sort_index()
+    return worst.head(MAX_ROWS).sort_index()
 
 
 def residual_figure(fit: CampaignFit, positions: pd.DataFrame) -> Figure:

@@ -33,9 +33,9 @@ Array = NDArray[np.float64]
 
 ATTITUDES = 60
 """Attitudes, each mirrored in all axes, over which the parameters are fitted."""
-TILTED = 200
+LOSS_ATTITUDES = 200
 """Attitudes over which the loss is taken."""
-SEEN = 0.01 * MGON
+MIN_LOSS = 0.01 * MGON
 """Error of an angle below which nothing is lost."""
 DEGREE = 3
 """Of the polynomials of PX4 in the temperature."""
@@ -149,7 +149,7 @@ class PX4:
     def _loss(self, calibration: SensorCalibration) -> tuple[Array, Array]:
         """Rms and largest error, (2,), of roll and of pitch by what PX4 cannot hold, rad."""
         gains, offsets = self._fitted(calibration)
-        cap = cap_forces(MAX_TILT_GON * GON, TILTED, calibration.gravity)
+        cap = cap_forces(MAX_TILT_GON * GON, LOSS_ATTITUDES, calibration.gravity)
         forces, hold = in_use(calibration, cap, calibration.model.hold_columns)
         linear = self._read(calibration, forces, hold) - self._terms(hold) @ offsets.T
         corrected = self.frame.to_frd(linear / gains)
@@ -159,8 +159,10 @@ class PX4:
     def _lost(self) -> Iterable[str]:
         """Say what PX4 cannot hold, and what that does to roll and pitch."""
         rms, largest = self._loss(self.calibration)
-        if largest.max() > SEEN:
-            parts = [effect for effect, alone in self._alone() if self._loss(alone)[1].max() > SEEN]
+        if largest.max() > MIN_LOSS:
+            parts = [
+                effect for effect, alone in self._alone() if self._loss(alone)[1].max() > MIN_LOSS
+            ]
             without = f" for {comma_list(parts)}" if parts else ""
             (roll, pitch), (most_roll, most_pitch) = rms / MGON, largest / MGON
             yield (

@@ -31,7 +31,7 @@ SIGNED_PERMUTATIONS = tuple(
 """What the channels x, y, z show: axis 1, 2 or 3 with a sign; the first is the right one."""
 SIZE = 0.1
 """m/s², size of an error of a position whose direction is drawn."""
-APART = 1.0
+MIN_DIFFERENCE = 1.0
 """m/s², smallest difference between the forces of two positions that are drawn to be exchanged."""
 
 
@@ -166,7 +166,7 @@ class RowOrder(GrossError):
             return self
         for first in rng.permutation(campaign.n_positions):
             distance = np.linalg.norm(campaign.forces - campaign.forces[first], axis=1)
-            others = np.flatnonzero(distance > APART)
+            others = np.flatnonzero(distance > MIN_DIFFERENCE)
             if len(others):
                 low, high = sorted(campaign.positions[[first, rng.choice(others)]].tolist())
                 return type(self)(first=low, second=high)

@@ -31,39 +31,39 @@ from accelstudy.leveling.angles import specific_force, usual_norm
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.plausibility import LARGEST
 
-USUAL = 0.3
+USUAL_SD = 0.3
 """Standard deviation of each parameter of an uncalibrated sensor, as a share of gravity."""
-CLEARLY = 4.0
+MIN_RATIO = 4.0
 """How many times better an explanation must fit to be clear. A position that is farther off than so
 many times the usual distance is wrong."""
-LOST = 0.15
+MAX_USABLE_ERROR = 0.15
 """Share of gravity by which no usable sensor is wrong."""
-SHOWS = 0.005
+MIN_POSITION_ERROR = 0.005
 """Share of gravity by which a single position must be off to be called wrong, and by which an
 exchange of rows must improve the fit."""
-LEAST = 1e-6
+MIN_DISTANCE = 1e-6
 """Distance, as a share of gravity, below which differences do not count."""
-SPARE = 3
+MIN_SPARE_POSITIONS = 3
 """Positions beyond the number of fitted parameters that are needed to notice a wrong one."""
-STEPS = 40
+MAX_ITERATIONS = 40
 """Largest number of iterations."""
-TOGETHER = 4
+MAX_ERRORS = 4
 """Largest number of gross errors of one stage that are looked for in a campaign."""
-GROSS = 0.1
+MIN_GROSS_ERROR = 0.1
 """Share of gravity: if no position is farther off, no unit and no axis can be wrong."""
 AS_GOOD = 1.25
 """Two explanations whose distances differ by less than this factor fit equally well; the simpler
 one is taken."""
 RIGHT_UNIT = 1 - LARGEST["scale"]
 """Share of gravity that even a bad sensor reads in the right unit."""
-NEAR = 2.0
+MAX_AXIS_RATIO = 2.0
 """Axes are tried if their distance from the ideal sensor is at most this many times the smallest
 distance of any axes."""
-SHOWN = 20
+MAX_NAMED = 20
 """Largest number of exchanged positions that a message names."""
-EXCHANGED = 1000
+MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
-PART = 8
+MIN_POSITIONS_PER_OUTLIER = 8
 """At most one of so many positions may be bumped; if more are off, something else is wrong."""
 
 
@@ -286,8 +286,8 @@ def _errors(
     """Gross errors of a stage: the one whose mending helps most first, until none helps clearly."""
     errors: list[Mending] = []
     sensor, everywhere = RealSensor.of(campaign, attitude, mounted), axes in stage
-    while len(errors) < TOGETHER:
-        if everywhere and sensor.distance.max() < GROSS * sensor.gravity:
+    while len(errors) < MAX_ERRORS:
+        if everywhere and sensor.distance.max() < MIN_GROSS_ERROR * sensor.gravity:
             break
         helps = []
         mirrored = everywhere and RealSensor.of(campaign, attitude, mounted=True).mirrored
@@ -308,9 +308,9 @@ def _errors(
 def _is_mounted(campaign: Campaign, attitude: bool) -> bool:
     """Whether most positions fit clearly better if the sensor may be mounted in any way."""
     sensor = RealSensor.of(campaign, attitude)
-    if sensor.expected is None or sensor.usual < SHOWS * sensor.gravity:
+    if sensor.expected is None or sensor.usual < MIN_POSITION_ERROR * sensor.gravity:
         return False
-    return CLEARLY * RealSensor.of(campaign, attitude, mounted=True).usual < sensor.usual
+    return MIN_RATIO * RealSensor.of(campaign, attitude, mounted=True).usual < sensor.usual
 
 
 def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bool) -> bool:
@@ -321,10 +321,12 @@ def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bo
         if mirrored and mending.matrix is not None and np.linalg.det(mending.matrix) < 0:
             return after.misfit < before.misfit
         # Single positions may be wrong as well: it is enough that most others fit then.
-        gained = before.misfit > CLEARLY * after.misfit
-        return bool(gained or before.usual > CLEARLY * after.usual)
+        gained = before.misfit > MIN_RATIO * after.misfit
+        return bool(gained or before.usual > MIN_RATIO * after.usual)
     was, now = (np.median(sensor.distance[mending.changed]) for sensor in (before, after))
-    return bool(was > max(CLEARLY * now, CLEARLY**2 * after.usual, SHOWS * before.gravity))
+    return bool(
+        was > max(MIN_RATIO * now, MIN_RATIO**2 * after.usual, MIN_POSITION_ERROR * before.gravity)
+    )
 
 
 # --- What would mend a campaign, the simplest first -----------------------------------------------
@@ -346,7 +348,9 @@ def axes(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
             moved = sum(abs(axis) != i for i, axis in enumerate(shown, 1))
             changes = (moved, sum(axis < 0 for axis in shown), float(np.linalg.norm(bias)))
             tried.append((changes, mending))
-    near = [one for one, miss in zip(tried, misses, strict=True) if miss < NEAR * min(misses)]
+    near = [
+        one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
+    ]
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
     assert campaign.angles is not None
     exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
@@ -403,18 +407,18 @@ def rows(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
     """Move each row that does not fit to the position where it fits; any number of rows."""
     if sensor.expected is None or not sensor.tells:
         return
-    lost = sensor.usual > LOST * sensor.gravity
+    lost = sensor.usual > MAX_USABLE_ERROR * sensor.gravity
     wrong = np.flatnonzero(sensor.wrong | lost)
-    if not 1 < len(wrong) <= EXCHANGED:
+    if not 1 < len(wrong) <= MAX_EXCHANGED:
         return
     # Rows in the same attitude could be exchanged at will, so an exchange must gain something.
-    least = min(CLEARLY * sensor.usual, SHOWS * sensor.gravity)
+    least = min(MIN_RATIO * sensor.usual, MIN_POSITION_ERROR * sensor.gravity)
     cost = campaign.forces[wrong][:, None] - sensor.expected[wrong][None]
     order = np.arange(campaign.n_positions)
     order[wrong] = wrong[_places(np.linalg.norm(cost, axis=2), least)]
     moved = order != np.arange(len(order))
     if moved.any():
-        shown = [str(position) for position in campaign.positions[moved][:SHOWN]]
+        shown = [str(position) for position in campaign.positions[moved][:MAX_NAMED]]
         more = int(moved.sum()) - len(shown)
         positions = ", ".join(shown) + (f" and {more} more" if more else "")
         reason = f"the forces of positions {positions} are exchanged"
@@ -438,7 +442,7 @@ def _places(cost: Array, least: float) -> NDArray[np.int_]:
     places = linear_sum_assignment(total.T)[1]
     for cycle in _cycles(places):
         after = np.linalg.norm(cost[places[cycle], cycle])
-        if np.linalg.norm(cost[cycle, cycle]) < CLEARLY * after:
+        if np.linalg.norm(cost[cycle, cycle]) < MIN_RATIO * after:
             places[cycle] = cycle
     return places
 
@@ -457,13 +461,13 @@ def _cycles(places: NDArray[np.int_]) -> list[NDArray[np.int_]]:
 
 def outliers(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
     """Leave out positions that are so wrong that they would spoil a calibration."""
-    far = sensor.wrong & (sensor.distance > LOST * sensor.gravity)
+    far = sensor.wrong & (sensor.distance > MAX_USABLE_ERROR * sensor.gravity)
     bumped = tuple(campaign.positions[far].tolist())
-    if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // PART:
+    if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER:
         return
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
     free = RealSensor.of(campaign, sensor.expected is not None, mounted=True)
-    if free.distance.max() < SHOWS * sensor.gravity:
+    if free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
     sizes = comma_list([f"{size:.2g}" for size in sensor.distance[far]])
     reason = f"position {comma_list([str(p) for p in bumped])} is wrong by {sizes} m/s^2"
@@ -503,13 +507,13 @@ class RealSensor:
 
     @property
     def misfit(self) -> float:
-        """Mean distance, m/s²; a position beyond `LOST` counts as `LOST`, however far off it is."""
-        return float(np.mean(np.minimum(self.distance, LOST * self.gravity)))
+        """Mean distance, m/s²; each position counts by `MAX_USABLE_ERROR` at most."""
+        return float(np.mean(np.minimum(self.distance, MAX_USABLE_ERROR * self.gravity)))
 
     @property
     def wrong(self) -> NDArray[np.bool_]:
         """Which positions, (n,), do not fit."""
-        return self.distance > CLEARLY * self.usual
+        return self.distance > MIN_RATIO * self.usual
 
     @classmethod
     def of(cls, campaign: Campaign, attitude: bool, mounted: bool = False) -> RealSensor:
@@ -522,7 +526,7 @@ class RealSensor:
         mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
         """
         g, conditions = campaign.gravity, _conditions(campaign)
-        share = np.inf if mounted else USUAL
+        share = np.inf if mounted else USUAL_SD
         if not attitude:
             # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
             x, y, z = unit = campaign.forces.T / g
@@ -557,12 +561,12 @@ def _left_handed(design: Array, expected: Array, noise: float) -> bool:
     matrix = (inverse @ expected)[:3]
     error = noise * np.linalg.norm(inverse[:3], ord=2)
     least = np.linalg.svd(matrix, compute_uv=False)[-1]
-    return bool(np.linalg.det(matrix) < 0 and least > CLEARLY * error)
+    return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
 
 
 def _tells(design: Array) -> bool:
     n, u = design.shape
-    return n >= u + SPARE
+    return n >= u + MIN_SPARE_POSITIONS
 
 
 def _conditions(campaign: Campaign) -> list[Array]:
@@ -586,13 +590,13 @@ def _robust(design: Array, lacking: Array, share: float) -> Array:
     if share == np.inf:
         start = np.asarray(np.linalg.lstsq(design, lacking, rcond=None)[0])
     parameters, before = start, np.inf
-    for _ in range(STEPS):
+    for _ in range(MAX_ITERATIONS):
         distance = np.linalg.norm(lacking - design @ parameters, axis=1)
-        usual = max(float(np.median(distance)), LEAST)
+        usual = max(float(np.median(distance)), MIN_DISTANCE)
         if abs(before - usual) < 1e-3 * usual:
             break
         before = usual
-        weights = 1 / (1 + (distance / (CLEARLY * usual)) ** 2) ** 2
+        weights = 1 / (1 + (distance / (MIN_RATIO * usual)) ** 2) ** 2
         normal = design.T * weights @ design / n + np.eye(u) * max((usual / share) ** 2, 1e-12)
         parameters = np.linalg.solve(normal, design.T * weights @ lacking / n)
     return np.asarray(design @ parameters)

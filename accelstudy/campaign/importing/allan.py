@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-RELIABLE = 10
+MIN_DIFFERENCES = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""
 
@@ -122,9 +122,9 @@ class MeanAccuracy:
 def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: int) -> MeanAccuracy:
     """Standard deviation of a mean over `duration`, averaged over the channels.
 
-    Beyond the largest averaging time with at least `RELIABLE` independent differences the curve is
-    extrapolated with the slope of its last two octaves. The slope is kept between that of white
-    noise (−1/2) and that of a random walk (+1/2).
+    Beyond the largest averaging time with at least `MIN_DIFFERENCES` independent differences the
+    curve is extrapolated with the slope of its last two octaves. The slope is kept between that of
+    white noise (−1/2) and that of a random walk (+1/2).
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def accuracy_of_mean(curve: AllanDeviation, duration: float, sd: ArrayLike, n: i
     """
     white = float(np.sqrt(np.mean(np.square(sd)))) / np.sqrt(n)
     channels = curve.deviation.shape[1]
-    usable = (curve.differences >= RELIABLE) & (curve.pooled > 0)
+    usable = (curve.differences >= MIN_DIFFERENCES) & (curve.pooled > 0)
     if not usable.any():
         samples = int(curve.differences[0]) if len(curve.tau) else n - 1
         return MeanAccuracy(duration, white, white, 0.0, None, max(1.0, channels * samples))

@@ -18,13 +18,13 @@ from scipy import special
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import counted
-from accelstudy.campaign.importing.allan import RELIABLE
+from accelstudy.campaign.importing.allan import MIN_DIFFERENCES
 from accelstudy.campaign.importing.noise import HoldNoise, hold_noise, noise_before_rounding
 from accelstudy.campaign.importing.recording import AXES, SDS, Recording
 from accelstudy.campaign.importing.settings import ImportSettings, Span, Which
 from accelstudy.campaign.importing.windows import (
-    FACTOR,
-    RESTLESS,
+    MAX_REST_NOISE,
+    THRESHOLD_FACTOR,
     Threshold,
     Windows,
     usual_window,
@@ -35,21 +35,21 @@ Array = NDArray[np.float64]
 Parts: TypeAlias = tuple[slice, ...]
 """Samples of a hold: slices of a log, each uninterrupted."""
 
-SATURATED = 0.05
+MAX_SATURATED_SHARE = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
-BEYOND, SURE = 5.0, 3.0
+MAX_BEYOND, MIN_WITHIN = 5.0, 3.0
 """Samples that rounding alone would hardly leave out beyond the largest one (e⁻⁵), and standard
 deviations by which those at the largest one may exceed what it then explains."""
-SHORTEST = 8
+MIN_REST = 8
 """Samples left of a rest from which on it is told; a sensor that turns back is still for fewer."""
-WANDERING = 2.0
+MAX_WANDER = 2.0
 """A hold whose standard deviation is more than this many thresholds of a window is none."""
-SLOW, QUICK = 2.0, 0.2
+SLOW_RATIO, QUICK_RATIO = 2.0, 0.2
 """Allan deviation, as a multiple of that of white noise, from which on a motion is slow, such as
 that of a hand; seconds, below which motions are vibrations, which do not harm a mean."""
 PARTS = 4
 """Parts of a block whose means are compared; the noise within them averages out."""
-TREMBLES = 10.0
+MAX_TREMOR = 10.0
 """Scatter of the parts of a block, as a multiple of that of a typical one, from which on the sensor
 moves: a hand that trembles makes some five of it, a turn by a few degrees dozens."""
 
@@ -168,13 +168,13 @@ def find_holds(
     lengths = np.diff(rests)[:, 0]
     runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
     lost = 2 * cut + windows[0].width
-    short = (lengths[(lengths >= SHORTEST) & (lengths < least)] + lost) * step
+    short = (lengths[(lengths >= MIN_REST) & (lengths < least)] + lost) * step
     said = _too_short(short.tolist(), seconds + 2 * settings.trim_s, settings.shortest_s)
     full = np.array([find_saturated(each, runs, settings.full_range) for each in windows], bool)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
     sds = np.array([[scatter(log.forces[run]) for run in runs] for log in logs])
-    turns = ~full & (sds > WANDERING * np.array([[threshold.sd] for threshold in thresholds]))
+    turns = ~full & (sds > MAX_WANDER * np.array([[threshold.sd] for threshold in thresholds]))
     good = ~full & ~turns
     numbers = dict(enumerate(np.flatnonzero(good.any(axis=0)).tolist(), 1))
     if one_each:
@@ -250,9 +250,11 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     threshold = windows.threshold(settings.threshold_mps2) if settings.threshold_mps2 else None
     if threshold is None:
         # Rounding hides the scatter of a coarse sensor.
-        usual = max(float(np.median([*scatters.values()])), FACTOR / TREMBLES * windows.rounding)
-        reason = f"{TREMBLES:g} times the scatter of the {PARTS} parts of a typical block"
-        threshold = Threshold(TREMBLES * usual, usual, reason)
+        usual = max(
+            float(np.median([*scatters.values()])), THRESHOLD_FACTOR / MAX_TREMOR * windows.rounding
+        )
+        reason = f"{MAX_TREMOR:g} times the scatter of the {PARTS} parts of a typical block"
+        threshold = Threshold(MAX_TREMOR * usual, usual, reason)
     for number, each in scatters.items():
         if each > threshold.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
@@ -269,7 +271,7 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     """Tell whether samples of holds lie at the sensor's range or, if it is unknown, at the extreme.
 
     In a hold of n samples of which none lies beyond the last step, the mean may be so high that
-    `BEYOND` of them were expected there. Those above the last edge but one are as many as the
+    `MAX_BEYOND` of them were expected there. Those above the last edge but one are as many as the
     step, and the noise before rounding, explain.
 
     Parameters
@@ -291,9 +293,9 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     for each in forces:
         n = len(each)
         end, beside = np.sum(each == extremes, axis=2).transpose(1, 0, 2)
-        share = special.ndtr(steps + special.ndtri(min(BEYOND / n, 0.5)))
-        explained = n * share + SURE * np.sqrt(n * share * (1 - share))
-        piled = (end > np.maximum(SATURATED * n, explained)) & (end > beside)
+        share = special.ndtr(steps + special.ndtri(min(MAX_BEYOND / n, 0.5)))
+        explained = n * share + MIN_WITHIN * np.sqrt(n * share * (1 - share))
+        piled = (end > np.maximum(MAX_SATURATED_SHARE * n, explained)) & (end > beside)
         result.append(bool(np.any(piled)))
     return result
 
@@ -302,7 +304,7 @@ def at_range(forces: Array, full_range: float) -> bool:
     """Whether samples (n, 3) of a hold, m/s², lie at the sensor's range ±`full_range`."""
     # Conversion from counts or g rounds.
     beyond = np.abs(forces) >= full_range * (1 - 1e-9)
-    return bool(np.any(beyond.sum(axis=0) > SATURATED * len(forces)))
+    return bool(np.any(beyond.sum(axis=0) > MAX_SATURATED_SHARE * len(forces)))
 
 
 def _too_short(rests: Sequence[float], lost: float, shortest: float) -> list[str]:
@@ -432,16 +434,16 @@ def _moves(holds: Holds) -> bool:
     The noise of a sensor at rest is below a few hundredths of gravity. The vibration of a machine
     may be larger, but it is quick and averages out like white noise. A human body moves slowly.
     """
-    if not holds.threshold.floor > RESTLESS * min(holds.radius, STANDARD_GRAVITY):
+    if not holds.threshold.floor > MAX_REST_NOISE * min(holds.radius, STANDARD_GRAVITY):
         return False
     curve, sd = holds.noise.allan, float(np.sqrt(np.mean(holds.noise.sd**2)))
     if sd == 0:  # all samples of a coarse sensor are rounded alike
         return False
-    reliable = (curve.differences >= RELIABLE) & (curve.tau >= QUICK)
+    reliable = (curve.differences >= MIN_DIFFERENCES) & (curve.tau >= QUICK_RATIO)
     if not reliable.any():
         return True
     white = sd * np.sqrt(holds.log.step / curve.tau[reliable])
-    return bool(np.max(curve.pooled[reliable] / white) > SLOW)
+    return bool(np.max(curve.pooled[reliable] / white) > SLOW_RATIO)
 
 
 def _never_still(windows: Windows, why: str, seconds: float, size: int | None = None) -> InputError:

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TURNING = 1.5
+MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
 
-COUNTS = 0.1
+MIN_ROUNDING_RATIO = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
 
@@ -155,7 +155,7 @@ def _lines(holds: Holds, notes: list[str]) -> Iterator[str]:
 
 def _rounds(holds: Holds) -> bool:
     """Whether rounding to the steps of the readings counts beside the noise of a mean."""
-    return holds.noise.rounding > COUNTS * holds.noise.accuracy.allan
+    return holds.noise.rounding > MIN_ROUNDING_RATIO * holds.noise.accuracy.allan
 
 
 def _recognised(recording: Recording) -> Iterator[str]:
@@ -189,7 +189,7 @@ def _doubts(holds: Holds, gravity: float) -> Iterator[str]:
             "the norms of the means differ too much for specific forces (is an offset missing?); "
             "sigma is taken over all axes"
         )
-    elif noise.across > TURNING * accuracy.allan:
+    elif noise.across > MAX_ACROSS_RATIO * accuracy.allan:
         turned = f"{to_display(noise.across / gravity, 'rad'):.0f} {display_unit('rad')}"
         yield (
             f"across gravity the means vary by {shown(noise.across)}, more than along it: the "

@@ -24,17 +24,17 @@ from accelstudy.campaign.importing.allan import (
 
 Array = NDArray[np.float64]
 
-ALIKE = 1.5
+MAX_NORM_RATIO = 1.5
 """Largest over smallest norm of the means of one sensor in gravity."""
-SPREAD = 0.25
+MIN_SPREAD = 0.25
 """Rms of the means along their thinnest direction, over gravity; of a sphere 0.58."""
 LONGEST_RECORD = 2**20
 """Samples of a hold that are used for the Allan deviation; later ones count for the mean only."""
-MOST = 2**15
+MAX_READINGS = 2**15
 """Different readings of an axis beyond which its steps are too fine to matter."""
-OFTEN = 4
+MIN_REPEATS = 4
 """Times that a reading occurs on average, at least, where an axis is read in steps."""
-COARSEST = 0.1 * STANDARD_GRAVITY
+MAX_STEP = 0.1 * STANDARD_GRAVITY
 """Largest step of a usable sensor, m/s²."""
 _OFF = 0.1
 """Rms of readings about a regular grid, in steps: a file rounds them, too."""
@@ -144,11 +144,11 @@ def _center(means: Array) -> tuple[Array, bool]:
     if len(means) > 5 and (sphere := fit_sphere(means)) is not None:
         center, radius = sphere
         thinnest = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)[-1]
-        if thinnest > SPREAD * radius * np.sqrt(len(means)):
+        if thinnest > MIN_SPREAD * radius * np.sqrt(len(means)):
             centers.insert(0, center)
     for center in centers:
         norms = np.linalg.norm(means - center, axis=1)
-        if norms.max() <= ALIKE * norms.min():
+        if norms.max() <= MAX_NORM_RATIO * norms.min():
             return center, True
     return np.zeros(3), False
 
@@ -184,11 +184,11 @@ def fit_sphere(forces: Array) -> tuple[Array, float] | None:
 def step_in(readings: Array) -> float:
     """Step of the readings (n,) of an axis, m/s²; 0 if there is none."""
     different = np.empty(0)
-    for first in range(0, len(readings), MOST):  # most axes of fine steps show it at once
-        different = np.union1d(different, readings[first : first + MOST])
-        if len(different) > MOST:
+    for first in range(0, len(readings), MAX_READINGS):  # most axes of fine steps show it at once
+        different = np.union1d(different, readings[first : first + MAX_READINGS])
+        if len(different) > MAX_READINGS:
             return 0.0
-    often = len(readings) >= OFTEN * len(different)
+    often = len(readings) >= MIN_REPEATS * len(different)
     return float(f"{step_of(different):.6g}") if often else 0.0
 
 
@@ -201,7 +201,7 @@ def step_of(different: Array) -> float:
     place = np.concatenate([[0.0], np.cumsum(np.round(gaps / step))])
     slope, start = np.polyfit(place, different, 1)
     off = np.sqrt(np.mean((different - start - slope * place) ** 2))
-    return float(slope) if off <= _OFF * slope and slope <= COARSEST else 0.0
+    return float(slope) if off <= _OFF * slope and slope <= MAX_STEP else 0.0
 
 
 def noise_before_rounding(step: ArrayLike, sd: ArrayLike) -> Array:

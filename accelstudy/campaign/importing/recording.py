@@ -27,7 +27,7 @@ from accelstudy.campaign.importing.names import places_by_name, unit_in, without
 from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
 from accelstudy.files.reading import overlay
-from accelstudy.sensors.conversion import LARGEST, Conversion, conversion_of
+from accelstudy.sensors.conversion import MAX_VALUE, Conversion, conversion_of
 
 Array = NDArray[np.float64]
 
@@ -35,17 +35,17 @@ AXES = ("fx", "fy", "fz")
 SDS = ("sd_fx", "sd_fy", "sd_fz")
 CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
-ABSURD = 1e4
+MAX_FORCE = 1e4
 """m/s², some 1000 g: what levels gives no larger reading."""
 SENTINELS = (2.0**31 - 1, -(2.0**31), 1 - 2.0**31, 2.0**32 - 1)
 """Numbers that stand for a missing reading: the ends of the integers of 32 bits."""
-TYPICAL = 1000
+SAMPLED_ROWS = 1000
 """Rows of a log that tell how large its readings are."""
-MANY = 0.05
+MAX_BAD_SHARE = 0.05
 """Share of rows without a usable reading from which on a log is refused."""
-NAMED = 3
+MAX_NAMED = 3
 """Rows that are named of those left out."""
-GAP = 5.0
+GAP_RATIO = 5.0
 """A step of time that is this many times the usual one is a gap."""
 _NANOSECONDS = re.compile(r"(.*?)n(ano)?(secs?)", re.IGNORECASE)
 """Whole seconds of a stamp of ROS, where there is no other time, and the rest of it."""
@@ -327,11 +327,11 @@ class Log:
         elif self.layout.rate_hz is not None:
             columns["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
         frame, conversion = self.layout.axes, self.conversion
-        first_rows = np.column_stack([values[axis][:TYPICAL] for axis in AXES])
+        first_rows = np.column_stack([values[axis][:SAMPLED_ROWS] for axis in AXES])
         read = _usable(first_rows) & ~np.isin(first_rows, SENTINELS)
         norms = np.linalg.norm(conversion.to_si(first_rows[read.all(axis=1)]), axis=1)
         # The unit may be wrong: it is checked by the means of the holds.
-        limit = max([ABSURD, *([1000 * np.median(norms)] if len(norms) else [])])
+        limit = max([MAX_FORCE, *([1000 * np.median(norms)] if len(norms) else [])])
         for axis, sign, i in zip(AXES, frame.signs, frame.order, strict=True):
             raw = values[AXES[i]]
             force = conversion.of_axis(i).to_si(raw)
@@ -363,7 +363,7 @@ class Log:
 
 def _usable(values: NDArray[Any]) -> NDArray[np.bool_]:
     """Which numbers can be calculated with."""
-    return np.asarray(np.abs(values) <= LARGEST)
+    return np.asarray(np.abs(values) <= MAX_VALUE)
 
 
 def unique_names(source: Source) -> list[str]:
@@ -449,7 +449,7 @@ class Recording:
                 f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
                 f"increase ({cell}); give the rate if it does not count"
             )
-        if lost.sum() > MANY * len(rows):
+        if lost.sum() > MAX_BAD_SHARE * len(rows):
             said, key = self._describe(i, int(np.argmax(lost)))
             hint = "; give the rate (`rate`) instead" if key == "time" else ""
             raise InputError(
@@ -495,8 +495,8 @@ class Recording:
             said += part.source.warnings
             if lost.any():
                 rows = np.flatnonzero(lost)
-                each = "; ".join(self._describe(i, int(row))[0] for row in rows[:NAMED])
-                more = "; …" if len(rows) > NAMED else ""
+                each = "; ".join(self._describe(i, int(row))[0] for row in rows[:MAX_NAMED])
+                more = "; …" if len(rows) > MAX_NAMED else ""
                 said.append(
                     f"{len(rows)} of {counted(len(lost), 'row')} left out, as a reading is missing "
                     f"or absurd: {each}{more}"
@@ -519,11 +519,11 @@ class Recording:
 
 
 def usual_step(steps: Array) -> float:
-    """Mean step of time, without gaps: steps of `GAP` times the mean or more."""
+    """Mean step of time, without gaps: steps of `GAP_RATIO` times the mean or more."""
     kept = steps
     while True:
         mean = float(np.mean(kept))
-        without = steps[steps <= GAP * mean]
+        without = steps[steps <= GAP_RATIO * mean]
         if len(without) == len(kept):
             return mean
         kept = without

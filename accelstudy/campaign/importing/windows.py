@@ -18,19 +18,19 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.importing.noise import step_in
-from accelstudy.campaign.importing.recording import GAP, Recording
+from accelstudy.campaign.importing.recording import GAP_RATIO, Recording
 
 Array = NDArray[np.float64]
 
-FEWEST, MOST = 8, 10**6
+MIN_SAMPLES, MAX_SAMPLES = 8, 10**6
 """Samples of a window, at least and at most."""
-FACTOR = 3.0
+THRESHOLD_FACTOR = 3.0
 """Threshold over noise floor; it leaves room for noise that differs between attitudes."""
 QUIET_FACTOR, QUIET = 10.0, 0.003 * STANDARD_GRAVITY
 """The same for a quiet sensor, and the largest threshold that it may give, m/s²."""
-RESTLESS = 0.02
+MAX_REST_NOISE = 0.02
 """Noise of windows, as a share of gravity, from which on it may be motion and not the sensor's."""
-COARSE = 1.75
+MAX_COARSE_RATIO = 1.75
 """Noise of windows, as a multiple of that of rounding, up to which a sensor at rest may read the
 same number all the time: that of noise of 0.4 steps."""
 
@@ -79,7 +79,7 @@ class Windows:
         self.log, self.width = log, width
         time, forces = log.time, log.forces
         another = np.diff(log.samples["part"]) > 0
-        jumps = (np.diff(time) > GAP * log.step) & ~another
+        jumps = (np.diff(time) > GAP_RATIO * log.step) & ~another
         self.gaps = int(jumps.sum())
         self.variance = np.full(len(time), np.nan)
         self.frozen = np.zeros(len(time), dtype=bool)
@@ -109,7 +109,7 @@ class Windows:
         """
         window = usual_window(log) if seconds is None else seconds
         samples = window / log.step
-        if not FEWEST <= samples <= MOST:
+        if not MIN_SAMPLES <= samples <= MAX_SAMPLES:
             raise InputError(
                 f"{log.path}: a window of {window:g} s holds {samples:.3g} samples, at "
                 f"{1 / log.step:.6g} per second"
@@ -149,7 +149,9 @@ class Windows:
         if not self.rounding > 0:
             return False
         noise = _noise_floor(_histogram(self.variance))
-        return bool(noise <= COARSE * self.rounding or noise > RESTLESS * STANDARD_GRAVITY)
+        return bool(
+            noise <= MAX_COARSE_RATIO * self.rounding or noise > MAX_REST_NOISE * STANDARD_GRAVITY
+        )
 
     @cached_property
     def counts(self) -> NDArray[np.int_]:
@@ -202,14 +204,14 @@ class Windows:
                 f"{self.log.path}: a channel does not change in any window; is it frozen?"
             )
         noise = _noise_floor(counts)
-        sd = max(FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
+        sd = max(THRESHOLD_FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
         reason = f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
         return Threshold(sd, noise, reason + "around which windows at rest crowd")
 
 
 def usual_window(log: Recording) -> float:
     """Length of a window, s: 1 s, or 9 samples of a slow log if its unit of time is plausible."""
-    return 1.0 if log.unit_hint() else max(1.0, (FEWEST + 1) * log.step)
+    return 1.0 if log.unit_hint() else max(1.0, (MIN_SAMPLES + 1) * log.step)
 
 
 def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]]:

@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 SIZES = np.geomspace(4.0, 4e6, 61)
 """λ of which the most probable one gives the amplitude."""
-LIKELY = 0.01
+MIN_POSTERIOR = 0.01
 """Posterior from which on an explanation counts for a place."""
-FOLLOWS = (0.1, 1.0)
+LAGS = (0.1, 1.0)
 """Lags by which a rate of temperature is taken, as parts of the time between two holds."""
 
 
@@ -96,7 +96,7 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
     totals: dict[Place, float] = defaultdict(float)
     beside: dict[Place, tuple[float, tuple[str, ...]]] = {}
     for one in posterior.all:
-        if UNKNOWN in one.names and one.posterior > LIKELY:
+        if UNKNOWN in one.names and one.posterior > MIN_POSTERIOR:
             names = tuple(name for name in one.names if name != UNKNOWN)
             for place, share in shares_of_places(problem, one.names).items():
                 totals[place] += one.posterior * share
@@ -157,7 +157,7 @@ def _coordinates(coordinate: str, frame: Frame) -> Iterator[dict[str, str | floa
     hold = frame.hold
     if coordinate == "dT/dt":
         between = float(np.median(np.diff(hold.column("time")))) if hold.time is not None else 0.0
-        for lag in FOLLOWS if between > 0 else ():
+        for lag in LAGS if between > 0 else ():
             yield {"coordinate": "temperature rate", "tau": float(f"{lag * between:.4g}")}
     elif coordinate == "time":
         yield {"coordinate": _course(frame)}

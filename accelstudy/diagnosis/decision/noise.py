@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from accelstudy.adjustment.quality import Solution, pooled_variance
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.evidence.noise_tests import (
@@ -51,7 +51,10 @@ def misfit(problem: Problem, solution: Solution) -> Misfit | None:
     after the refit, it is the difference of repeated positions.
     """
     stated = problem.evidence.level.known
-    if stated and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTED:
+    if (
+        stated
+        and 2 * float(special.chdtrc(solution.redundancy, solution.omega)) >= REFUTATION_LEVEL
+    ):
         return None
     ratio = float(np.sqrt(solution.omega / solution.redundancy))
     than_stated = Misfit(ratio, of_repeats=False) if stated else None
@@ -60,9 +63,9 @@ def misfit(problem: Problem, solution: Solution) -> Misfit | None:
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
     square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
-    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTED / 2):
+    if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
         return than_stated
-    if _of_fit(left, square, freedom) >= REFUTED:
+    if _of_fit(left, square, freedom) >= REFUTATION_LEVEL:
         return None
     return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
 
@@ -122,7 +125,7 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
 def sigma_holds(problem: Problem, frame: Frame) -> bool:
     """Whether sigma is given, and the residuals of a fit do not refute it."""
     stated = problem.evidence.level.known
-    return stated and level_test_of(problem, frame).p_value >= REFUTED
+    return stated and level_test_of(problem, frame).p_value >= REFUTATION_LEVEL
 
 
 def unit_variance(problem: Problem, frame: Frame) -> float:
@@ -141,8 +144,8 @@ def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:
         t
         for t in tests
         # A sigma that the residuals confirm knows of what varies from hold to hold.
-        if not (t.by_holds and level is not None and level.p_value >= REFUTED)
+        if not (t.by_holds and level is not None and level.p_value >= REFUTATION_LEVEL)
     ]
     others = RULES.level_noise / max(len(counted) - (level is not None), 1)
-    failed = [t for t in counted if t.p_value < (REFUTED if t is level else others)]
+    failed = [t for t in counted if t.p_value < (REFUTATION_LEVEL if t is level else others)]
     return min(failed, key=lambda t: SPECIFIC.index(t.name), default=None)

@@ -47,7 +47,7 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis, cosines
 from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
 
-SLOW = (("time", "bias"), ("time", "scale"))
+SLOW_PLACES = (("time", "bias"), ("time", "scale"))
 """Places of what follows something that was not recorded, and that slow noise may be, too."""
 
 
@@ -333,7 +333,11 @@ def _noises(
     coloured = np.log(RULES.prior_coloured) + log_mean(processes)
     if problem.absent:
         unknown = problem.field.unknown
-        courses = LearnedShapes.of(problem.frame, SLOW) if unknown is None else unknown.at(SLOW)
+        courses = (
+            LearnedShapes.of(problem.frame, SLOW_PLACES)
+            if unknown is None
+            else unknown.at(SLOW_PLACES)
+        )
         if courses.places:
             z = residuals.z
             course = float(courses.log_density(evidence, courses.parts(z), z @ z))

@@ -19,9 +19,9 @@ from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.sensors.models import composition_name
 from accelstudy.sensors.sensor import SensorModel
 
-EDGE = 0.1
+EDGE_SHARE = 0.1
 """Part of what is searched within which the least is at its end."""
-BEYOND = 1.6
+RANGE_FACTOR = 1.6
 """Factor by which a setting may lie beyond the first and the last that are tried."""
 
 
@@ -150,7 +150,7 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
         from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
         values = _values(examined, start)
-        passed = {min(values) / BEYOND, max(values) * BEYOND}
+        passed = {min(values) / RANGE_FACTOR, max(values) * RANGE_FACTOR}
         ends = (*passed, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
@@ -169,7 +169,7 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
             )
             # To first order the least may seem to be a little to one side.
             near = min((low, high), key=lambda v: abs(least.x - np.log(v)))
-            inside = abs(least.x - np.log(near)) > EDGE * np.log(high / low)
+            inside = abs(least.x - np.log(near)) > EDGE_SHARE * np.log(high / low)
             if inside or near in passed or omega(float(np.log(near))) > least.fun:
                 break
             at, passed = near, passed | {low, high}

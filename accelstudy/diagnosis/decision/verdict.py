@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution, global_test
-from accelstudy.basics.levels import REFUTED
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
 from accelstudy.diagnosis.decision.posterior import (
     Case,
@@ -192,7 +192,7 @@ def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
     The evidence for something is wider than the test of the calibration, and its level less strict.
     What it finds beyond that level counts if something of it has a name, or is certain.
     """
-    if not case.problem.evidence.level.known or case.detection.p_value < REFUTED:
+    if not case.problem.evidence.level.known or case.detection.p_value < REFUTATION_LEVEL:
         return None
     base = case.problem.base.solution
     test = global_test(base.omega, base.redundancy, sigma_dof=base.sigma_dof)
@@ -211,7 +211,7 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
     problem, posterior = case.problem, case.posterior
     verdict, name, noise = "noise_model", worst.name, posterior.of_noise
     reason = Reason.of("noise", name=name, remark=worst.remark)
-    if lack_of_fit(problem) < REFUTED and name != STEPS:
+    if lack_of_fit(problem) < REFUTATION_LEVEL and name != STEPS:
         verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
     elif name == LEVEL and worst.estimate[0] >= 1 and noise < RULES.more_probable:

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 NODES = 6
 """Nodes of the integration over each parameter but the last one."""
-LEAST = 1e-300
+MIN_PROBABILITY = 1e-300
 """Least probability that is told from none."""
 
 
@@ -71,7 +71,9 @@ def within_bounds(
         less = sizes / (1 + sizes)
         after = box_probability(less[:, None] * means, less[:, None, None] * covariances, *bounds)
         before = box_probability(0 * means, sizes[:, None, None] * covariances, *bounds)
-        logs[alike] = np.log(np.maximum(after, LEAST)) - np.log(np.maximum(before, LEAST))
+        logs[alike] = np.log(np.maximum(after, MIN_PROBABILITY)) - np.log(
+            np.maximum(before, MIN_PROBABILITY)
+        )
     return logs
 
 
@@ -102,6 +104,6 @@ def box_probability(mean: Array, covariance: Array, low: float, high: float) -> 
         between = ndtr(b) - below
         share *= between
         if i < d - 1:
-            at = np.clip(below + grid[:, i] * between, LEAST, 1 - 1e-16)
+            at = np.clip(below + grid[:, i] * between, MIN_PROBABILITY, 1 - 1e-16)
             drawn[..., i] = sign * ndtri(at)
     return np.asarray(share @ weights)

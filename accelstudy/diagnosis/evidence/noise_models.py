@@ -50,7 +50,7 @@ def restricted_to_residuals(determinant: Array, normal: Array) -> tuple[Array, A
 
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
-GRID = np.linspace(-2.5, 2.5, 9)
+LOG_RATIOS = np.linspace(-2.5, 2.5, 9)
 CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
 
 
@@ -77,7 +77,7 @@ class UnequalAxes:
         evidence : Evidence
         within : (3,) array, variances within the holds; None if unknown
         """
-        x, y = (values.ravel() for values in np.meshgrid(GRID, GRID))
+        x, y = (values.ravel() for values in np.meshgrid(LOG_RATIOS, LOG_RATIOS))
         logs = np.column_stack([x, y]) @ CONTRASTS
         determinant, squares = _restricted(residuals, np.exp(logs))
         densities = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)

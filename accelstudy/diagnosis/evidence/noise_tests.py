@@ -204,7 +204,7 @@ def most_evidence(p: float) -> float:
     return float(-np.log(-np.e * p * np.log(p))) if p < 1 / np.e else 0.0
 
 
-GRID = 1e-5
+GRID_PROBABILITY = 1e-5
 """Probability that noise about a regular grid of attitudes looks like steps, at each resolution."""
 
 
@@ -226,7 +226,7 @@ def resolution_test(forces: Array, sigma: float) -> NoiseTest:
     steps = max(2, min(int(2 * extent / sigma), 100_000))
     lowest = max(1 / 30, 4 * sigma / extent) if extent > 0 else 1.0
     frequencies = np.linspace(min(lowest, 1.0), 1.0, steps) / sigma
-    least = 2 * special.gammaincinv((n - 1) / 2, GRID) / n if n > 1 else 0.0
+    least = 2 * special.gammaincinv((n - 1) / 2, GRID_PROBABILITY) / n if n > 1 else 0.0
     usual = np.exp(-((2 * np.pi * sigma * frequencies) ** 2) * least)
     for column in forces.T if lowest < 1 else ():
         power = _rayleigh_of_grid(column, frequencies)

@@ -33,7 +33,7 @@ where an effect would have been noticed without any test."""
 SHAPE_SIZES = np.geomspace(4.0, 4e6, 7)
 SHAPE_WEIGHTS = np.where(SHAPE_SIZES < 1500, 0.9 / 3, 0.1 / 4)
 """The same prior for a shape, whose density changes less with λ."""
-SIMULATED = 4
+SIMULATED_SIZES = 4
 """The first of them, which are all that simulated residuals can have."""
 
 
@@ -161,7 +161,7 @@ class Evidence:
         """
         # Many sets are simulated ones. They have small effects, and seven digits will do.
         many = len(total) > 1
-        kind, count = (np.float32, SIMULATED) if many else (np.float64, len(SHAPE_SIZES))
+        kind, count = (np.float32, SIMULATED_SIZES) if many else (np.float64, len(SHAPE_SIZES))
         sizes, ends = SHAPE_SIZES[:count, None], np.cumsum([len(share) for share in shares])
         g = sizes * np.concatenate(shares)
         kept, growth = (g / (1 + g)).astype(kind), np.add.reduceat(np.log1p(g), [0, *ends[:-1]], 1)

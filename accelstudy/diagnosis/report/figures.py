@@ -64,12 +64,12 @@ def diagnosis_figures(
 
 
 BEFORE, AFTER, NOISE = "#D55E00", "#0072B2", "#E6E6E6"
-OTHER = "#999999"
+OTHER_COLOUR = "#999999"
 
 
 AXES = {"x": ("#0072B2", "o"), "y": ("#E69F00", "s"), "z": ("#009E73", "^"), "norm": (INK, "o")}
 """Colour and marker of the components of a residual."""
-FEW = 4
+MAX_DISTINCT = 4
 """Number of different values up to which the components of a residual stand side by side."""
 ABREAST = 0.03
 """Distance of the components there, as a part of the range."""
@@ -129,7 +129,7 @@ def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[s
 def _abreast(values: Array, count: int) -> Array:
     """Abscissas (n, count) of components, aside of each other where few values would hide them."""
     aside = ABREAST * np.ptp(values) * (np.arange(count) - (count - 1) / 2)
-    return values[:, None] + aside * (len(np.unique(values)) <= FEW)
+    return values[:, None] + aside * (len(np.unique(values)) <= MAX_DISTINCT)
 
 
 def _draw_component(
@@ -150,7 +150,7 @@ def _draw_component(
                 markerfacecolor="none", label="left out")  # fmt: skip
 
 
-SHOWN = 12
+MAX_CANDIDATES = 12
 """Candidates in the figure of the evidence; weaker ones would only make it long."""
 SMALLEST_P = 1e-12
 
@@ -165,13 +165,13 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
         return max(p_values.get(name, 1.0), SMALLEST_P), -probabilities.get(name, 0.0), name
 
     names = sorted({*p_values, *probabilities}, key=rank)
-    shown = [name for name in names if name != UNKNOWN][:SHOWN]
+    shown = [name for name in names if name != UNKNOWN][:MAX_CANDIDATES]
     shown += [
         n for n in names if n not in shown and (probabilities.get(n, 0) > 0.05 or n == UNKNOWN)
     ]
     named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
     named |= set() if diagnosis.shape is None else {UNKNOWN}
-    colours = [AFTER if name in named else OTHER for name in shown]
+    colours = [AFTER if name in named else OTHER_COLOUR for name in shown]
     place = np.arange(len(shown))[::-1]
 
     figure = new_figure(FULL, 22 + 4.4 * len(shown))
@@ -216,16 +216,18 @@ def _percent(probability: float | None) -> str:
     return "> 99 %" if probability > 0.99 else f"{100 * probability:.0f} %"
 
 
-LISTED = 5
+MAX_PLACES = 5
 """Places that are drawn by themselves; the others count together."""
 
 
 def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Posterior of the places where what is missing may live, and residuals over the best one."""
     d, best = diagnosis, diagnosis.like[0]
-    bars = {f"{o.target} over\n{_coordinate(o.coordinate)}": o.posterior for o in d.like[:LISTED]}
-    if len(d.like) > LISTED:
-        bars["all others"] = sum(one.posterior for one in d.like[LISTED:])
+    bars = {
+        f"{o.target} over\n{_coordinate(o.coordinate)}": o.posterior for o in d.like[:MAX_PLACES]
+    }
+    if len(d.like) > MAX_PLACES:
+        bars["all others"] = sum(one.posterior for one in d.like[MAX_PLACES:])
     names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
     values = coordinate_in_holds(best.coordinate, d.frame)
     # Each axis has its own argument, and a panel of its own only where all residuals are one.
@@ -272,7 +274,7 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 """Of the families, the most probable first."""
 ALONE = "#999999"
 """Of what belongs to no family, and of further families."""
-BARS = 8
+MAX_BARS = 8
 """Explanations in the figure; weaker ones count as others."""
 HEIGHT = 0.64
 """Of a bar, in rows."""
@@ -290,7 +292,7 @@ def _rows(
     explanations: tuple[Explanation, ...],
 ) -> tuple[list[tuple[str, float, list[str]]], dict[str, str]]:
     """Label, posterior and colours of each bar, and the colour of each family."""
-    families = [[family_of(*members) for members in one.classes] for one in explanations[:BARS]]
+    families = [[family_of(*members) for members in one.classes] for one in explanations[:MAX_BARS]]
     named = dict.fromkeys(family for of_one in families for family in of_one if family)
     colours = dict(zip(named, COLOURS, strict=False))
     rows = [
@@ -335,7 +337,7 @@ COMPONENTS = {
 """Colour and marker of what depends on the coordinate of a learned function."""
 BAND = 1.96
 """Half of a band of 95 %, in sigmas."""
-PLAIN = 3
+MAX_NOISE_RATIO = 3
 """Residuals whose noise is so many times that of the best are drawn small."""
 
 
@@ -364,7 +366,7 @@ def shape_figure(shape: LearnedShape) -> Figure:
     # What hardly shows the function has no say in the scale.
     limits = panels[0].get_ylim()
     for ax, x, points in hardly:
-        ax.plot(x, points, ".", color=OTHER, markersize=2.5)
+        ax.plot(x, points, ".", color=OTHER_COLOUR, markersize=2.5)
     panels[0].set_ylim(limits)
     panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
     return figure
@@ -372,7 +374,7 @@ def shape_figure(shape: LearnedShape) -> Figure:
 
 def hardly_shown(shape: LearnedShape) -> NDArray[np.bool_]:
     """Which residuals, (n, c), have so much noise that they are drawn small."""
-    return np.asarray(shape.spreads > PLAIN * np.nanmin(shape.spreads, axis=0))
+    return np.asarray(shape.spreads > MAX_NOISE_RATIO * np.nanmin(shape.spreads, axis=0))
 
 
 def _per_unit(what: str, unit: str) -> str:
@@ -382,7 +384,7 @@ def _per_unit(what: str, unit: str) -> str:
 
 DIGITS = 48
 """Most digits of position numbers along the axis."""
-LARGE = 20
+LOG_SCALE_RATIO = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
 
@@ -397,7 +399,7 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     sigma = 1e3 * condition_sigma(diagnosis.final.solution, diagnosis.unit_variance)
     place = np.arange(len(held))
     ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
-    ax.vlines(place, after, before, color=OTHER, linewidth=0.8)
+    ax.vlines(place, after, before, color=OTHER_COLOUR, linewidth=0.8)
     ax.plot(place, before, "s", color=BEFORE, label="without the effect")
     ax.plot(place, after, "o", color=AFTER, label="with the effect")
     # Labels of long numbers must not meet.
@@ -409,11 +411,11 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     figure.legend(loc="outside upper left", ncols=3)
 
     heights = {"without": gap.before, "with": gap.after, "right\nmodel": gap.floor}
-    drawn = bars.bar(list(heights), list(heights.values()), color=[BEFORE, AFTER, OTHER])
+    drawn = bars.bar(list(heights), list(heights.values()), color=[BEFORE, AFTER, OTHER_COLOUR])
     bars.bar_label(drawn, [number(value) for value in heights.values()], padding=1, fontsize=7.5)
     bars.axhline(1, color=INK, linewidth=0.8, linestyle=":")
     bars.set_ylabel("mean square / noise variance")
-    if max(heights.values()) > LARGE * min(heights.values()):
+    if max(heights.values()) > LOG_SCALE_RATIO * min(heights.values()):
         bars.set_yscale("log")
     bars.margins(y=0.12)
     bars.grid(axis="x", visible=False)

@@ -23,7 +23,7 @@ from accelstudy.diagnosis.decision.statement import (
 )
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.forms import coordinate_of
-from accelstudy.diagnosis.formulas import OTHER
+from accelstudy.diagnosis.formulas import OTHER_FORM
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect, get_effect
@@ -64,11 +64,11 @@ FAMILIES = {
 NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """Words for names that stand for no effect."""
 
-WORTH = 0.1
+MIN_SAID = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
-PLAIN = 0.5
+MIN_PLACE_SAID = 0.5
 """Posterior from which on it is worth a word where that which has a name lives."""
-MOST = 3
+MAX_FORMULAS = 3
 """Formulas that are worth a word; the page lists all."""
 
 HERE = sys.modules[__name__]
@@ -183,11 +183,11 @@ def changed(diagnosis: Diagnosis) -> str:
 
 def like(diagnosis: Diagnosis) -> str:
     """Say of what that which is missing may be a function; nothing where that is open."""
-    worth = [one for one in diagnosis.like if one.posterior >= WORTH]
+    worth = [one for one in diagnosis.like if one.posterior >= MIN_SAID]
     if diagnosis.shape is not None and len(worth) == 1:
         return ""
     named = diagnosis.verdict not in ("unknown", LEARNED)
-    if named and worth and worth[0].posterior < PLAIN:
+    if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
     places = [(COORDINATES.get(one.coordinate, one.coordinate), one) for one in worth]
     return _listed([(f"{TARGETS[o.target]} that varies with {c}", o.posterior) for c, o in places],
@@ -199,11 +199,11 @@ def formulas(diagnosis: Diagnosis) -> str:
     if diagnosis.shape is None:
         return ""
     ranked = diagnosis.shape.ranking.formulas
-    if ranked[0].text == OTHER and ranked[0].posterior >= RULES.sure:
+    if ranked[0].text == OTHER_FORM and ranked[0].posterior >= RULES.sure:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
-    worth = [(one.text, one.posterior) for one in ranked if one.posterior >= WORTH]
-    rest = " or otherwise" if len(worth) > MOST else ""
-    return f"It varies {_listed(worth[:MOST], 'or')}{rest}."
+    worth = [(one.text, one.posterior) for one in ranked if one.posterior >= MIN_SAID]
+    rest = " or otherwise" if len(worth) > MAX_FORMULAS else ""
+    return f"It varies {_listed(worth[:MAX_FORMULAS], 'or')}{rest}."
 
 
 def beyond(diagnosis: Diagnosis) -> str:
@@ -258,7 +258,7 @@ def explain(names: Sequence[str]) -> str:
 def missing(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
     effects, others = effects_and_others(credible_set)
-    unless = _or([one for one in others if one.posterior >= WORTH])
+    unless = _or([one for one in others if one.posterior >= MIN_SAID])
     return _missing(_if_it_is_an_effect(effects, cosine)) + f", unless it is {unless}" * bool(
         unless
     )
@@ -276,7 +276,7 @@ def without_a_name(set_says: Statement, beside: str = "something else") -> str:
     if not effects:
         return "Something is missing from the model, and it has no name here."
     lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
-    worth = [one for one in set_says.open if one.names and one.posterior >= WORTH]
+    worth = [one for one in set_says.open if one.names and one.posterior >= MIN_SAID]
     more = sorted(worth, key=lambda one: not one.of_effects)
     surely = len(effects) < len(set_says.certain) or _surely_more(set_says, RULES.credible)
     if any(one.of_effects for one in more) and len(more) <= RULES.many:
@@ -297,7 +297,7 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
         named = zip(one.names, one.classes, strict=True)
         for kind in dict.fromkeys(_kind(name, members) for name, members in named):
             kinds[kind] += one.posterior
-    worth = sorted(((k, p) for k, p in kinds.items() if p >= WORTH), key=lambda item: -item[1])
+    worth = sorted(((k, p) for k, p in kinds.items() if p >= MIN_SAID), key=lambda item: -item[1])
     return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
 
 
@@ -327,7 +327,9 @@ def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
         if len(part.names) > 1
     ]
     beside = set_says.open if alike or not others else credible_set
-    more = [(explained(o.names), o.posterior) for o in beside if o.names and o.posterior >= WORTH]
+    more = [
+        (explained(o.names), o.posterior) for o in beside if o.names and o.posterior >= MIN_SAID
+    ]
     perhaps = any(not one.names for one in beside)
     if len(more) > 1 and not perhaps:
         alike.append(more)
@@ -344,7 +346,7 @@ def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str
 def _missing(set_says: Statement) -> str:
     if not set_says.certain:
         return _or(set_says.open)
-    more = _or([one for one in set_says.open if one.names and one.posterior >= WORTH])
+    more = _or([one for one in set_says.open if one.names and one.posterior >= MIN_SAID])
     if not more and len(set_says.certain) == 1:
         (part,) = set_says.certain
         return _part(part, "{family}: {names}" if part.family else "{names}")

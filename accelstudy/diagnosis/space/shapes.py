@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DIRECTIONS, SOME = 12, 60
+DIRECTIONS, SPHERE_DIRECTIONS = 12, 60
 """Functions of the direction of gravity for each axis, and directions that they are made of."""
-KEPT, LEAST = 24, 2e-3
+MAX_DIRECTIONS, MIN_TRACE_SHARE = 24, 2e-3
 """Directions of a shape that are kept at most, and the least share of the trace of each."""
 
 Place: TypeAlias = tuple[str, str]
@@ -93,7 +93,7 @@ class LearnedShapes(Shapes):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
             for prior in priors[priors @ left > RULES.visible_shape * (priors @ whole)]:
-                used = prior > LEAST * prior.max()
+                used = prior > MIN_TRACE_SHARE * prior.max()
                 places.append(place)
                 kinds.append(kind)
                 covariances.append(projected[:, used] * np.sqrt(prior[used]))
@@ -126,7 +126,7 @@ class LearnedShapes(Shapes):
         vectors, shares = [np.zeros((m, 0))], []
         for i, root in enumerate(roots):
             values, turned = decomposed[i]
-            kept = np.flatnonzero(values > LEAST * values.sum())[-KEPT:]
+            kept = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
             vectors.append(root @ (turned[:, kept] / np.sqrt(values[kept])))
             shares.append(values[kept] / values[kept].sum())
         return cls(tuple(places), weights, np.concatenate(vectors, axis=1), tuple(shares))
@@ -201,7 +201,7 @@ class _Coordinate:
     priors: Array
 
 
-SLOW = ("bias", "scale", "square", "nonorthogonality", "reading", "tilt")
+SLOW_TARGETS = ("bias", "scale", "square", "nonorthogonality", "reading", "tilt")
 """Targets of anything that changes from hold to hold, whatever the attitude."""
 
 
@@ -229,11 +229,11 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
         targets = ("bias", "scale", "reading", "tilt")
         yield from smooth("vibration", targets, hold.vibration[:, None])
     if hold.temperature is not None:
-        yield from smooth("temperature", SLOW, hold.temperature[:, None])
+        yield from smooth("temperature", SLOW_TARGETS, hold.temperature[:, None])
     if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
         return
     when = hold.column(order)
-    yield from smooth("time", SLOW, when[:, None])
+    yield from smooth("time", SLOW_TARGETS, when[:, None])
     yield _Coordinate("time", ("bias",), when[:, None], *_waves(when))
     before = np.concatenate([f[:1], f[:-1]])
     yield from smooth("previous", ("bias",), before)
@@ -272,7 +272,7 @@ def _on_the_sphere(f: Array) -> tuple[Array, Array]:
     """Functions of the direction of forces (n, 3), smooth by any of two lengths."""
     unit = f / np.linalg.norm(f, axis=1, keepdims=True)
     # Of many directions some will do: the functions are smooth (Nyström).
-    some = unit[np.unique(np.linspace(0, len(unit) - 1, SOME).round().astype(int))]
+    some = unit[np.unique(np.linspace(0, len(unit) - 1, SPHERE_DIRECTIONS).round().astype(int))]
     features, weights = [], []
     for length in LENGTHS[1:]:
         values, vectors = np.linalg.eigh(_alike(some, some, length))
@@ -289,7 +289,7 @@ def _alike(one: Array, other: Array, length: float) -> Array:
 
 # --- targets ------------------------------------------------------------------------------------
 
-NAMES = {"square": "scale", "bias of the others": "bias"}
+NAMED_TARGETS = {"square": "scale", "bias of the others": "bias"}
 """Targets of which more is tried: a scale of the square, a bias by the forces of other axes."""
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
@@ -303,7 +303,7 @@ def _functions(frame: Frame, only: Collection[Place]) -> Iterator[tuple[Place, A
     for one in _coordinates(frame):
         varying = less_its_mean(one.functions)
         for target in one.targets:
-            place = (one.name, NAMES.get(target, target))
+            place = (one.name, NAMED_TARGETS.get(target, target))
             if (only and place not in only) or (target in ("reading", "tilt") and not robot):
                 continue
             rows = function_rows(frame, target, varying)

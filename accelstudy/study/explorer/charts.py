@@ -13,7 +13,7 @@ import altair as alt
 from accelstudy.drawing.style import INK, approach_colour
 
 Layers = alt.LayerChart | alt.FacetChart
-PALE = 0.2
+PALE_OPACITY = 0.2
 """Opacity of set-ups that are not compared with the chosen one."""
 BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
 """Of correlations from none to 1, as in the figures."""
@@ -68,7 +68,7 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
         alike=f"{alike} && ({same_scheme})",
     )
     rows = rows.encode(
-        opacity=_opacity("datum.alike", 1, PALE),
+        opacity=_opacity("datum.alike", 1, PALE_OPACITY),
         tooltip=["model:N", "scheme:N", "approach:N", "state:N"]
         + [f"{angle}_{name}:Q" for name in ("rms", "low", "high", "q95")],
     )
@@ -86,7 +86,7 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
         rows.mark_text(text="×", fontSize=18).encode(
             x=alt.value(alt.ExprRef("width - 8")),
             opacity=_opacity(
-                f"isValid(datum.{angle}_rms)", 0, alt.ExprRef(f"datum.alike ? 1 : {PALE}")
+                f"isValid(datum.{angle}_rms)", 0, alt.ExprRef(f"datum.alike ? 1 : {PALE_OPACITY}")
             ),
         ),
     ).add_params(by, chosen)

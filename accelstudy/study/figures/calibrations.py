@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
 APPROACHES = ("gravity", "robot")
-WRITTEN = 0.005
+MIN_WRITTEN = 0.005
 """Correlations above this are written into their field."""
 WIDTH = 0.36
 """Width of a bar; the parameters are 1 apart."""
@@ -119,7 +119,9 @@ def correlations(tables: Tables, study: Study) -> Figure:
         texts = np.char.lstrip(np.char.mod("%.2f", values), "0")
         for lines in (ax.hlines, ax.vlines):  # between the groups of parameters
             lines(edges, -0.5, len(names) - 0.5, "#BBBBBB", linewidth=0.6)
-        return matrix(ax, symbols, symbols, values, np.where(values > WRITTEN, texts, ""), **look)
+        return matrix(
+            ax, symbols, symbols, values, np.where(values > MIN_WRITTEN, texts, ""), **look
+        )
 
     return panels(
         table,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.lines import Line2D
 
-MOST = 12
+MAX_PANELS = 12
 """Most rows and most columns of panels; with more none could be read."""
 SMALLEST_BIAS = 0.01
 """Smallest bias that is drawn, as a share of the sd. Adjustments have a bias of their own, which is
@@ -69,8 +69,8 @@ def panels(
     """
     table = table.reset_index(drop=True)
     rows, columns = (list(table[name].unique()) if name else [""] for name in (row, column))
-    left_out = len(rows[MOST:]) + len(columns[MOST:])
-    rows, columns = rows[:MOST] or [""], columns[:MOST] or [""]
+    left_out = len(rows[MAX_PANELS:]) + len(columns[MAX_PANELS:])
+    rows, columns = rows[:MAX_PANELS] or [""], columns[:MAX_PANELS] or [""]
     fig = style.new_figure(width, 20 + len(rows) * height_mm)
     fig.set_layout_engine("constrained", wspace=0, hspace=0)
     shared = {"sharex": "col", "sharey": "row", **shared} if len(table) else {}

@@ -7,13 +7,13 @@ import numpy as np
 from accelstudy.basics.shares import Z95
 from accelstudy.drawing import style
 from accelstudy.study.beyond_linear_theory import (
-    OFF,
+    MIN_NONLINEAR_SHARE,
     beyond_linear_theory,
     knows_all,
     noise_when_off,
 )
 from accelstudy.study.figures.factors import NOISES
-from accelstudy.study.figures.panels import MOST, key, narrow, panels, points
+from accelstudy.study.figures.panels import MAX_PANELS, key, narrow, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 BAND = "#DDDDDD"
@@ -88,7 +88,7 @@ def ratios_to_theory(summary: DataFrame) -> DataFrame:
 
 # --- what simulation adds ------------------------------------------------------------------------
 
-APART = 0.36
+APPROACH_DISTANCE = 0.36
 """Height between two approaches; rows are 1 apart."""
 LIMIT: style.Style = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
 ROW_MM = 4.2
@@ -109,12 +109,12 @@ def draw_beyond_linear_theory(tables: Tables, study: Study) -> Figure:
     """
     table = largest_of_groups(tables)
     approaches = sorted(set(table["approach"]))
-    lines = {"excess": OFF, "noise": float(NOISES[0].shown(study.sigma_force))}
+    lines = {"excess": MIN_NONLINEAR_SHARE, "noise": float(NOISES[0].shown(study.sigma_force))}
 
     def draw(ax: Axes, rows: DataFrame) -> None:
         groups, seen = style.in_order(rows["group"]), rows["size"].notna()
         offset = rows["approach"].map(approaches.index) - (len(approaches) - 1) / 2
-        rows = rows.assign(y=rows["group"].map(groups.index) + APART * offset)
+        rows = rows.assign(y=rows["group"].map(groups.index) + APPROACH_DISTANCE * offset)
         quantity = rows["quantity"].iloc[0]
         if quantity in lines:
             ax.axvline(lines[quantity], color=style.INK, linewidth=0.8, linestyle=":")
@@ -125,7 +125,7 @@ def draw_beyond_linear_theory(tables: Tables, study: Study) -> Figure:
         ax.set_yticks(range(len(groups)), map(style.group_label, groups))
         ax.grid(False, axis="y")
 
-    sizes = table.groupby("title", sort=False)["group"].nunique()[:MOST] + 1.6
+    sizes = table.groupby("title", sort=False)["group"].nunique()[:MAX_PANELS] + 1.6
     legend = [
         *style.approach_handles(approaches),
         key("at most", linestyle="", marker="<", **LIMIT),
@@ -167,5 +167,5 @@ def largest_of_groups(tables: Tables) -> DataFrame:
     table = pd.concat(parts).groupby(keys, sort=False)[["size", "limit"]].max().reset_index()
     excess = table[(table["quantity"] == "excess") & (table["noise"] > 0)]
     off = {name: noise_when_off(excess["noise"], excess[name]) for name in ("size", "limit")}
-    label = f"{NOISES[0].title} for {100 * OFF:g} % / {NOISES[0].shown_unit}"
+    label = f"{NOISES[0].title} for {100 * MIN_NONLINEAR_SHARE:g} % / {NOISES[0].shown_unit}"
     return pd.concat([table, excess.assign(quantity="noise", label=label, **off)])

@@ -10,11 +10,11 @@ from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Ta
 LINE_STYLES = ("-", "--", ":")
 MARKERS = ("o", "^", "s")
 """Styles of the first, second and third member of a group."""
-SMALLEST = 1.0
+MIN_PERCENT = 1.0
 """Percent; inputs that are below everywhere are left out."""
-SEEN = 0.5
+MIN_CHANGE = 0.5
 """Percentage points; groups of inputs that change by less are left out."""
-APART = 0.17
+SYMBOL_DISTANCE = 0.17
 """Height of a symbol, as a share of its panel."""
 RING: style.Style = {
     **{"linestyle": "", "marker": "o", "markersize": 6},
@@ -39,10 +39,10 @@ def effects_over_roll(
     table = read_shares(tables["sensitivity"], approach)
     table = table[(table["output"] == output) & (table["pitch_gon"] >= 0)]
     table = table.assign(value=100 * table["share"], half=100 * table["ci95"], overtakes=False)
-    drawn = table.groupby("input")["value"].transform("max") >= SMALLEST
-    scale = {"value": "symlog", "linthresh": SMALLEST, "linscale": 0.4}
+    drawn = table.groupby("input")["value"].transform("max") >= MIN_PERCENT
+    scale = {"value": "symlog", "linthresh": MIN_PERCENT, "linscale": 0.4}
     table = table[drawn].assign(low=-0.1, high=500, on="")
-    return over_roll(table, scale, SMALLEST, f"total effect on {output} / %")
+    return over_roll(table, scale, MIN_PERCENT, f"total effect on {output} / %")
 
 
 for _number, _output in ((5, "roll"), (6, "pitch")):
@@ -67,12 +67,12 @@ def shapley(tables: Tables, study: Study) -> Figure:
     table = changes(tables["shapley"])
     of_group = table.groupby(["output", "group"])
     low, high = of_group["value"].transform("min"), of_group["value"].transform("max")
-    drawn = (low <= -SEEN) | (high >= SEEN) | of_group["overtakes"].transform("any")
+    drawn = (low <= -MIN_CHANGE) | (high >= MIN_CHANGE) | of_group["overtakes"].transform("any")
     low, high = 1.7 * low.clip(upper=0) - 0.1, 1.7 * high.clip(lower=0) + 0.1
     title = "Shapley effect less total effect / percentage points\n"
-    title += f"all others: less than {SEEN:g}; ○ overtakes another input"
+    title += f"all others: less than {MIN_CHANGE:g}; ○ overtakes another input"
     table = table.assign(low=low, high=high, on="\non " + table["output"])[drawn]
-    return over_roll(table, {"value": "linear"}, 0.2 * SEEN, title)
+    return over_roll(table, {"value": "linear"}, 0.2 * MIN_CHANGE, title)
 
 
 # --- tables --------------------------------------------------------------------------------------
@@ -169,13 +169,13 @@ def write_symbols(ax: Axes, rows: DataFrame, least: float) -> None:
             at = end if abs(end["value"]) >= 0.5 * abs(peak["value"]) else peak
             place = ax.transData.transform((at["roll"], at["value"]))
             side = -1 if at["value"] < 0 else 1
-            height = side * ax.transAxes.inverted().transform(place)[1] + 0.6 * APART
+            height = side * ax.transAxes.inverted().transform(place)[1] + 0.6 * SYMBOL_DISTANCE
             ends.append((side, height, float(at["roll"]), str(name)))
     taken: list[tuple[int, float, float]] = []
     near = 0.5 * rows["roll"].max()
     for side, height, roll, name in sorted(ends):
         below = [h for s, x, h in taken if s == side and abs(x - roll) < near]
-        height = max([height, *(other + APART for other in below)])
+        height = max([height, *(other + SYMBOL_DISTANCE for other in below)])
         taken.append((side, roll, height))
         font: style.Style = {"ha": "center", "va": "center", "fontsize": 7.5}
         font |= {"color": style.group_colour(style.group_of(name))}
