@@ -64,15 +64,11 @@ def test_the_calibration_finds_the_bias(guide):
 
 
 @pytest.mark.parametrize("name", ["log", "campaign", "calibration", "diagnosis", "plan", "result"])
-def test_a_result_shows_itself_on_one_line_and_in_a_notebook(guide, name):
-    assert len(repr(guide[name])) <= 100
-    assert "\n" not in repr(guide[name])
-    assert "<table" in guide[name]._repr_html_()
-
-
-@pytest.mark.parametrize("name", ["log", "campaign", "calibration", "diagnosis", "plan", "result"])
-def test_a_result_is_equal_to_itself_alone(guide, name):
+def test_a_result_shows_itself_on_one_line_and_is_equal_to_itself_alone(guide, name):
     one, other = guide[name], copy(guide[name])
+    assert len(repr(one)) <= 100
+    assert "\n" not in repr(one)
+    assert "<table" in one._repr_html_()
     assert (one == one, one == other) == (True, False)
     assert len({one, other}) == 2
 
@@ -122,14 +118,10 @@ def test_a_truth_is_in_si_or_with_its_unit():
 
 
 @pytest.mark.parametrize("name", ["calibration", "diagnosis", "plan"])
-def test_a_plot_goes_into_the_axes_that_are_given(guide, name):
-    ax = matplotlib.figure.Figure().subplots()
-    assert guide[name].plot(ax) is ax
-
-
-@pytest.mark.parametrize("name", ["calibration", "diagnosis", "plan"])
-def test_a_plot_of_its_own_has_the_style_of_all_figures(guide, name):
+def test_a_plot_goes_into_the_axes_that_are_given_or_has_the_style_of_all_figures(guide, name):
     with matplotlib.rc_context({"interactive": True, "backend": "agg"}):
+        given = matplotlib.figure.Figure().subplots()
+        assert guide[name].plot(given) is given
         ax = guide[name].plot()
         assert matplotlib.is_interactive()
     assert {label.get_fontsize() for label in ax.get_xticklabels()} == {STYLE["xtick.labelsize"]}
@@ -204,7 +196,6 @@ WRONG = {
     r"acs.read_log('\0')": "no name of a file",
     r"acs.read_log('a\ud800')": "no name of a file",
     "acs.read_log('x' * 5000)": "too long for the name of a file",
-    "acs.read_campaign('x/' * 5000)": "too long for the name of a file",
     "acs.read_log(table, rate='fast')": "rate: expected a number, as 2Hz",
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
     "acs.find_holds({'fx': 1})": "log: expected a path",
@@ -217,7 +208,6 @@ WRONG = {
     "acs.calibrate(3)": "campaign: expected a Campaign",
     "acs.diagnose({})": "campaign: expected a Campaign",
     "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
-    "acs.plan(tilt_accuracy=1e-4, sigma=1, confidence=2)": "confidence: must be rms, or a share",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected the name of a scheme",
     "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",

@@ -1,4 +1,4 @@
-"""What commands suggest to type next runs; and what scripts rely on: --quiet."""
+"""What commands suggest to type next runs."""
 
 import re
 import shlex
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calling import call, succeed
+from calling import succeed
 
 from accelstudy.basics import suggested
 from accelstudy.schemes import get_scheme
@@ -88,30 +88,3 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page():
     for command, *arguments in steps:
         succeed(command, *arguments, *(reading if command == "apply" else ()))
     assert "imu-left-diagnosis-leveled.csv" in steps[0]
-
-
-QUIET = """
-import log.csv --rate 50 --columns fx=0,fy=1,fz=2 --no-figure --out campaign
-calibrate rejected --out one
-apply one/calibration.json log.csv --rate 50 --columns fx=0,fy=1,fz=2 --out leveled.csv
-advise accepted --tilt-accuracy 10mgon
-schemes faces-6
-export one/calibration.json --form px4
-"""
-
-
-@pytest.mark.usefixtures("made")
-def test_quiet_leaves_the_result_and_the_warnings():
-    """Of results, files, lists and texts; the golden set has each command with all its words."""
-    silenced = set()
-    for line in QUIET.strip().splitlines():
-        words = shlex.split(line)
-        force = ["--force"] if "--out" in words else []
-        loud, quiet = (call(*words, *options) for options in ((), (*force, "--quiet")))
-        assert loud.exit_code == quiet.exit_code == 0, f"{line}: {loud.output}{quiet.output}"
-        said, left = ([*filter(None, r.stdout.splitlines())] for r in (loud, quiet))
-        assert [each for each in said if each in left] == left, line
-        silenced |= {words[0]} if len(left) < len(said) else set()
-        warned, rest = (re.findall("^warning: .*", r.stderr, re.M) for r in (loud, quiet))
-        assert warned == rest == [each for each in quiet.stderr.splitlines() if each], line
-    assert silenced >= {"import", "calibrate", "schemes"}

@@ -84,15 +84,6 @@ def test_gravity_is_blind_to_rotations_and_a_robot_is_not(scheme):
     assert design(scheme, QUADRATIC).estimable is (scheme not in ("faces-6", "d-optimal-9"))
 
 
-@pytest.mark.parametrize(
-    ("scheme", "gravity", "robot"),
-    [("d-optimal-9", 0, 18), ("faces-edges-18", 9, 45), ("mclaren-24", 15, 63)],
-)
-def test_redundancy(scheme, gravity, robot):
-    assert design(scheme).redundancy == gravity
-    assert design(scheme, approach=ROBOT).redundancy == robot
-
-
 GOLDEN = (1 + np.sqrt(5)) / 2
 TRIBONACCI = 1.8392867552141612
 SIGNS = list(product((1, -1), repeat=2))
@@ -100,6 +91,7 @@ ALIGNED = {
     "6 faces": np.concatenate([np.eye(3), -np.eye(3)]),
     "12 edges": [np.roll((0, a, b), k) for a, b in SIGNS for k in range(3)],
     "24 McLaren": mclaren_orbit(),
+    "24 rhombicuboctahedron": get_scheme("rhombicuboctahedron-24").directions,
     "24 snub cube": [
         s * np.array((1, 1 / TRIBONACCI, TRIBONACCI))[list(order)]
         for s in product((1, -1), repeat=3)
@@ -132,7 +124,7 @@ def test_a_generic_rotation_makes_cubic_terms_estimable(name):
     assert design(turned, CUBIC).estimable
     of_scheme = design("mclaren-24", CUBIC)
     assert of_scheme.condition == pytest.approx(16, abs=0.5)
-    assert np.degrees(of_scheme.pole_distance) == pytest.approx(13.8, abs=0.05)
+    assert np.degrees(of_scheme.pole_distance) == pytest.approx(13.8, abs=0.05)  # off the pole
 
 
 class _Quintic(Effect):
@@ -226,25 +218,6 @@ def test_table_of_schemes(scheme, m, correlation, gravity, robot):
         assert worst["nonorthogonality"] / MGON == pytest.approx(misalignment, abs=0.05)
         assert worst["scale"] * 1e6 == pytest.approx(scale, abs=0.5)
         assert worst["bias"] * 1e3 == pytest.approx(bias, abs=0.005)
-
-
-@pytest.mark.parametrize(("scheme", "reductions", "gravity_correlation", "robot_correlation"), [
-    ("mclaren-24", {"bias": 41, "scale": 28, "nonorthogonality": 54}, 0.25, 0.012),
-    ("rings-24", {"bias": 41, "scale": 15, "nonorthogonality": 64}, 0.14, 0.007),
-])  # fmt: skip
-def test_what_a_robot_gains(scheme, reductions, gravity_correlation, robot_correlation):
-    """The paper says 50, 30, 70 % of one simulation; linear theory says this of the worst axis."""
-    gravity, robot = design(scheme), design(scheme, approach=ROBOT)
-    for kind, percent in reductions.items():
-        gain = 1 - robot.sigma[KINDS[kind]].max() / gravity.sigma[KINDS[kind]].max()
-        assert 100 * gain == pytest.approx(percent, abs=0.5)
-    for found, correlation, digit in (
-        (gravity, gravity_correlation, 0.005),
-        (robot, robot_correlation, 0.0005),
-    ):
-        matrix = found.cofactors / np.outer(found.sigma, found.sigma)
-        largest = np.abs(matrix[3:6, 3:6] - np.eye(3)).max()
-        assert largest == pytest.approx(correlation, abs=digit)
 
 
 def test_sigma_scales_with_the_noise():

@@ -40,6 +40,11 @@ SEARCHED = 1e-3
 NEGLECTED = {"quadratic_scale": 1e-4, "cubic_scale": 1e-5}
 
 
+def asked(task, name):
+    """A task and a criterion of it."""
+    return task, get_criterion(name, task)
+
+
 def random_directions(n, seed=1):
     points = np.random.default_rng(seed).standard_normal((n, 3))
     return points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -158,8 +163,7 @@ def test_no_positions_are_below_the_bound_of_a_neglected_effect():
 
 def test_moments_of_the_sphere_are_d_optimal_for_the_norm_of_gravity():
     """The general equivalence theorem: d(x) ≤ p everywhere, with equality on the support."""
-    task = BY_GRAVITY
-    criterion = get_criterion("D", task)
+    task, criterion = asked(BY_GRAVITY, "D")
     anywhere = random_directions(500)
     for name in ("mclaren-24", "icosahedron-12", "dodecahedron-20"):
         directions = get_scheme(name).directions
@@ -172,8 +176,7 @@ def test_moments_of_the_sphere_are_d_optimal_for_the_norm_of_gravity():
 
 
 def test_nine_d_optimal_positions_are_the_extremal_points_of_degree_2():
-    task = BY_GRAVITY
-    criterion = get_criterion("D", task)
+    task, criterion = asked(BY_GRAVITY, "D")
     known = float(criterion.value(task.normal(get_scheme("d-optimal-9").directions)))
     found = optimal_design(task, criterion, 9, starts=6)
     assert found.value == pytest.approx(known, abs=1e-5)
@@ -246,17 +249,6 @@ def test_other_numbers_of_optimal_positions_are_refused_with_what_there_is():
         get_scheme("i-optimal-41")
 
 
-def test_the_same_arguments_give_the_same_positions():
-    task = BY_GRAVITY
-    one, two = (
-        optimal_design(task, get_criterion("I", task), 10, starts=1, bounded=False)
-        for _ in range(2)
-    )
-    np.testing.assert_array_equal(one.directions, two.directions)
-    with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
-        optimal_design(task, get_criterion("D", task), 8)
-
-
 # Constraints
 
 
@@ -275,8 +267,7 @@ LEVEL = (-60 * GON, 60 * GON)
     Constraints(LEVEL, LEVEL, 50 * GON, 12 * GON),
 ])  # fmt: skip
 def test_constraints_are_kept_and_cost_efficiency(constraints, free):
-    task = BY_ROBOT
-    criterion = get_criterion("I", task)
+    task, criterion = asked(BY_ROBOT, "I")
     found = optimal_design(task, criterion, 12, constraints=constraints, starts=1)
     assert constraints.met(found.directions)
     assert free.value < found.value < free.value + 0.2
@@ -314,8 +305,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
         [[0, -np.pi / 4], [0, 0], [np.pi / 2, 0]],
         atol=1e-9,
     )
-    task = BY_ROBOT
-    criterion = get_criterion("I", task)
+    task, criterion = asked(BY_ROBOT, "I")
     with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
         optimal_design(task, criterion, 9, Listed(listed.points[:2], "two"))
     for text, wrong in {
@@ -330,12 +320,13 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
 
 
 def test_what_cannot_be_is_said_in_one_line():
-    task = BY_GRAVITY
-    criterion = get_criterion("D", task)
+    task, criterion = asked(BY_GRAVITY, "D")
     with pytest.raises(
         InputError, match=r"9 positions at least 150 gon between positions were not"
     ):
         optimal_design(task, criterion, 9, constraints=Constraints(least_angle=150 * GON))
+    with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
+        optimal_design(task, criterion, 8)
     nowhere = Constraints(pitch=(90 * GON, 100 * GON), pole_distance=30 * GON)
     with pytest.raises(
         InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
@@ -351,8 +342,7 @@ def test_what_cannot_be_is_said_in_one_line():
 
 
 def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
-    task = BY_ROBOT
-    criterion = get_criterion("I", task)
+    task, criterion = asked(BY_ROBOT, "I")
     cosines = (free.directions @ free.directions.T)[np.triu_indices(12, 1)]
     same = cosines > 1 - 1e-8  # of directions to 9 decimals
     assert same.any()

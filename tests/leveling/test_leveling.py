@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.leveling.angles import (
     jacobian,
     near_pole,
@@ -62,12 +62,6 @@ def test_upside_down_has_a_roll_of_200_gon():
     assert pitch == 0
 
 
-def test_components_may_be_arrays():
-    roll, pitch = np.meshgrid(np.linspace(-3, 3, 7), np.linspace(-1.5, 1.5, 5))
-    found = roll_pitch(specific_force(roll, pitch, G))
-    np.testing.assert_allclose(found, [roll, pitch], atol=1e-12)
-
-
 @given(roll=ROLLS, pitch=PITCHES)
 def test_jacobian_is_equation_7(roll, pitch):
     f_x, f_y, f_z = f = force(roll, pitch)
@@ -78,19 +72,6 @@ def test_jacobian_is_equation_7(roll, pitch):
         [f_yz / f_xyz2, -f_x * f_y / (f_xyz2 * f_yz), -f_x * f_z / (f_xyz2 * f_yz)],
     ]
     np.testing.assert_allclose(jacobian(f), expected, rtol=1e-9, atol=1e-14)
-
-
-def test_jacobian_of_many_forces():
-    f = np.random.default_rng(0).standard_normal((4, 5, 3))
-    found = jacobian(f)
-    assert found.shape == (4, 5, 2, 3)
-    np.testing.assert_allclose(found[2, 3], jacobian(f[2, 3]), rtol=1e-14)
-
-
-@pytest.mark.parametrize(("pitch", "expected"), [(0, 12.98), (50, [18.36, 12.98])])
-def test_sigma_of_the_tilt(pitch, expected):
-    sigma = sigma_roll_pitch(force(0, pitch * GON), EQUAL_NOISE) / MGON
-    np.testing.assert_allclose(sigma, expected, atol=0.005)
 
 
 @given(roll=ROLLS, pitch=PITCHES, sigma=st.floats(1e-6, 0.1))
@@ -117,7 +98,7 @@ def test_away_from_the_pole_two_sigmas_hold(noise):
     At each measured distance at which the sigmas are said to hold, 93 to 97 % of the errors are
     below two of them, where 95.4 % are expected.
     """
-    n, rng = 400_000, np.random.default_rng(4)
+    n, rng = 200_000, np.random.default_rng(4)
     sd_x, sd_y, sd_z = noise
     g, farthest = 2000.0, 30.0 * max(sd_y, sd_z)
     distance, azimuth = farthest * np.sqrt(rng.random(n)), rng.uniform(-np.pi, np.pi, n)

@@ -108,16 +108,6 @@ def test_a_large_error_of_the_mean_is_not_linearised():
 # --- closed forms --------------------------------------------------------------------------------
 
 
-def test_a_bias_at_level():
-    """atan(b_y/g) in roll, and atan(b_x/g) in pitch."""
-    level = np.array([[0.0, 0.0, -G]])
-    truth = BIAS.vector({"b_x": 0.03, "b_y": 0.05})
-    error = leveling_error(BIAS, truth, BIAS, np.zeros((1, 3)), level)
-    roll = np.arctan(0.05 / G)
-    pitch = np.arctan(0.03 / np.hypot(G, 0.05))
-    np.testing.assert_allclose(error.per_replicate, [[roll, pitch]], rtol=1e-9)
-
-
 def test_a_common_scale_does_not_tilt():
     f_b = cap_forces(50 * GON, 30)
     error = leveling_error(SCALE, np.full(3, 1e-3), SCALE, np.zeros((2, 3)), f_b)

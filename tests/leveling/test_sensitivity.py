@@ -37,15 +37,6 @@ def test_ishigami():
     assert sd[0] == pytest.approx(np.sqrt(variance), rel=0.01)
 
 
-def test_confidence_intervals_hold_the_published_values():
-    """Over 20 seeds, 60 intervals of 95 %."""
-    inside = 0
-    for seed in range(20):
-        total, ci95, _ = total_effects(ishigami, np.zeros(3), np.ones(3), 512, 100, seed)
-        inside += int(np.count_nonzero(np.abs(total[0] - ISHIGAMI) <= ci95[0]))
-    assert inside >= 50  # of Sobol points they are rather too wide
-
-
 def test_linear_function():
     """(aσ)² over the sum, whatever the means; an input without sigma has no effect."""
     coefficients, sigma = np.array([1.0, -2.0, 3.0, 50.0]), np.array([2.0, 1.0, 0.5, 0.0])
@@ -67,16 +58,6 @@ def test_effects_and_intervals_are_those_of_salib():
     total, ci95, _ = total_effects(ishigami, np.zeros(3), np.ones(3), 256, 20, 4)
     assert total[0].tolist() == expected["ST"].tolist()
     np.testing.assert_allclose(ci95[0], expected["ST_conf"], rtol=1e-12)
-
-
-def test_an_output_without_variance_has_no_effects():
-    total, ci95, sd = total_effects(
-        lambda x: np.stack([x[:, 0], np.full(len(x), 7.0)], axis=1), [0, 0], [1, 1], 64, 10, 1
-    )
-    assert np.isfinite(total[0]).all()
-    assert np.isnan(total[1]).all()
-    assert np.isnan(ci95[1]).all()
-    assert sd[1] == 0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2018])

@@ -18,7 +18,7 @@ def distribution(quadratic, covariance=None, constant=(0.0, 0.0), linear=None):
     return TiltDistribution(tilt, np.eye(u) if covariance is None else covariance)
 
 
-def drawn(of, count=400_000):
+def drawn(of, count=100_000):
     rng = np.random.default_rng(5)
     estimates = rng.multivariate_normal(np.zeros(len(of.covariance)), of.covariance, count)
     each = of.tilt.rms(estimates).T

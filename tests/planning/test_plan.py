@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, succeed
+from calling import call, refusal, succeed
 from page_helpers import assert_told_alike
 from places import ROOT
 from study_helpers import simulated as simulated_of
@@ -19,7 +19,6 @@ from study_helpers import simulated as simulated_of
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, angles_in
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
-from accelstudy.design.closed_forms import gravity_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.estimability import estimability
 from accelstudy.design.spaces import Constraints, Sphere
@@ -54,7 +53,7 @@ MODELS = ("bias-scale", NINE, f"{NINE}-quadratic-cubic")
 QUESTION = "plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"
 G = STANDARD_GRAVITY
 SIGMA = 0.002
-REPLICATES = 10_000
+REPLICATES = 5000
 
 
 @pytest.fixture(autouse=True)
@@ -91,39 +90,18 @@ def asked(sheet=None, **options):
 # --- linear theory -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("approach", "rms", "q95"),
-    [("gravity", (10.7, 10.6), (20.1, 19.1)), ("robot", (5.4, 5.3), (9.9, 9.4))],
-)
-def test_the_numbers_of_the_readme_come_from_linear_theory(approach, rms, q95):
-    theory = theory_of(50 * GON)
+@pytest.mark.parametrize(("model", "approach"), [
+    (NINE, "gravity"), (f"{NINE}-quadratic-cubic", "robot"), ("bias-scale", "robot"),
+])  # fmt: skip
+def test_columns_of_one_model_are_the_designs_of_all(model, approach):
+    model, theory = get_model(model), theory_of(30 * GON)
     told = theory.information(MCLAREN.directions, approach, Noise())
-    expected = theory.expected(told, MODELLED, {})
-    np.testing.assert_allclose(expected.rms / MGON, rms, atol=0.06)
-    np.testing.assert_allclose(expected.quantile(0.95) / MGON, q95, atol=0.1)
-
-
-@pytest.mark.parametrize("model", [NINE, f"{NINE}-quadratic-cubic", "bias-scale"])
-def test_columns_of_one_model_are_the_designs_of_all(model):
-    model, robot = get_model(model), get_approach("robot")
-    theory = theory_of(30 * GON)
-    told = theory.information(MCLAREN.directions, "robot", Noise())
     zeros = np.zeros(model.n_parameters)
     error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
-    own = estimability(MCLAREN, model, robot)
+    own = estimability(MCLAREN, model, get_approach(approach))
     expected = theory.expected(told, names_of(model), {})
     np.testing.assert_allclose(expected.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
     assert expected.redundancy == own.redundancy
-
-
-def test_at_level_it_is_the_closed_form_of_bias_and_axes():
-    sigma = gravity_sigma(MCLAREN.directions, 0.002)
-    theory = theory_of(1e-4)
-    told = theory.information(MCLAREN.directions, "gravity", Noise())
-    level = math.hypot(sigma["bias"] / STANDARD_GRAVITY, sigma["nonorthogonality"])
-    roll, pitch = theory.expected(told, MODELLED, {}).rms
-    assert roll == pytest.approx(level, rel=1e-3)
-    assert pitch == pytest.approx(level, rel=1e-3)
 
 
 def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
@@ -280,20 +258,8 @@ def test_the_answer_that_a_page_quotes_is_the_commands_own(told, page):
     assert_told_alike("".join(lines[: quoted.count("\n")]), quoted)
 
 
-def test_the_answer_stands_in_the_first_line(plan):
-    lines = answer_lines(plan)
-    n = plan.first.candidate.scheme.n_positions
-    minutes = math.ceil(plan.first.candidate.seconds / 60)
-    assert lines[0] == (
-        f"You need no robot. Measure {n} positions by hand, 10 s each: about {minutes} minutes."
-    )
-    assert "in 95 of 100 such calibrations both stay below" in lines[1]
-    assert f"{n - 1}" in lines[2]
-    assert lines[3].startswith("For both to stay below 10 mgon in 95 of 100 calibrations: ")
-    assert "with a robot" in lines[4]
-    table = table_lines(plan)
-    assert len(table) == len(plan.ranked) + 5
-    assert "noise of the sensor" in table[1]
+def test_a_plan_has_a_line_of_each_calibration_and_the_unit_of_angles_that_is_asked_for(plan):
+    assert len(table_lines(plan)) == len(plan.ranked) + 5
     with angles_in("deg"):
         assert " mdeg" in answer_lines(plan)[1]
         assert "roll/mdeg" in table_lines(plan)[0]
@@ -405,10 +371,7 @@ def positions(plan, tmp_path_factory):
     """Positions by the command that the plan tells."""
     folder = tmp_path_factory.mktemp("positions")
     command = positions_command(plan.question, plan.first.candidate)
-    result = call(
-        *shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:]
-    )
-    assert result.exit_code == 0, result.output
+    succeed(*shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:])
     return yaml.safe_load((folder / "positions.yaml").read_text(encoding="utf-8"))["directions"]
 
 
@@ -480,15 +443,9 @@ def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelv
     scale *= kelvin * (sheet.scale_per_kelvin or 0)
     left = roll_and_pitch(f * (1 + scale) + bias) - roll_and_pitch(f)
     square = np.einsum("rka,k->ra", left**2, weights).mean(axis=0)
-    # With 3 degrees of freedom or more the rms of so many is right to 0.5 %.
+    # With 3 degrees of freedom or more the rms of so many is right to 0.6 %.
     said = in_use(question, kelvin=kelvin).warmth
     assert said == pytest.approx(np.sqrt(square.max()), rel=0.025)
-
-
-def test_the_scale_is_a_part_of_what_a_temperature_leaves():
-    """ADXL355, 30 gon, 10 K: the bias alone would leave 13 mgon, both together 24."""
-    said = in_use(Question(10 * MGON, 30 * GON, get_data_sheet("adxl355"))).warmth
-    assert 23 < said / MGON < 25
 
 
 # --- the command ---------------------------------------------------------------------------------
@@ -498,8 +455,8 @@ ASKED = ("plan", "--tilt-accuracy", "20mgon", "--sigma", "2mm/s2", "--replicates
 
 def test_the_command_writes_what_it_says(tmp_path):
     out = tmp_path / "plan"
-    result = call(*ASKED, "--equipment", "gravity", "--out", out, "--angle-unit", "deg")
-    assert result.exit_code == 0, result.output
+    asked = (*ASKED, "--equipment", "gravity", "--out")
+    result = succeed(*asked, out, "--angle-unit", "deg")
     assert result.stdout.startswith("Measure ")
     names = {path.name for path in out.iterdir()}
     pages = {"plan.md", "plan.svg", "plan.png"}
@@ -512,14 +469,12 @@ def test_the_command_writes_what_it_says(tmp_path):
     study = parse_study(yaml.safe_load((out / "study.yaml").read_text(encoding="utf-8")))
     assert study.leveling.max_tilt_gon == 30
     assert result.stdout.splitlines()[0] in (out / "plan.md").read_text(encoding="utf-8")
-    again = call(*ASKED, "--equipment", "gravity", "--out", out, "--quiet")
-    assert again.exit_code == 0
+    again = succeed(*asked, out, "--quiet")
     assert len(again.stdout.splitlines()) < 10
+    assert again.stderr == ""
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("mine")
-    refused = call(*ASKED, "--equipment", "gravity", "--out", tmp_path / "full")
-    assert refused.exit_code == 2
-    assert "--force" in refused.stderr
+    assert "--force" in refusal(*asked, tmp_path / "full")
 
 
 def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
@@ -542,24 +497,17 @@ def test_an_unreachable_target_has_an_exit_status_of_its_own():
     assert result.exit_code == 1
     assert result.stdout.count("\n") == 1
     assert result.stderr == "comparing calibrations, which takes some seconds ...\n"
-    assert call(*ASKED, "--equipment", "gravity", "--quiet").stderr == ""
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    ((), "--tilt-accuracy"),
-    (("--tilt-accuracy", "10"), "expected a number with its unit"),
     (("--tilt-accuracy", "10mgon"), "give the sensor by --sensor, or its noise by --sigma"),
     (("--tilt-accuracy", "10mgon", "--sensor", "paper", "--sigma", "2mm/s2"), "not both"),
     (("--tilt-accuracy", "10mgon", "--sensor", "adxl35"), "did you mean 'adxl355'"),
     (("--tilt-accuracy", "10mgon", "--sensor", "no.yaml"), "no.yaml: no such file"),
-    (("--tilt-accuracy", "10mgon", "--sigma", "0mm/s2"), "must be at least"),
     (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--tilt-range", "95gon"), "at most 90"),
     (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--confidence", "120%"),
      "--confidence: must be rms, or a share"),
     (("--tilt-accuracy", "10mgon", "--sigma", "2mm/s2", "--equipment", "crane"), "crane"),
 ])  # fmt: skip
 def test_bad_input_ends_with_exit_status_2(words, message):
-    result = call("plan", *words)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert result.stdout == ""
+    assert message in refusal("plan", *words)

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 import yaml
-from calling import call
+from calling import refusal, succeed
 from scipy import stats
 
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
@@ -36,19 +35,19 @@ def values(entries):
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
 def test_a_campaign_is_calibrated_to_its_truth(approach):
     """Errors over sigma of many campaigns are standard normal, and Ω is χ²."""
-    standardised, omega = [], []
-    for seed in range(60):
+    n, standardised, omega = 30, [], []
+    for seed in range(n):
         campaign, truth = simulate(seed=seed, approach=approach)
         fit = fit_campaign(campaign, NINE, get_approach(approach))
         known = NINE.vector(values(truth["sensor"]))
         standardised.append((fit.parameters - known) / fit.adjustment.sigma_priori[0, :9])
         omega.append(fit.adjustment.omega[0])
     z = np.array(standardised)
-    assert np.abs(z.mean(axis=0)).max() < 4 / math.sqrt(60)
-    # The parameters are correlated; each has 60 independent values.
-    assert np.abs(z.var(axis=0) - 1).max() < 4.5 * math.sqrt(2 / 60)
+    assert np.abs(z.mean(axis=0)).max() < 4 / math.sqrt(n)
+    # The parameters are correlated; each has n independent values.
+    assert np.abs(z.var(axis=0) - 1).max() < 4.5 * math.sqrt(2 / n)
     r = fit.adjustment.redundancy
-    assert np.mean(omega) == pytest.approx(r, rel=4.5 * math.sqrt(2 / r / 60))
+    assert np.mean(omega) == pytest.approx(r, rel=4.5 * math.sqrt(2 / r / n))
 
 
 def test_hidden_effects_are_found_where_they_were_put():
@@ -83,13 +82,6 @@ def test_sizes_are_typical():
         assert stats.kstest(np.log(part / low) / np.log(high / low), "uniform").pvalue > 1e-4
     _, truth = simulate(effects=("quadratic_scale",), size=0.5)
     assert {abs(v) for v in values(truth["effects"]).values()} == {2500e-6 / 2}
-
-
-def test_a_seed_gives_the_same_campaign_and_another_a_different_one():
-    one, same, other = (simulate(seed=seed) for seed in (4, 4, 5))
-    np.testing.assert_array_equal(one[0].forces, same[0].forces)
-    assert one[1] == same[1]
-    assert not np.any(one[0].forces == other[0].forces)
 
 
 def test_what_is_added_changes_nothing_else_that_is_drawn():
@@ -173,14 +165,13 @@ def test_sds_within_the_holds():
 
 def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     folder, truth_path = tmp_path / "one", tmp_path / "truth" / "one.yaml"
-    result = call(
+    succeed(
         "simulate-campaign", "--out", folder, "--truth", truth_path, "--seed", 7,
         "--effect", "warm_up(tau=300)",
         "--noise-effect", "heavy_tails(nu=3)", "--gross-error", "unit_error(force=0.1)",
         "--temperature", "20:40", "--temperature-order", "ABBA", "--vibration", "0:1",
         "--yaw", "random", "--n-samples", 50, "--no-sigma-known", "--robot-sigma", "5mgon",
     )  # fmt: skip
-    assert result.exit_code == 0, result.output
     assert sorted(path.name for path in folder.iterdir()) == ["campaign.yaml", "positions.csv"]
     campaign = read_campaign(folder, plausible=False)
     expected, truth = simulate(
@@ -206,6 +197,8 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     (["--noise-effect", "white"], "unknown noise effect 'white'"),
     (["--gross-error", "row_order(first=1, second=99)"], "second=99 is no position"),
     (["--sigma", "0"], "--sigma: '0': must be at least 1e-09 and at most 1000 m/s^2"),
+    (["--size", "-1"], "--size: '-1': must be at least 1e-06"),
+    (["--vibration", "-1:1"], "vibration: must be from 0 to 10000"),
     (["--repeats", "0"], "repeats: must be from 1 to 100000, not 0"),
     (["--repeat-first", "25"], "repeat_first: must be at most 24"),
     (["--temperature", "20"], "temperature: expected two numbers, as 20:40, not '20'"),
@@ -221,16 +214,5 @@ def test_the_command_writes_a_campaign_and_apart_from_it_the_truth(tmp_path):
     (["--truth", "/dev/null/truth.yaml"], "/dev/null is not a folder"),
 ])  # fmt: skip
 def test_bad_input_ends_with_one_line_and_leaves_nothing(arguments, expected, tmp_path):
-    result = call("simulate-campaign", "--out", tmp_path / "one", *arguments)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("error: ")
-    assert expected in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    assert expected in refusal("simulate-campaign", "--out", tmp_path / "one", *arguments)
     assert not (tmp_path / "one").exists()
-
-
-def test_settings_are_checked_in_python_too():
-    with pytest.raises(InputError, match="size: must be from 1e-06 to 1000000, not -1"):
-        CampaignSettings(size=-1)
-    with pytest.raises(InputError, match="vibration: must be from 0 to 10000"):
-        simulate(vibration=(-1, 1))
