@@ -158,26 +158,23 @@ def weighed(*names_and_probabilities):
     ]
 
 
-def test_where_one_effect_is_more_probable_a_pair_counts_for_its_better_half():
-    one, other = ("bias_drift",), ("hysteresis",)
-    posterior = Posterior.of(
-        weighed((one, 0.5), (other, 0.2), (one + other, 0.1), ((*other, "bias"), 0.2))
-    )
-    assert [e.names for e in posterior.told] == [one, other]
-    assert [e.posterior for e in posterior.told] == pytest.approx([0.6, 0.4])
-    assert tuple(one.posterior for one in posterior.all) == pytest.approx((0.5, 0.2, 0.2, 0.1))
+DRIFT, OTHER, BIAS = ("bias_drift",), ("hysteresis",), ("bias",)
 
 
-def test_a_pair_that_is_more_probable_than_its_parts_stands():
-    pair = ("bias_drift", "hysteresis")
-    posterior = Posterior.of(weighed((pair, 0.3), (pair[:1], 0.25), (("bias",), 0.45)))
-    assert [e.names for e in posterior.told] == [("bias",), pair, pair[:1]]
-
-
-def test_where_two_effects_are_more_probable_all_pairs_stand():
-    pairs = [("bias", "hysteresis"), ("bias", "settling"), ("bias", "warm_up")]
-    posterior = Posterior.of(weighed(*((pair, 0.2) for pair in pairs), (("bias",), 0.4)))
-    assert {e.names for e in posterior.told} == {*pairs, ("bias",)}
+@pytest.mark.parametrize(("given", "told"), [
+    # Where one effect is more probable a pair counts for its better half.
+    ({DRIFT: 0.5, OTHER: 0.2, DRIFT + OTHER: 0.1, OTHER + BIAS: 0.2}, {DRIFT: 0.6, OTHER: 0.4}),
+    # A pair that is more probable than its parts stands.
+    ({DRIFT + OTHER: 0.3, DRIFT: 0.25, BIAS: 0.45}, {BIAS: 0.45, DRIFT + OTHER: 0.3, DRIFT: 0.25}),
+    # Where two effects are more probable, all pairs stand.
+    ({BIAS + DRIFT: 0.3, BIAS + OTHER: 0.2, (*BIAS, "warm_up"): 0.1, BIAS: 0.4},
+     {BIAS: 0.4, BIAS + DRIFT: 0.3, BIAS + OTHER: 0.2, (*BIAS, "warm_up"): 0.1}),
+])  # fmt: skip
+def test_what_is_told_of_pairs(given, told):
+    posterior = Posterior.of(weighed(*given.items()))
+    assert {e.names: e.posterior for e in posterior.told} == pytest.approx(told)
+    assert [e.names for e in posterior.told] == [*told]
+    assert [e.posterior for e in posterior.all] == pytest.approx(sorted(given.values())[::-1])
 
 
 def test_wrong_noise_of_all_kinds_is_one_explanation():

@@ -200,12 +200,3 @@ def test_a_sigma_as_large_as_gravity_makes_no_steps(sigma):
     """Readings that span less than some steps cannot show them."""
     forces = draw(17, "fibonacci-50").forces[0]
     assert resolution_test(forces, sigma).p_value == 1
-
-
-@BOTH
-def test_what_the_holds_do_not_see_is_colour(approach):
-    """An offset that is random from hold to hold has no sd within them."""
-    residuals, _ = sessions(approach, "coloured_noise(share=0.8, tau=0.1)", seed=16, runs=50)
-    sd, n_samples = np.full((24, 3), SIGMA * 10), np.full(24, 100)
-    p = np.array([within_hold_test(r, SIGMA, sd, n_samples).p_value for r in residuals])
-    assert np.sum(p < 0.01) >= least(50, 0.95, RARE)

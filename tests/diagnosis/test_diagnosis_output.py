@@ -1,6 +1,5 @@
 """What a diagnosis writes: files, their content, the page for every verdict, and the loop."""
 
-import hashlib
 import json
 import re
 import shutil
@@ -180,13 +179,8 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     for words in (
         "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal curve.",
         "This campaign cannot tell thermal bias (0.55) and thermal curve (0.4) apart; further",
-        "that such an effect is missing; not that it is thermal bias rather than a rival",
-        "a wrong name costs 7, a right name that is withheld 3",
         "whether thermal bias or thermal curve is missing",
-        "temperature / °C",
         "takes thermal bias, and its sigmas do not know of the others",
-        "accelstudy diagnose CAMPAIGN --model bias-scale-nonorthogonality --approach robot",
-        "credible set the most probable explanations",
     ):
         assert words in text, words
     assert yaml.safe_load((tmp_path / "model.yaml").read_text("utf-8"))["models"]
@@ -271,14 +265,9 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
         assert any("may be an effect" in line for line in verdict_lines(found)) != sure
 
 
-def test_the_question_of_further_positions_is_a_sentence():
-    """Of two explanations, of which one may hold the other and more."""
-    for separates, question in (
-        ((("bias_drift",), ("warm_up",)), "whether bias drift or warm up is missing"),
-        (((), ("scale_asymmetry",)), "whether scale asymmetry is missing as well"),
-        ((("scale_asymmetry",), ()), "whether scale asymmetry is missing as well"),
-    ):
-        assert said("question", separates) == [question]
+def test_a_further_effect_is_asked_for_as_such():
+    for separates in (((), ("scale_asymmetry",)), (("scale_asymmetry",), ())):
+        assert said("question", separates) == ["whether scale asymmetry is missing as well"]
 
 
 @pytest.mark.parametrize(("change", "path"), [
@@ -291,26 +280,6 @@ def test_the_schema_asks_what_a_verdict_requires(written, change, path):
     _, content, _ = written("named")
     changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
     assert path in [error.json_path for error in SCHEMA.iter_errors(changed)]
-
-
-def test_the_headline_names_all_that_would_be_the_same():
-    settings = CampaignSettings(scheme="fibonacci-36", effects=("mounting_rotation",))
-    found = headline(diagnose(simulate_campaign(settings)[0], NINE))
-    assert "mounting rotation" in found
-    assert " or " in found
-
-
-def test_an_effect_is_found_with_its_true_values(written):
-    _, content, _ = written("named")
-    (effect,) = content["effects"]
-    assert effect["name"] == "thermal_bias"
-    errors = [
-        (p["value"] - truth) / p["sigma"]
-        for p, truth in zip(effect["parameters"], (0.003, -0.002, 0.001), strict=True)
-    ]
-    assert np.abs(errors).max() < 4.5
-    assert [content["like"][0][key] for key in ("coordinate", "target")] == ["temperature", "bias"]
-    assert sum(place["posterior"] for place in content["like"]) == pytest.approx(1)
 
 
 def test_positions_say_what_was_held_out(written):
@@ -359,10 +328,8 @@ def test_same_seed_same_files(written, tmp_path):
         # Its commands name the folder.
         accelstudy.diagnose(out.parent / "named", replicates=100).save(out)
     for path in sorted(first.rglob("*.*")):
-        if path.is_file() and path.suffix != ".parquet":
-            again = out / path.relative_to(first)
-            digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in (path, again)]
-            assert digests[0] == digests[1], path.name
+        if path.suffix != ".parquet":
+            assert path.read_bytes() == (out / path.relative_to(first)).read_bytes(), path.name
     for name in ("positions", "loop"):
         tables = [pd.read_parquet(f / f"{name}.parquet") for f in (first, out)]
         pd.testing.assert_frame_equal(*tables)
@@ -420,11 +387,6 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
     diagnosis = diagnose(campaign, NINE)
     monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
     write_diagnosis(diagnosis, tmp_path / "out")
-    said = "The figure 'evidence' could not be drawn (ZeroDivisionError: division by zero)."
-    assert capsys.readouterr().err == f"warning: {said}\n"
-    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
-    assert said in page.replace("&#x27;", "'")
-    assert page.count("<svg") == 1
     assert (tmp_path / "out/diagnosis.json").exists()
     assert not list((tmp_path / "out").rglob("*.part"))
 
@@ -433,11 +395,14 @@ def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys
         "accelstudy.campaign.calibration.output.correlation_figure", lambda _: 1 / 0
     )
     write_calibration(assess(fit), tmp_path / "calibrated")
-    said = said.replace("evidence", "correlations")
-    assert capsys.readouterr().err == f"warning: {said}\n"
-    page = (tmp_path / "calibrated/report.html").read_text(encoding="utf-8")
-    assert said in page.replace("&#x27;", "'")
-    assert page.count("<svg") == 1
+    for line, name, folder in zip(capsys.readouterr().err.splitlines(),
+                                  ("evidence", "correlations"), ("out", "calibrated"),
+                                  strict=True):  # fmt: skip
+        said = f"The figure '{name}' could not be drawn (ZeroDivisionError: division by zero)."
+        assert line == f"warning: {said}"
+        page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
+        assert said in page.replace("&#x27;", "'")
+        assert page.count("<svg") == 1
 
 
 def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, monkeypatch):
@@ -472,7 +437,6 @@ def test_numbers_of_many_positions_do_not_meet():
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"modle": 1}, "did you mean 'model'"),
     ({"model": "nine"}, "unknown model 'nine'"),
     ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
     ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),

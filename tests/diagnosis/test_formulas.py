@@ -131,6 +131,10 @@ def test_the_residuals_lie_upon_the_function(learned):
 
 def test_what_was_learned_is_said(learned):
     shape = learned.shape
+    assert (learned.verdict, learned.place) == ("learned", ("yaw", "bias"))
+    assert learned.found[0].posterior > 0.7
+    assert learned.gap.confirmed
+    assert learned.gap.after < 2 < learned.gap.before
     assert headline(learned) == (
         "The model lacks something that has no name here: the bias of x and y depends on the yaw."
     )

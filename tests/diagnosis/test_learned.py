@@ -1,11 +1,10 @@
 """Learned functions: beside plain Gaussian processes, exported, and in campaigns that hide one."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROBOT, G, campaign, least, some_holds
+from diagnosis_helpers import NINE, ROBOT, G, least, some_holds
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError
@@ -14,7 +13,6 @@ from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.drawing.style import group_of, symbol
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.leveling.angles import specific_force
@@ -163,35 +161,3 @@ def test_exported_formulas_correct_as_the_calibration_does(calibration, readings
             known |= dict(zip(("f_x", "f_y", "f_z"), f_a, strict=True))
             f_a = reading - added("output")
         np.testing.assert_allclose((np.eye(3) + added("axes")) @ f_a, one, atol=1e-10)
-
-
-@pytest.fixture(scope="module")
-def hidden():
-    """A campaign in which the biases of x and y turn with the yaw, and the angle of each axis."""
-    clean = campaign(seed=7, sigma=1e-3)[0]
-    turn = np.column_stack(
-        [8e-3 * np.cos(clean.yaw - 0.3), 6e-3 * np.cos(clean.yaw - 1.2), 0 * clean.yaw]
-    )
-    return diagnose(replace(clean, forces=clean.forces + turn), NINE)
-
-
-def test_a_function_without_a_name_is_learned(hidden):
-    assert hidden.verdict == "learned"
-    assert hidden.place == ("yaw", "bias")
-    (found,) = hidden.found
-    assert found.name == "learned"
-    assert found.posterior > 0.7
-    assert hidden.gap.confirmed
-    assert hidden.gap.after < 2 < hidden.gap.before
-    effect, u = hidden.extended.effects[-1], len(found.parameters)
-    assert effect.spec == found.spec
-    solution = hidden.final.solution
-    yaw = np.linspace(-3, 3, 25)
-    h, sd = effect.function(yaw, solution.parameters[-u:], solution.cofactors[-u:, -u:])
-    truth = np.column_stack([8e-3 * np.cos(yaw - 0.3), 6e-3 * np.cos(yaw - 1.2), 0 * yaw])
-    assert np.all(np.abs(h - truth) < 4.5 * sd)
-
-
-def test_nothing_is_learned_where_nothing_is_missing():
-    for seed in range(6):
-        assert diagnose(campaign(seed=seed, sigma=1e-3)[0], NINE).verdict != "learned"

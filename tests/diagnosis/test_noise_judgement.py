@@ -44,19 +44,13 @@ def worst(tests, **p):
 # --- which test counts ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.parametrize("tests", [OTHERS, (LEVEL, *OTHERS)])
-def test_the_tests_beside_that_of_sigma_share_one_percent(name, tests):
-    """Each has a quarter of it, whether sigma is tested or not."""
-    share = OF_ALL_OTHERS / 4
-    assert worst(tests, **{name: 0.99 * share}) == name
-    assert worst(tests, **{name: 1.01 * share}) is None
-
-
-def test_sigma_has_a_level_of_its_own():
-    tests = (LEVEL, *OTHERS)
-    assert worst(tests, **{LEVEL: 0.99 * OF_LEVEL}) == LEVEL
-    assert worst(tests, **{LEVEL: 1.01 * OF_LEVEL}) is None
+def test_the_tests_beside_that_of_sigma_share_one_percent(tests):
+    """Each has a quarter of it, whether sigma is tested or not; sigma has a level of its own."""
+    for name in tests:
+        share = OF_LEVEL if name == LEVEL else OF_ALL_OTHERS / 4
+        assert worst(tests, **{name: 0.99 * share}) == name
+        assert worst(tests, **{name: 1.01 * share}) is None
 
 
 def test_the_most_specific_finding_comes_first():

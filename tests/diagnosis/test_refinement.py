@@ -72,17 +72,6 @@ def test_of_very_many_times_of_a_jump_the_best_is_found():
     assert best.effect.settings["t"] not in tried
 
 
-def test_a_shape_with_another_value_is_the_effect_with_that_value():
-    time = 60.0 * np.arange(40)
-    examined, explained = hidden(np.exp(-time / 400))
-    warm_up = examined.candidates["warm_up"][0]
-    other = shaped(examined, warm_up, 512.0)
-    z = examined.frame.residuals.z
-    assert other.value == 512.0
-    expected = explained(np.exp(-time[:, None] / np.array([512.0])))[0]
-    assert np.sum((z @ other.basis) ** 2) == pytest.approx(expected)
-
-
 def test_a_shape_that_shows_less_is_none():
     """What is over after the first hold is one number for a norm, not one for each axis."""
     examined = design(shuffled("fibonacci-30"), GRAVITY, some_holds(30))

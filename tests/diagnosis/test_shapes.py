@@ -1,17 +1,12 @@
 """Smooth functions without a name: their covariances, their evidence, and what is said of them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, ROBOT, campaign, design, shuffled, some_holds
+from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
-from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.space.shapes import MIN_TRACE_SHARE, LearnedShapes
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import LENGTHS
-from accelstudy.sensors.models import get_model
 
 
 @pytest.fixture(scope="module", params=[ROBOT, GRAVITY], ids=lambda approach: approach.name)
@@ -95,16 +90,3 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
         # Directions with a share of less than MIN_TRACE_SHARE are dropped.
         off = np.linalg.norm(after - expected / np.trace(expected))
         assert off < 20 * MIN_TRACE_SHARE
-
-
-def test_physics_that_is_not_in_the_catalogue_is_told_by_its_place():
-    """A scale that swings in time: no effect of the catalogue does, and no name is given."""
-    clean, _ = campaign(seed=5)
-    swing = np.sin(2 * np.pi * np.asarray(clean.time) / 1100.0)[:, None]
-    changed = replace(clean, forces=clean.forces * (1 + 1.5e-3 * swing))
-    diagnosis = diagnose(changed, get_model("bias-scale-nonorthogonality"))
-    assert (diagnosis.verdict, diagnosis.place) == ("learned", ("time", "scale"))
-    assert diagnosis.found[0].posterior > 0.7
-    assert "the scale of all axes depends on the time" in verdict_lines(diagnosis)[0]
-    nothing = diagnose(clean, get_model("bias-scale-nonorthogonality"))
-    assert nothing.like == ()

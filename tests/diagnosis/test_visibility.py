@@ -34,11 +34,6 @@ def by_hand():
     return {name: left_of(nine(u), f(u, G)) / SIGMA for name, f in SHOWN.items()}
 
 
-def test_the_noncentrality_is_that_of_the_power():
-    limit = stats.chi2.isf(0.001, 1)
-    assert stats.ncx2.sf(limit, 1, LAMBDA) == pytest.approx(0.8, abs=1e-4)
-
-
 @pytest.mark.parametrize("name", SHOWN)
 def test_detectable_and_identifiable_sizes_by_hand(shown, by_hand, name):
     """The worst parameter; and what the other effects cannot imitate of it."""

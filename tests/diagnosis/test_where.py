@@ -1,7 +1,5 @@
 """Where a model disagrees with a campaign: the posterior over coordinates and targets."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -50,14 +48,6 @@ def test_a_large_effect_is_placed_where_its_formula_has_it(effect):
     assert any(
         line.startswith("As a smooth function, what is missing") for line in verdict_lines(found)
     )
-
-
-def test_what_has_no_name_is_placed_as_well():
-    """A bias of the third power of what changes in time is in no catalogue."""
-    campaign = measured()
-    swing = np.sin(2 * np.pi * np.asarray(campaign.time) / np.ptp(campaign.time) * 1.5) ** 3
-    found = diagnose(replace(campaign, forces=campaign.forces + 0.01 * swing[:, None]), NINE)
-    assert (found.like[0].coordinate, found.like[0].target) == ("time", "bias")
 
 
 def test_noise_lives_nowhere():

@@ -38,16 +38,9 @@ def job():
 
 
 WRONG = [
-    (
-        {"nothing": {"campaigns": 1, "campaign": 3}},
-        "nothing.campaign: unknown key; did you mean 'campaigns'?",
-    ),
+    ({"nothing": {"campaigns": 1, "campaign": 3}}, "nothing.campaign: unknown key; did you mean"),
     ({"designs": "spread-25"}, "designs: unknown design 'spread-25'; did you mean 'spread-24'?"),
-    ({"approaches": ["robots"]}, "approaches: unknown approach 'robots'; did you mean 'robot'?"),
     ({"one": {"kinds": ["warmup"], "sizes": [25], "campaigns": 1}}, "one.kinds: unknown kind"),
-    ({"one": {"sizes": [-1], "campaigns": 1}}, "one.sizes.0: must be greater than 0"),
-    ({"one": {"sizes": [25], "campaigns": 0}}, "one.campaigns: must be from 1 to"),
-    ({"sigma": "known"}, "sigma: must be 'given' or 'not given', not 'known'"),
     ({"model": "nine"}, "model: unknown model 'nine'"),
     ({"one": None, "removed": None}, "no campaigns; give at least one of nothing, noise"),
 ]

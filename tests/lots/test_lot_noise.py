@@ -39,13 +39,17 @@ def noises_of(fits):
     return noises_of_lot(fits, lambda i, sigma: pytest.fail("angles alone need it"))
 
 
+def assert_sigmas(noises, sigmas, rtol=0.03):
+    np.testing.assert_allclose([noise.sigma for noise in noises], sigmas, rtol=rtol)
+
+
 def test_sensors_whose_stated_noise_differs_have_a_factor_in_common():
     noises = noises_of([fit(true, k, stated=2 * true) for k, true in enumerate(MIXED)])
     assert all(noise.said and noise.freedom >= 60 for noise in noises)
-    np.testing.assert_allclose([noise.sigma for noise in noises], MIXED, rtol=0.03)
+    assert_sigmas(noises, MIXED)
     # So has what the samples within the holds tell.
     noises = noises_of([fit(true, k, within=true / 3) for k, true in enumerate(MIXED)])
-    np.testing.assert_allclose([noise.sigma for noise in noises], MIXED, rtol=0.03)
+    assert_sigmas(noises, MIXED)
 
 
 def test_a_wrongly_stated_sigma_changes_that_of_no_other_sensor():
@@ -53,29 +57,27 @@ def test_a_wrongly_stated_sigma_changes_that_of_no_other_sensor():
     noises = noises_of(
         [fit(true, k, stated=u) for k, (true, u) in enumerate(zip(MIXED, stated, strict=True))]
     )
-    np.testing.assert_allclose([noise.sigma for noise in noises], stated, rtol=0.05)
+    assert_sigmas(noises, stated, 0.05)
     assert noises[5].freedom >= 20  # so its residuals are far beyond what it states
 
 
 def test_sensors_of_equal_noise_are_equal_whatever_they_state():
     stated = ROUGH * np.geomspace(0.5, 2, N)[np.arange(N) * 5 % N]
     noises = noises_of([fit(ROUGH, k, stated=u) for k, u in enumerate(stated)])
-    np.testing.assert_allclose([noise.sigma for noise in noises], ROUGH, rtol=0.03)
+    assert_sigmas(noises, ROUGH)
 
 
 def test_sensors_that_say_nothing_pool_only_if_they_agree():
     """What is not said cannot be wrong."""
     noises = noises_of([fit(ROUGH, k) for k in range(N)])
-    np.testing.assert_allclose([noise.sigma for noise in noises], ROUGH, rtol=0.03)
+    assert_sigmas(noises, ROUGH)
     assert not any(noise.said for noise in noises)
     assert noises_of([fit(true, k) for k, true in enumerate(MIXED)]) == [None] * N
     # Those that say it are judged apart from those that do not.
     half = [fit(true, k, stated=true if k < N / 2 else None) for k, true in enumerate(MIXED)]
     noises = noises_of(half)
     assert noises[N // 2 :] == [None] * (N // 2)
-    np.testing.assert_allclose(
-        [noise.sigma for noise in noises[: N // 2]], MIXED[: N // 2], rtol=0.05
-    )
+    assert_sigmas(noises[: N // 2], MIXED[: N // 2], 0.05)
     assert noises_of([None, *half[:2]]) == [None] * 3  # two are no lot
 
 

@@ -99,18 +99,11 @@ def test_the_noise_is_that_which_the_best_effects_leave():
     sizes = np.zeros((400, 3))
     sizes[:, 0], sizes[:200, 1] = 3.0, -2.0
     _, of_lot = sensors(rng, sizes)
-    normal, right = of_lot.normal[:, 2, 2], of_lot.right[:, 2]
-    without = right - np.einsum(
-        "nk,nk->n",
-        of_lot.normal[:, 2, :2],
-        np.linalg.solve(of_lot.normal[:, :2, :2], of_lot.right[:, :2, None])[..., 0],
-    )
-    beside = normal - np.einsum(
-        "nk,nk->n",
-        of_lot.normal[:, 2, :2],
-        np.linalg.solve(of_lot.normal[:, :2, :2], of_lot.normal[:, :2, 2:])[..., 0],
-    )
-    assert np.std(without / np.sqrt(beside)) == pytest.approx(1, abs=3.3 / np.sqrt(800))
+    told = []
+    for normal, right in zip(of_lot.normal, of_lot.right, strict=True):
+        by = np.linalg.solve(normal[:2, :2], normal[:2, 2])
+        told.append((right[2] - by @ right[:2]) / np.sqrt(normal[2, 2] - by @ normal[:2, 2]))
+    assert np.std(told) == pytest.approx(1, abs=3.3 / np.sqrt(800))
 
 
 def test_a_campaign_that_does_not_determine_the_model_says_nothing():

@@ -1,6 +1,7 @@
 """The file of a type: what it tells of the next sensor, for each command that takes it."""
 
 import json
+from copy import deepcopy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -132,47 +133,43 @@ def test_each_command_takes_a_type(tmp_path):
     assert "type" in succeed("plan", *question).stdout  # the name of its data sheet
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"sensors": 4}, "4 are too few"),
-        ({"parameters": {}}, "give `model`"),
-        ({"schema_version": 2}, "schema_version"),
-    ],
-)
-def test_a_file_that_tells_too_little_is_refused(change, said, tmp_path):
-    rng = np.random.default_rng(14)
-    path = type_of([measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)], tmp_path)
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    path.write_text(yaml.safe_dump({**content, **change}, sort_keys=False), encoding="utf-8")
+@pytest.fixture(scope="module")
+def content(tmp_path_factory):
+    """The file of a type of five sensors that are alike."""
+    rng, folder = np.random.default_rng(14), tmp_path_factory.mktemp("type")
+    made = [measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)]
+    return yaml.safe_load(type_of(made, folder).read_text(encoding="utf-8"))
+
+
+def read(content, folder, **options):
+    """What a file of a type tells that has some content."""
+    (folder / "type.yaml").write_text(yaml.safe_dump(content, **options), encoding="utf-8")
+    return read_type(folder / "type.yaml", MODEL)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"sensors": 4}, "4 are too few"),
+    ({"parameters": {}}, "give `model`"),
+    ({"schema_version": 2}, "schema_version"),
+])  # fmt: skip
+def test_a_file_that_tells_too_little_is_refused(change, said, content, tmp_path):
     with pytest.raises(InputError, match=said):
-        read_type(path, MODEL)
+        read({**content, **change}, tmp_path)
 
 
-def test_numbers_that_no_type_has_are_refused(tmp_path):
-    rng = np.random.default_rng(14)
-    path = type_of([measured("mclaren-24", np.zeros(9), rng, f"s{i}") for i in range(5)], tmp_path)
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    for key in ("mean", "sigma", "scatter_below"):
-        changed = json.loads(json.dumps(content))
-        changed["parameters"]["b_x"][key] = 1e200
-        path.write_text(yaml.safe_dump(changed, sort_keys=False), encoding="utf-8")
-        with pytest.raises(InputError, match=rf"parameters.b_x.{key}: must be from \S+ to"):
-            read_type(path, MODEL)
+@pytest.mark.parametrize("key", ["mean", "sigma", "scatter_below"])
+def test_numbers_that_no_type_has_are_refused(key, content, tmp_path):
+    changed = deepcopy(content)
+    changed["parameters"]["b_x"][key] = 1e200
+    with pytest.raises(InputError, match=rf"parameters.b_x.{key}: must be from \S+ to"):
+        read(changed, tmp_path)
 
 
 def test_other_files_are_no_types(tmp_path):
-    (tmp_path / "model.yaml").write_text("models: {a: [bias]}", encoding="utf-8")
     with pytest.raises(InputError, match="no file of a type"):
-        read_type(tmp_path / "model.yaml", MODEL)
+        read({"models": {"a": ["bias"]}}, tmp_path)
 
 
-def test_the_order_of_keys_says_nothing(tmp_path):
-    rng = np.random.default_rng(4)
-    true = np.full(MODEL.n_parameters, USUAL)
-    made = [measured("fibonacci-24", true, rng, f"s{i}") for i in range(5)]
-    path = type_of(made, tmp_path)
-    before = read_type(path, MODEL).known
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    path.write_text(yaml.safe_dump(content, sort_keys=True), encoding="utf-8")
-    assert read_type(path, MODEL).known == before
+def test_the_order_of_keys_says_nothing(content, tmp_path):
+    one, other = (read(content, tmp_path, sort_keys=key).known for key in (True, False))
+    assert one == other
