@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from calling import refusal, succeed
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
@@ -211,6 +211,11 @@ SETTINGS = st.fixed_dictionaries(
 )
 
 
+@example({  # of a setting that is searched for only one value shows
+    "seed": 0, "scheme": "fibonacci-11", "approach": "gravity", "size": 1e-3, "sigma": 1e-5,
+    "effects": ("axis_nonperpendicularity",), "gross_errors": ("outlier_position",),
+    "temperature": (10.0, 40.0), "vibration": (0.0, 2.0), "sigma_known": False,
+})  # fmt: skip
 @given(SETTINGS)
 @settings(
     max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]

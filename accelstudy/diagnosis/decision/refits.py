@@ -125,7 +125,10 @@ def with_settings(
         slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
         columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
         tried = _values(examined, one)
-        weights.append(12 / np.log([max(tried) / min(tried)]) ** 2)
+        low, high = min(tried), max(tried)
+        if low == high:  # the only one that shows: it was searched for on either side
+            low, high = low / RANGE_FACTOR, high * RANGE_FACTOR
+        weights.append(12 / np.log([high / low]) ** 2)
     design = np.concatenate(columns, axis=1)
     if design.shape[1] == len(fit.parameters) or not np.isfinite(design).all():
         return fit.cofactors
