@@ -41,6 +41,9 @@ def made(*explanations):
 @pytest.mark.parametrize(("explanations", "certain", "beside"), [
     # one name
     ([("thermal_bias", 0.97)], [("", {"thermal_bias": 0.97})], []),
+    # what is not like it does not stand in its place
+    ([("bias_drift", 0.92), ("hysteresis", 0.05)],
+     [("", {"bias_drift": 0.92})], [((), 0.92), (("hysteresis",), 0.05)]),
     # near rivals are one family
     ([("bias_drift", 0.51), ("warm_up", 0.44)],
      [(SLOW, {"bias_drift": 0.51, "warm_up": 0.44})], []),
