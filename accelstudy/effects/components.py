@@ -13,3 +13,9 @@ Matrix = tuple[Vector, Vector, Vector]
 
 ZERO_VECTOR: Vector = (0, 0, 0)
 ZERO_MATRIX: Matrix = (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR)
+
+
+def multiply(matrix: Matrix, vector: Vector) -> Vector:
+    """Multiply a matrix with a vector, by components."""
+    x, y, z = (sum(a * v for a, v in zip(row, vector, strict=True)) for row in matrix)
+    return x, y, z

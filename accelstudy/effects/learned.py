@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
-from accelstudy.effects.components import AXES, Number
+from accelstudy.effects.components import AXES, Number, multiply
 from accelstudy.effects.smooth import (
     EDGE,
     MIN_LENGTHS,
@@ -169,8 +169,7 @@ class Learned(Effect):
         if self.target == "tilt":
             return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
         if self.target == "nonorthogonality":
-            rows = get_effect("nonorthogonality").axes(tuple(h), xp)
-            return tuple(sum(a * f_j for a, f_j in zip(row, f, strict=True)) for row in rows)
+            return multiply(get_effect("nonorthogonality").axes(tuple(h), xp), f)
         power = {"bias": 0, "scale": 1, "square": 2}[self.target]
         return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
 

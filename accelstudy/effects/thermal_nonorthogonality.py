@@ -1,6 +1,7 @@
 """Thermal non-orthogonality: the angles between the sensitive axes depend on temperature."""
 
-from accelstudy.effects.base import Effect, Parameter, register
+from accelstudy.effects.base import Effect, Parameter, get_effect, register
+from accelstudy.effects.components import multiply
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 
 
@@ -24,5 +25,5 @@ class ThermalNonOrthogonality(Effect):
     def output(self, f, p, g, hold, xp):
         """Return the upper triangle of eq. (4), with angles α_T (T − T0), times f."""
         warmer = hold.temperature - REFERENCE_TEMPERATURE
-        yz, zy, zx = (alpha * warmer for alpha in p)
-        return (zy * f[2] - yz * f[1], -zx * f[2], 0 * f[0])
+        angles = tuple(alpha * warmer for alpha in p)
+        return multiply(get_effect("nonorthogonality").axes(angles, xp), f)

@@ -208,7 +208,7 @@ class Weighing:
 
     @cached_property
     def alone(self) -> list[Explanation]:
-        """One effect, one outlying position, or something unknown."""
+        """Explanations by one effect, one outlying position, or something unknown."""
         each, unknown = -np.log(max(len(self.classes), 1)), self.problem.field.unknown
         alone = [
             Explanation((best.name,), (names,), self.singles.densities[best.name] + each, (best,))
@@ -223,7 +223,7 @@ class Weighing:
 
     @cached_property
     def sets(self) -> list[Explanation]:
-        """Two or three effects or outlying positions."""
+        """Explanations by two or three effects or outlying positions."""
         k, weighed, problem = len(self.classes), [], self.problem
         if k < 2:
             return []
@@ -245,7 +245,7 @@ class Weighing:
 
     @cached_property
     def with_unknown(self) -> list[Explanation]:
-        """Something unknown beside the strongest effects, and beside the strongest pairs."""
+        """Explanations by something unknown beside the strongest effects and pairs of effects."""
         problem, weighed = self.problem, list[Explanation]()
         unknown = problem.field.unknown
         if len(self.classes) < 2 or unknown is None:
@@ -287,7 +287,7 @@ class Case:
 
     @cached_property
     def weighing(self) -> Weighing:
-        """Everything that may be missing."""
+        """Evidence for everything that may be missing."""
         return Weighing(self.problem)
 
     def cosine(self, name: str, other: str) -> float:
@@ -297,7 +297,7 @@ class Case:
 
     @property
     def noises(self) -> list[Explanation]:
-        """Only the noise is wrong, in one of its kinds."""
+        """Explanations by wrong noise alone, one of each kind."""
         return self._noises[0]
 
     @property
@@ -307,7 +307,7 @@ class Case:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """Of everything that may be missing or wrong."""
+        """Probabilities of everything that may be missing or wrong."""
         weighing = self.weighing
         weighed = [*weighing.alone, *weighing.sets, *weighing.with_unknown, *self.noises]
         return Posterior.of(weighed)

@@ -134,7 +134,7 @@ def statement(
 
 
 def _match(top: Explanation, one: Explanation, cosine: Cosine) -> dict[int, int]:
-    """Places of what stands in an explanation for the effects of another one, by their places."""
+    """Match the effects of two explanations: place in the first -> place in the other."""
     if one.of_noise:
         return {}
     alike = [
