@@ -2,48 +2,66 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import as_calibration
-from accelstudy.approaches import Approach, get_approach
+from accelstudy.api.calibrations import as_calibration, as_campaign, place_of
+from accelstudy.api.results import Result
+from accelstudy.approaches import get_approach
+from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
-from accelstudy.basics.suggested import calibrate
+from accelstudy.basics.progress import show
+from accelstudy.basics.units import attitude_unit, to_attitude
+from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.of_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
+from accelstudy.files.outputs import ADVICE
+from accelstudy.leveling.angles import angles_of
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sequential import wording
 from accelstudy.sequential.advisor import Advice, advise
 from accelstudy.sequential.choice import DEFAULTS, candidates
 from accelstudy.sequential.estimate import NOTHING_KNOWN, Prior
 from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.wording import heading, lines
+from accelstudy.sequential.running import read_as_it_is
 
 TYPES = (".yaml", ".yml")
 """Endings of files of a type."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SessionAdvice:
+class SessionAdvice(Result):
     """What to do next in a session.
 
     Attributes
     ----------
     advice : accelstudy.sequential.advisor.Advice, all of it
-    heading : str, what was advised on
-    lines : list of str, the advice, most important last
-    command : str, that calibrates the session if it is enough; else empty
+    session : Campaign, so far
     """
 
-    advice: Advice
-    heading: str
-    lines: list[str]
-    command: str
+    kind = ADVICE
+
+    def __init__(self, advice: Advice, session: Campaign, adviser: Adviser) -> None:
+        self.advice, self.session, self._adviser = advice, session, adviser
+
+    @classmethod
+    def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
+        """Advise by the keywords of `accelstudy.advise`, checked."""
+        place = place_of(campaign)
+        now = as_campaign(campaign) if place is None else read_as_it_is(place).campaign
+        return Adviser(now, place, **given)(now)
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.session.name
 
     @property
     def enough(self) -> bool:
@@ -53,23 +71,79 @@ class SessionAdvice:
     @property
     def state(self) -> str:
         """State in a word: enough, not yet, or rejected or implausible as the calibration."""
-        if self.enough:
-            return "enough"
         wrong = self.advice.state in (REJECTED, IMPLAUSIBLE)
-        return self.advice.state if wrong else "not yet"
+        return "enough" if self.enough else self.advice.state if wrong else "not yet"
 
     @property
     def verdict(self) -> str:
         """How far it is to the accuracy that is wanted, in a sentence."""
         return self.lines[-1]
 
+    @cached_property
+    def heading(self) -> str:
+        """What was advised on."""
+        model, approach = self._adviser.model, self._adviser.approach.name
+        return wording.heading(self.advice, self.session, model, approach)
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """The advice, most important last."""
+        return wording.lines(self.advice, self.session, self._adviser.model, self._adviser.promise)
+
+    @property
+    def command(self) -> str:
+        """Command that calibrates the session if it is enough; else empty."""
+        return self._adviser.calibrate() if self.enough else ""
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Content of advice.json, in SI."""
+        advice = self.advice
+        return {
+            "campaign": self.name,
+            "state": self.state,
+            "verdict": self.verdict,
+            "advice": self.lines,
+            "positions": advice.positions,
+            "in_conflict": advice.suspects,
+            "undetermined": advice.undetermined,
+            "vague": advice.vague,
+            "to_go": advice.to_go,
+            "tilt": self.to_frame().reset_index().to_dict("records"),
+            "command": self.command,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return roll and pitch of the next position, what is left of them so far, and may be."""
+        rows = {
+            "next_rad": angles_of(-self.advice.next),
+            "rms_rad": np.nan if self.advice.rms is None else self.advice.rms,
+            "wanted_rad": self._adviser.promise.accuracy,
+        }
+        return pd.DataFrame(rows, index=pd.Index(["roll", "pitch"], name="angle"))
+
+    def draw(self, ax: Axes) -> None:
+        """Draw roll and pitch of the positions so far, and of the next one."""
+        so_far, after = (
+            to_attitude(angles_of(forces)).T for forces in (self.session.forces, -self.advice.next)
+        )
+        ax.plot(*so_far, "o", label="so far")
+        ax.plot(*after, "*", markersize=10, label="next")
+        ax.set(xlabel=f"roll / {attitude_unit()}", ylabel=f"pitch / {attitude_unit()}")
+        ax.legend()
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write advice.json."""
+        write_json(folder / ADVICE.marker, self.content)
+
+    def tell(self, place: Path | None) -> None:
+        """Print the advice."""
+        show(self.summary())
+
     def summary(self) -> str:
         """Return the advice as text."""
         more = [f"calibrate: {self.command}"] if self.command else []
         return "\n".join([self.heading, *(f"  {line}" for line in (*self.lines, *more))])
-
-    def __repr__(self) -> str:
-        return f"SessionAdvice({self.heading!r}, {self.state})"
 
 
 class Adviser:
@@ -95,10 +169,8 @@ class Adviser:
         attitudes: str | None,
         **limits: float | None,
     ) -> None:
-        self.place, self.promise = place, Promise(tilt_accuracy, tilt_range)
-        self.approach: Approach = (
-            usual_approach(session) if approach is None else get_approach(approach)
-        )
+        self.place, self.promise = place or Path("CAMPAIGN"), Promise(tilt_accuracy, tilt_range)
+        self.approach = get_approach(approach) if approach else usual_approach(session)
         self.model, self._called = get_model(model), model
         chosen = attitudes or DEFAULTS.get(self.approach.name, "grid")
         self.directions = candidates(chosen, **limits)
@@ -108,20 +180,14 @@ class Adviser:
     def __call__(self, session: Campaign) -> SessionAdvice:
         """Advise on the session as it is now."""
         known = self.model, self.approach, self.promise, self.directions, self.prior
-        advice = advise(session, *known)
-        command = ""
-        if advice.enough:
-            place, approach = self.place or Path("CAMPAIGN"), self.approach.name
-            command = calibrate(place, self._called, approach, self.type)
-        return SessionAdvice(
-            advice,
-            heading(advice, session, self.model, self.approach.name),
-            lines(advice, session, self.model, self.promise),
-            command,
-        )
+        return SessionAdvice(advise(session, *known), session, self)
+
+    def calibrate(self) -> str:
+        """Command that calibrates the session."""
+        return suggested.calibrate(self.place, self._called, self.approach.name, self.type)
 
 
-def _prior(given: Any, wanted: SensorModel) -> Prior | SensorType:
+def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType:
     """What an earlier calibration, or a type, says; nothing without one."""
     if given is None:
         return NOTHING_KNOWN

@@ -6,60 +6,37 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.given import (
-    SIGMA_READING,
-    START,
-    drawing,
-    of_type,
-    path_of,
-    quantity,
-)
-from accelstudy.api.logs import log_of
+import accelstudy
+from accelstudy.api.given import of_type, path_of, quantity
 from accelstudy.api.results import Result
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.units import GON, Given
-from accelstudy.campaign.calibration import export as forms
-from accelstudy.campaign.calibration.applying import (
-    NO_CALIBRATION,
-    SensorCalibration,
-    calibration_of,
-    dof_of,
-    read_calibration_content,
-)
+from accelstudy.campaign.calibration import applying, export, wording
+from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
-from accelstudy.campaign.calibration.fit import CampaignFit
-from accelstudy.campaign.calibration.leveling import level
+from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
 from accelstudy.campaign.calibration.output import (
     calibration_content,
     draw_residuals,
     write_calibration,
 )
-from accelstudy.campaign.calibration.wording import (
-    approach_words,
-    interval_words,
-    next_steps,
-    parameter_lines,
-)
-from accelstudy.campaign.format import read_campaign as read_folder
+from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.of_type import with_type
 from accelstudy.campaign.session import Campaign
-from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import axes_note
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TILT = Given("rad", "", 1e-3, np.pi / 2)
 
@@ -78,20 +55,12 @@ class Calibration(Result):
 
     def __init__(
         self,
-        content: Mapping[str, Any],
+        content: Mapping[str, Any] | None,
         fit: CampaignFit | None = None,
         source: Path | None = None,
     ) -> None:
-        self._content, self.fit = content, fit
-        self.source = Path("CAMPAIGN") if source is None else source
-
-    @classmethod
-    def of_fit(cls, fit: CampaignFit, source: Path | None = None) -> Calibration:
-        """Return the calibration that an adjustment gives."""
-        assessment = assess(fit)
-        calibration = cls(calibration_content(assessment), fit, source)
-        calibration._assessment = assessment
-        return calibration
+        self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
+        self._content = calibration_content(self._assessment) if content is None else content
 
     @property
     def content(self) -> Mapping[str, Any]:
@@ -164,7 +133,8 @@ class Calibration(Result):
         of_type("level", level, float, expected="a probability between 0 and 1")
         if not 0 < level < 1:
             raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
-        half = stats.t.ppf((1 + level) / 2, dof_of(self.content)) * self.parameters["sigma"]
+        dof = applying.dof_of(self.content)
+        half = stats.t.ppf((1 + level) / 2, dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
 
@@ -208,27 +178,24 @@ class Calibration(Result):
         start : float in s or str with a unit, from the start of the calibration session
         sigma : float in m/s² or str with a unit, of a reading
         """
-        opened = log_of(log)
-        at = None if start is None else quantity("start", start, START)
-        noise = None if sigma is None else quantity("sigma", sigma, SIGMA_READING)
-        file, layout, given = opened.file, opened.layout, opened.table
-        leveled = level(self.sensor, file, layout, noise, at)
-        table = leveled.to_frame(given)
-        table.attrs["warnings"] = list(leveled.warnings)
-        return table
+        return accelstudy.apply(self, log, start=start, sigma=sigma)
 
     def export(self, form: str = "json") -> str:
         """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
-        return forms.export(self.sensor, form)
+        return export.export(self.sensor, form)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the parameters, as `parameters`."""
         return self.parameters
 
+    def draw(self, ax: Axes) -> None:
+        """Draw |f| − g of each position, mm/s²."""
+        draw_residuals(ax, self._fitted("plot"), self.residuals)
+
     def _table(self) -> str:
         """Parameters with sigmas in the units that people read, then what the user should know."""
-        lines = [*parameter_lines(self.content), *(f"warning: {one}" for one in self.warnings)]
-        return "\n".join(lines)
+        warnings = (f"warning: {one}" for one in self.warnings)
+        return "\n".join([*wording.parameter_lines(self.content), *warnings])
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
@@ -242,23 +209,15 @@ class Calibration(Result):
         fit = self._fitted("tell")
         for warning in fit.campaign.warnings:
             warn(warning)
-        for line in parameter_lines(self.content):
-            say(line)
+        say("\n".join(wording.parameter_lines(self.content)))
         if self.content["sigmas_95"] is not None:
-            say(f"±: {interval_words(fit)}")
-        say(approach_words(fit))
+            say(f"±: {wording.interval_words(fit)}")
+        say(wording.approach_words(fit))
         say(axes_note(None if fit.campaign.log is None else fit.campaign.log.frame))
         show(f"{self.state.upper()}: {self.verdict}")
-        what, command = next_steps(fit, self.state, self.source, place / "calibration.json")[0]
-        say(f"{what}: {command}")
+        steps = wording.next_steps(fit, self.state, self.source, place / "calibration.json")
+        say(": ".join(steps[0]))
         say(f"report: {place / 'report.html'}")
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw |f| − g of each position, mm/s²."""
-        fit = self._fitted("plot")
-        with drawing(ax, FULL, 62) as ax:
-            draw_residuals(ax, fit, self.residuals)
-        return ax
 
 
 # --- what is given ------------------------------------------------------------------------------
@@ -269,8 +228,8 @@ def as_calibration(calibration: Any, name: str = "calibration") -> Calibration:
     if isinstance(calibration, str | PathLike):
         file = path_of(name, calibration)
         file = file / "calibration.json" if file.is_dir() else file
-        content = read_calibration_content(file)
-        calibration_of(content, f"{file}: {NO_CALIBRATION}")
+        content = applying.read_calibration_content(file)
+        calibration_of(content, f"{file}: {applying.NO_CALIBRATION}")
         return Calibration({"warnings": [], **content})
     if not isinstance(calibration, Calibration):
         raise InputError(
@@ -283,7 +242,7 @@ def as_calibration(calibration: Any, name: str = "calibration") -> Calibration:
 def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
     """Return a campaign, read if it is given as the path of its folder."""
     if isinstance(campaign, str | PathLike):
-        return read_folder(path_of("campaign", campaign), plausible=plausible)
+        return read_campaign(path_of("campaign", campaign), plausible=plausible)
     of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path")
     return campaign
 
@@ -304,3 +263,8 @@ def resolve(
     """Read the campaign, the model, the approach and what is known of the sensor a priori."""
     names = chosen(model, approach)
     return with_type(as_campaign(campaign, plausible), prior, names[0]), *names
+
+
+def fit_of(campaign: Any, model: str, approach: str | None, prior: Any = None) -> CampaignFit:
+    """Adjust a campaign, of which the keywords of `calibrate` say how."""
+    return fit_campaign(*resolve(campaign, model, approach, prior))

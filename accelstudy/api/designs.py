@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.given import drawing, path_of
+from accelstudy.api.given import path_of
 from accelstudy.api.results import Result
-from accelstudy.basics.errors import InputError
+from accelstudy.basics import bounds
+from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import MAX_BYTES
-from accelstudy.basics.progress import say, show
+from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.units import (
+    MGON,
     angle_note,
     attitude_unit,
     display_unit,
@@ -27,10 +31,9 @@ from accelstudy.design.spaces import attitudes
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
 from accelstudy.proposal.proposal import REFERENCE, Proposal, write_design
+from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme, is_scheme_file
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from accelstudy.simulation.sessions import Noise
 
 
 class Design(Result):
@@ -41,8 +44,20 @@ class Design(Result):
     proposal : accelstudy.proposal.proposal.Proposal, all of it
     """
 
+    size = FULL, 80.0
+
     def __init__(self, proposal: Proposal) -> None:
         self.proposal = proposal
+
+    @classmethod
+    def of(cls, *, sigma: float, robot_sigma: float, gravity_sigma: float, **given: Any) -> Design:
+        """Search by the keywords of `accelstudy.find_positions`, checked."""
+        bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
+        bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
+        bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
+        request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
+        with stage("search"):
+            return cls(Proposal.of(request))
 
     @property
     def name(self) -> str:
@@ -98,22 +113,19 @@ class Design(Result):
         """Return the positions and what they bring as text."""
         return "\n".join([self.table(), *self.lines()])
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw roll and pitch of the positions, with their numbers."""
         rows = self.to_frame()
         number, roll, pitch = rows.columns[:3]
-        with drawing(ax, FULL, 80) as ax:
-            ax.plot(rows[roll], rows[pitch], "o")
-            for _, row in rows.iterrows():
-                ax.annotate(f" {row[number]}", (row[roll], row[pitch]))
-            ax.set(xlabel=roll.replace("/", " / "), ylabel=pitch.replace("/", " / "))
-        return ax
+        ax.plot(rows[roll], rows[pitch], "o")
+        for _, row in rows.iterrows():
+            ax.annotate(f" {row[number]}", (row[roll], row[pitch]))
+        ax.set(xlabel=roll.replace("/", " / "), ylabel=pitch.replace("/", " / "))
 
     def tell(self, place: Path) -> None:
         """Print the positions and what they bring."""
         show(self.table())
-        for line in self.lines():
-            say(line)
+        say("\n".join(self.lines()))
         say(f"scheme: {place}")
 
     def lines(self) -> Iterable[str]:
@@ -159,9 +171,9 @@ class Design(Result):
         path : path, ending in .yaml
         force : bool, whether to replace a file that is there
         """
-        out = scheme_file(path)
-        with new_file(out, self.inputs, force) as file:
-            self.write(file, out)
+        place = path_of("path", path)
+        with new_scheme(place, self.inputs, force) as file:
+            self.write(file, place)
 
     def write(self, file: Path, place: Path) -> None:
         """Write a file that becomes `place`, by which the scheme is named."""
@@ -174,12 +186,13 @@ class Design(Result):
         write_design(file, name, title, source, proposal.directions, proposal.made(), extra)
 
 
-def scheme_file(path: Any) -> Path:
-    """Path of a file that is known as a scheme."""
-    out = path_of("path", path)
+@contextmanager
+def new_scheme(out: Path, inputs: Iterable[str | Path], force: bool) -> Iterator[Path]:
+    """Yield a temporary file that becomes `out`, by whose ending it is known as a scheme."""
     if not out.name.endswith((".yaml", ".yml")):
         raise InputError(f"{out}: must end in .yaml, by which a file is known as a scheme")
-    return out
+    with new_file(out, inputs, force) as file:
+        yield file
 
 
 def _both(rms: Any) -> str:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
-from accelstudy.api.calibrations import Calibration
-from accelstudy.api.given import drawing
+from accelstudy.api.calibrations import Calibration, place_of, resolve
 from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
+from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.loop import Loop, close_loop
-from accelstudy.diagnosis.report.document import (
-    diagnosed_calibration,
-    diagnosed_fit,
-    diagnosis_document,
-)
+from accelstudy.diagnosis.report import document
 from accelstudy.diagnosis.report.figures import draw_explanations
 from accelstudy.diagnosis.report.output import write_diagnosis
 from accelstudy.diagnosis.report.words import verdict_lines
@@ -27,9 +24,6 @@ from accelstudy.diagnosis.result import Diagnosis as Found
 from accelstudy.drawing.style import COLUMN
 from accelstudy.files.outputs import DIAGNOSIS
 from accelstudy.sensors.frames import FRD, axes_note
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class Diagnosis(Result):
@@ -48,6 +42,23 @@ class Diagnosis(Result):
     ) -> None:
         self.result, self._seed, self._replicates = result, seed, replicates
         self.source = Path("CAMPAIGN") if source is None else source
+        self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
+
+    @classmethod
+    def of(
+        cls,
+        campaign: Any,
+        model: str,
+        approach: str | None,
+        prior: Path | None,
+        seed: int,
+        replicates: int,
+    ) -> Diagnosis:
+        """Diagnose by the keywords of `accelstudy.diagnose`, checked."""
+        # The diagnosis, not the reader, looks for wrong units and axes.
+        given = resolve(campaign, model, approach, prior, plausible=False)
+        with stage("search for what is missing"):
+            return cls(pipeline.diagnose(*given, seed=seed), seed, replicates, place_of(campaign))
 
     @property
     def name(self) -> str:
@@ -57,7 +68,7 @@ class Diagnosis(Result):
     @cached_property
     def content(self) -> dict[str, Any]:
         """Content of diagnosis.json, without the simulated sessions."""
-        return diagnosis_document(self.result)
+        return document.diagnosis_document(self.result)
 
     @property
     def state(self) -> str:
@@ -83,7 +94,8 @@ class Diagnosis(Result):
     def calibration(self) -> Calibration:
         """The calibration with what was found; raises `InputError` if there can be none."""
         try:
-            return Calibration(diagnosed_calibration(self.result), diagnosed_fit(self.result))
+            content = document.diagnosed_calibration(self.result)
+            return Calibration(content, document.diagnosed_fit(self.result))
         except LinAlgError as error:
             raise InputError(f"the diagnosis gives no calibration: {error}") from None
 
@@ -92,12 +104,9 @@ class Diagnosis(Result):
         """Sessions simulated with the old and with the new model; None if nothing was added."""
         return close_loop(self.result, self._replicates, self._seed)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw the posterior probabilities of the explanations."""
-        explanations = self.result.credible_set
-        with drawing(ax, COLUMN, 25 + 8 * len(explanations)) as ax:
-            draw_explanations(ax, explanations)
-        return ax
+        draw_explanations(ax, self.result.credible_set)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy diagnose` does."""

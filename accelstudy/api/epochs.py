@@ -7,25 +7,22 @@ from datetime import datetime
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import Calibration
-from accelstudy.api.given import drawing
+from accelstudy.api.calibrations import Calibration, as_calibration
+from accelstudy.api.given import check_once
 from accelstudy.api.results import Result
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.wording import counted
 from accelstudy.drawing.style import FULL
+from accelstudy.epochs import history as epochs
 from accelstudy.epochs import output
-from accelstudy.epochs.history import History as Calibrations
-from accelstudy.epochs.history import history_of
 from accelstudy.epochs.interval import Interval
 from accelstudy.files.outputs import COMPARISON, HISTORY
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class Comparison(Result):
@@ -39,8 +36,14 @@ class Comparison(Result):
 
     kind = COMPARISON
 
-    def __init__(self, result: Calibrations, tilt_range: float) -> None:
+    def __init__(self, result: epochs.History, tilt_range: float) -> None:
         self.result, self.tilt_range = result, tilt_range
+
+    @classmethod
+    def of(cls, first: Any, second: Any, tilt_range: float) -> Comparison:
+        """Compare by the keywords of `accelstudy.compare`, checked."""
+        pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
+        return cls(epochs.compare(*pair), tilt_range)
 
     @property
     def name(self) -> str:
@@ -57,11 +60,9 @@ class Comparison(Result):
         rows = pd.DataFrame(self.content["parameters"]).set_index("name")
         return rows[["first", "second", "change", "sigma", "detectable", "unit", "changed"]]
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw the change of each parameter over its sigma."""
-        with drawing(ax, FULL, 62) as ax:
-            output.draw_changes(ax, self.result)
-        return ax
+        output.draw_changes(ax, self.result)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy compare` does."""
@@ -80,9 +81,26 @@ class History(Result):
     """
 
     kind = HISTORY
+    size = FULL, 70.0
 
-    def __init__(self, result: Calibrations, interval: Interval | None) -> None:
+    def __init__(self, result: epochs.History, interval: Interval | None) -> None:
         self.result, self.interval = result, interval
+
+    @classmethod
+    def of(
+        cls,
+        calibrations: Sequence[Any],
+        dates: Sequence[str | datetime],
+        tilt_accuracy: float | None,
+        tilt_range: float,
+        confidence: float,
+    ) -> History:
+        """Follow a sensor by the keywords of `accelstudy.history`, checked."""
+        check_once(calibrations, "calibration")
+        course = follow([*map(as_calibration, calibrations)], dates, calibrations)
+        if tilt_accuracy is None:
+            return cls(course, None)
+        return cls(course, Interval(course, tilt_accuracy, tilt_range, confidence))
 
     @property
     def name(self) -> str:
@@ -101,31 +119,22 @@ class History(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Return value, rate a year and scatter of each parameter, and what was found."""
-        rows = [
-            {
-                "name": one["name"],
-                "value": one["value"],
-                "sigma": one["sigma"],
-                "rate_per_year": one["rate"]["per_year"],
-                "sigma_rate": one["rate"]["sigma"],
-                "scatter": one["scatter"]["sd"],
-                "unit": one["unit"],
-                "found": ", ".join(one["found"]),
-            }
-            for one in self.content["parameters"]
-        ]
-        return pd.DataFrame(rows).set_index("name")
+        rows = pd.json_normalize([*self.content["parameters"]]).set_index("name")
+        rows["found"] = rows["found"].str.join(", ")
+        rates = {
+            "rate.per_year": "rate_per_year",
+            "rate.sigma": "sigma_rate",
+            "scatter.sd": "scatter",
+        }
+        return rows[["value", "sigma", *rates, "unit", "found"]].rename(columns=rates)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw the deviation of each parameter from the first calibration, over its sigma."""
-        table = self.values
-        with drawing(ax, FULL, 70) as ax:
-            for name, rows in table.groupby("parameter", sort=False):
-                off = (rows["value"] - rows["value"].iloc[0]) / rows["sigma"]
-                ax.plot(pd.to_datetime(rows["date"]), off, "o-", markersize=3, label=name)
-            ax.set(xlabel="date", ylabel="change since the first / sigma")
-            ax.legend(ncols=4)
-        return ax
+        for name, rows in self.values.groupby("parameter", sort=False):
+            off = (rows["value"] - rows["value"].iloc[0]) / rows["sigma"]
+            ax.plot(pd.to_datetime(rows["date"]), off, "o-", markersize=3, label=name)
+        ax.set(xlabel="date", ylabel="change since the first / sigma")
+        ax.legend(ncols=4)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy history` does."""
@@ -135,7 +144,7 @@ class History(Result):
 
 def follow(
     calibrations: Sequence[Calibration], dates: Sequence[str | datetime], given: Sequence[Any]
-) -> Calibrations:
+) -> epochs.History:
     """Follow a sensor over its calibrations, which messages call as they were given."""
     if dates and len(dates) != len(calibrations):
         raise InputError(
@@ -156,7 +165,7 @@ def follow(
     places = [f"{name}: date" for name in called or map(repr, calibrations)]
     where = [key("dates")] * len(dates) or places
     read = [_date(text, what) for text, what in zip(stated, where, strict=True)]
-    return history_of([one.sensor for one in calibrations], read)
+    return epochs.history_of([one.sensor for one in calibrations], read)
 
 
 def _date(given: str | datetime | None, where: str) -> datetime:

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import Given
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-GRAVITY = Given("m/s^2", "", bounds.GRAVITY.least, bounds.GRAVITY.most, True)
-SIGMA_READING = Given("m/s^2", "", 0.0, bounds.SIGMA_READING.most, True)
-START = Given("s", "", 0.0, bounds.TIME.most, True)
-LAYOUT = (
-    *("columns", "time", "time_unit", "rate", "delimiter", "variable"),
-    *("unit", "scale", "offset", "frame"),
-)
-"""Keywords that say how a log is read."""
 
 
 def of_type(name: str, value: Any, *types: type, expected: str) -> None:
@@ -72,34 +58,10 @@ def each(value: Any) -> Sequence[Any]:
     return tuple(value) if several else (value,)
 
 
-def names(name: str, value: Any) -> tuple[str, ...]:
-    """One name or several."""
-    for one in each(value):
-        of_type(name, one, str, expected="a name, or several")
-    return tuple(each(value))
-
-
-@contextmanager
-def drawing(ax: Any, width: float, height_mm: float) -> Iterator[Axes]:
-    """Draw in the style of all figures: into given axes, else into those of a new figure of pyplot.
-
-    Parameters
-    ----------
-    ax : Axes, or None
-    width, height_mm : float, of the new figure; the width in inches
-    """
-    import matplotlib as mpl
-
-    from accelstudy.drawing.style import MM, STYLE
-
-    figure = None
-    if ax is None:
-        import matplotlib.pyplot as plt
-
-        # A notebook gets ready to show figures at its first one, and the style would undo that.
-        figure = plt.figure(figsize=(width, height_mm * MM), layout="constrained")
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        ax = ax if figure is None else figure.add_subplot()
-        yield ax
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.get_major_ticks()  # made in this style, and not where the figure is shown
+def check_once(given: Sequence[Any], what: str) -> None:
+    """Raise `InputError` if a path is given twice of which each stands for one thing."""
+    seen = set()
+    for path in (one for one in given if isinstance(one, str | PathLike)):
+        if (place := Path(path).resolve()) in seen:
+            raise InputError(f"{path}: is given twice; each {what} counts once")
+        seen.add(place)

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from accelstudy.api.given import LAYOUT, path_of, tidy
+from accelstudy.api.given import path_of, tidy
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
@@ -88,7 +88,8 @@ def log_of(log: Any, given: Mapping[str, Any] | None = None) -> Log:
 
 def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a layout that keywords say, checked; other keywords do not count."""
-    given = {name: given[name] for name in LAYOUT if name in given}
+    fields = LogLayout.model_fields
+    given = {name: given[name] for name in given if KEYS.get(name, name) in fields}
     layout = checked(LogLayout, keys_of(given), "log", names=names_of(given))
     return layout.model_dump(exclude_unset=True)
 

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import Calibration
-from accelstudy.api.given import drawing
+from accelstudy.api.calibrations import Calibration, as_campaign, chosen
+from accelstudy.api.given import check_once
 from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
-from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.output import draw_sensors, lot_document, write_lot
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
 
 
 class Lot(Result):
@@ -34,6 +33,17 @@ class Lot(Result):
 
     def __init__(self, report: CalibratedLot) -> None:
         self.report = report
+
+    @classmethod
+    def of(
+        cls, campaigns: Sequence[Any], model: str, approach: str | None, seed: int, cores: int
+    ) -> Lot:
+        """Judge a lot by the keywords of `accelstudy.lot`, checked."""
+        check_once(campaigns, "sensor")
+        if len(campaigns) < MIN_SENSORS:
+            raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+        measured = [as_campaign(one) for one in campaigns]
+        return cls(evaluate_lot(measured, *chosen(model, approach), seed, cores))
 
     @property
     def name(self) -> str:
@@ -63,24 +73,16 @@ class Lot(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Return for each sensor which effects its model lacks, and their posterior probability."""
-        odd = {one["campaign"] for one in self.content["odd"]}
-        rows = [
-            {
-                "campaign": one["campaign"],
-                "effects": ", ".join(one["names"]),
-                "posterior": one["posterior"],
-                "odd": one["campaign"] in odd,
-                "failed": one["failed"],
-            }
-            for one in self.content["each"]
-        ]
-        return pd.DataFrame(rows).set_index("campaign")
+        odd = [one["campaign"] for one in self.content["odd"]]
+        rows = pd.DataFrame(self.content["each"]).set_index("campaign")
+        rows = rows.assign(effects=rows["names"].str.join(", "), odd=rows.index.isin(odd))
+        return rows[["effects", "posterior", "odd", "failed"]]
 
     @property
     def calibrations(self) -> dict[str, Calibration]:
         """Calibration of each sensor with all that the model lacks, by its campaign."""
         return {
-            fit.campaign.name: Calibration.of_fit(fit)
+            fit.campaign.name: Calibration(None, fit)
             for fit in self.report.fits
             if not isinstance(fit, InputError)
         }
@@ -90,11 +92,9 @@ class Lot(Result):
         show(self.verdict)
         say(f"report: {place / 'report.html'}")
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw what each sensor has of the first parameter that the model lacks."""
-        with drawing(ax, FULL, 62) as ax:
-            draw_sensors(ax, self.report)
-        return ax
+        draw_sensors(ax, self.report)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy lot` does."""

@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.given import drawing
 from accelstudy.api.results import Result
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import say, show
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.progress import begin, say, show
 from accelstudy.basics.suggested import study_again
+from accelstudy.data_sheets import of_sigma
+from accelstudy.data_sheets.measured import with_history
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
-from accelstudy.planning.answer import Answer
+from accelstudy.planning import question, wording
+from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.figure import draw_plan
 from accelstudy.planning.output import plan_files, plan_table
-from accelstudy.planning.wording import (
-    answer_lines,
-    assumption_lines,
-    how_to,
-    reason_lines,
-    table_lines,
-    unreachable,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from accelstudy.planning.quantities import EQUIPMENT
+from accelstudy.planning.question import Equipment, Question
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
 
@@ -42,9 +37,43 @@ class Plan(Result):
     """
 
     kind = PLAN
+    size = FULL, 95.0
 
     def __init__(self, answer: Answer) -> None:
         self.answer = answer
+
+    @classmethod
+    def of(cls, **given: Any) -> Plan:
+        """Plan by the keywords of `accelstudy.plan`, checked."""
+        sensor, sigma, history = given["sensor"], given["sigma"], given["history"]
+        equipment, max_time = given["equipment"], given["max_time"]
+        if equipment not in EQUIPMENT:
+            raise UnknownNameError("equipment", equipment, EQUIPMENT)
+        if (sensor is None) == (sigma is None):
+            both = ", not both" if sensor else ""
+            raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
+        sheet = question.get_sensor(sensor) if sigma is None else of_sigma(sigma)
+        by_hand = Equipment("gravity", given["moving_time"], 0.0)
+        robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
+        beside = None
+        if given["reference"] is not None:
+            planned = question.planned_reference(str(given["reference"]), sheet)
+            beside = Equipment("reference", by_hand.moving, question.MOUNTING, planned)
+        asked = Question(
+            given["tilt_accuracy"],
+            given["tilt_range"],
+            sheet if history is None else with_history(sheet, history),
+            {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
+            given["confidence"],
+            tuple(sorted({*given["holds"]})),
+            given["robot_sigma"],
+            math.inf if max_time is None else max_time,
+            given["max_positions"],
+            given["schemes"],
+            beside,
+        )
+        begin("comparing calibrations, which takes some seconds ...")
+        return cls(answer(asked, given["seed"], given["replicates"]))
 
     @property
     def exit_status(self) -> int:  # type: ignore[override]
@@ -64,7 +93,7 @@ class Plan(Result):
     @property
     def verdict(self) -> str:
         """What to do, in one line."""
-        return answer_lines(self.answer)[0] if self.answer.ranked else unreachable(self.answer)
+        return wording.answer_lines(self.answer)[0]
 
     @property
     def content(self) -> dict[str, Any]:
@@ -86,11 +115,9 @@ class Plan(Result):
         """Return what the cheapest calibrations take, by rank; `table` has all that is known."""
         return self.table[SHOWN]
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw the tilt error left over the time in the field."""
-        with drawing(ax, FULL, 95) as ax:
-            draw_plan(ax, self.answer)
-        return ax
+        draw_plan(ax, self.answer)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy plan` does; raises `InputError` if nothing is reached."""
@@ -103,12 +130,10 @@ class Plan(Result):
         if not self.answer.ranked:
             show(self.verdict)
             return
-        for line in (*answer_lines(self.answer), "", *how_to(self.answer)):
-            show(line)
-        for line in ("", *table_lines(self.answer), "", *reason_lines(self.answer)):
-            say(line)
-        for line in ("", *assumption_lines(self.answer.question)):
-            say(line)
+        told = self.answer
+        show("\n".join([*wording.answer_lines(told), "", *wording.how_to(told)]))
+        say("\n".join(["", *wording.table_lines(told), "", *wording.reason_lines(told)]))
+        say("\n".join(["", *wording.assumption_lines(told.question)]))
         if place is None:
             say(
                 "\n--out FOLDER keeps the table, the figure, and a study that makes the numbers "

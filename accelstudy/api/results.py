@@ -1,4 +1,4 @@
-"""What the results of all functions for programs have in common."""
+"""What the results of the functions for programs have in common."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from accelstudy.api.given import path_of
 from accelstudy.basics.progress import say, show
+from accelstudy.drawing.style import FULL, MM, STYLE
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.pages.notebook import notebook_html
 
@@ -27,6 +28,8 @@ class Result(ABC):
     kind: ClassVar[Kind]
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
+    size = FULL, 62.0
+    """Width (inches) and height (mm) of the main figure."""
 
     @property
     @abstractmethod
@@ -53,12 +56,31 @@ class Result(ABC):
         """Return the main table, in SI but for columns that name another unit."""
 
     @abstractmethod
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the main figure into given axes, or into new ones, and return them."""
+    def draw(self, ax: Axes) -> None:
+        """Draw the main figure into axes."""
 
     @abstractmethod
     def write(self, folder: Path, place: Path) -> None:
         """Write all files into a folder that is there; the page names `place` as theirs."""
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the main figure into given axes, or into new ones, and return them."""
+        import matplotlib as mpl
+
+        figure = None
+        if ax is None:
+            from matplotlib import pyplot
+
+            # A notebook gets ready to show figures at its first one; the style would undo that.
+            size = self.size[0], self.size[1] * MM
+            figure = pyplot.figure(figsize=size, layout="constrained")
+        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+            ax = figure.add_subplot() if ax is None and figure else ax
+            assert ax is not None
+            self.draw(ax)
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.get_major_ticks()  # made in this style, and not where the figure is shown
+        return ax
 
     def tell(self, place: Path) -> None:
         """Print what the command of the same name does, after it wrote the files to a place."""

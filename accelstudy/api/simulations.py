@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf
@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
-from accelstudy.api.given import drawing, of_type, quantity, tidy
+from accelstudy.api.given import each, of_type, quantity, tidy
 from accelstudy.api.results import Result
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -24,21 +25,14 @@ from accelstudy.files.outputs import SIMULATION
 from accelstudy.files.tables import write_table
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
+from accelstudy.study import statistics as of_cells
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import LevelingConfig, parse_study
-from accelstudy.study.statistics import (
-    ANGLES,
-    TILT,
-    CellStatistics,
-    calibrations,
-    cell_tilt_error,
-    simulated_statistics,
-)
+from accelstudy.study.statistics import ANGLES, TILT, CellStatistics
 from accelstudy.study.tables import tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
@@ -58,6 +52,51 @@ class Simulation(Result):
     def __init__(self, statistics: Sequence[CellStatistics], seed: int) -> None:
         self.statistics, self._seed = statistics, seed
         self.cells = tuple(one.cell for one in statistics)
+        self.size = FULL, 40.0 + 6 * len(self.cells)
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        sigma: Sequence[float],
+        robot_sigma: float,
+        gravity: float,
+        truth: Mapping[str, float | str] | None,
+        replicates: int,
+        seed: int,
+        **names: Any,
+    ) -> Simulation:
+        """Simulate every combination of models, schemes and approaches of `accelstudy.simulate`."""
+        chosen = {}
+        for name, get in (("model", get_model), ("scheme", get_scheme), ("approach", get_approach)):
+            for one in each(names[name]):
+                of_type(name, one, str, expected="a name, or several")
+            chosen[name] = [get(one).name for one in each(names[name])]
+        for name, values in {**chosen, "sigma": sigma}.items():
+            if not values:
+                raise InputError(f"{name}: none is given")
+        noise = {
+            "sensor": {"sigma_mps2": tidy(sigma[0])},
+            "robot": {"sigma_mgon": tidy(robot_sigma / MGON)},
+        }
+        grid = {
+            "models": chosen["model"],
+            "schemes": chosen["scheme"],
+            "approaches": chosen["approach"],
+            "sensor_sigma_mps2": [*map(tidy, sigma)],
+            "replicates": replicates,
+        }
+        content = {
+            "study": "python",
+            "seed": seed,
+            "gravity_mps2": tidy(gravity),
+            "noise": noise,
+            "grids": [grid],
+        }
+        cells = _with_truth(parse_study(content, "simulate").cells, truth)
+        if not any(cell.estimability.estimable for cell in cells):
+            raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
+        return cls([of_cells.simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
 
     @property
     def name(self) -> str:
@@ -95,16 +134,14 @@ class Simulation(Result):
         """Return the parameters or, of several set-ups, the tilt errors."""
         return self.parameters if len(self.cells) == 1 else self.tilt
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def draw(self, ax: Axes) -> None:
         """Draw the tilt error of each set-up, with its standard error."""
-        with drawing(ax, FULL, 40 + 6 * len(self.cells)) as ax:
-            for angle, rows in self.tilt.groupby("angle", sort=False):
-                rms, error = (to_display(rows[key], "rad") for key in ("rms", "rms_error"))
-                ax.errorbar(rms, range(len(rms)), xerr=error, fmt="o", markersize=3, label=angle)
-            ax.set_yticks(range(len(self.cells)), [cell.name for cell in self.cells])
-            ax.set_xlabel(f"tilt error / {display_unit('rad')}")
-            ax.legend()
-        return ax
+        for angle, rows in self.tilt.groupby("angle", sort=False):
+            rms, error = (to_display(rows[key], "rad") for key in ("rms", "rms_error"))
+            ax.errorbar(rms, range(len(rms)), xerr=error, fmt="o", markersize=3, label=angle)
+        ax.set_yticks(range(len(self.cells)), [cell.name for cell in self.cells])
+        ax.set_xlabel(f"tilt error / {display_unit('rad')}")
+        ax.legend()
 
     def write(self, folder: Path, place: Path) -> None:
         """Write simulation.json and the tables of a study."""
@@ -128,19 +165,18 @@ class Simulation(Result):
         The errors are standard errors by the number of replicates. Of several cells the index has
         the name of the cell, too.
         """
-        tables = []
-        for one in self.statistics:
-            cell, bias, sd = one.cell, one["bias"], one["sd"]
-            columns = {
-                "truth": cell.true_values,
-                "bias": bias.value,
-                "bias_error": bias.error,
-                "sd": sd.value,
-                "sd_error": sd.error,
-                "unit": list(cell.parameter_units.values()),
+        return self._joined(
+            {
+                "truth": one.cell.true_values,
+                "bias": one["bias"].value,
+                "bias_error": one["bias"].error,
+                "sd": one["sd"].value,
+                "sd_error": one["sd"].error,
+                "unit": [*one.cell.parameter_units.values()],
+                "name": [*one.cell.parameter_units],
             }
-            tables.append(pd.DataFrame(columns, index=pd.Index(cell.parameter_units, name="name")))
-        return self._joined(tables)
+            for one in self.statistics
+        )
 
     @property
     def tilt(self) -> pd.DataFrame:
@@ -149,18 +185,17 @@ class Simulation(Result):
         The columns are its rms over all calibrations, and `q95`, which 95 of 100 calibrations stay
         below, each with its standard error.
         """
-        tables = []
-        for one in self.statistics:
-            rms = one["tilt_rms"]
-            bound = [one.quantile(TILT, angle, 0.95) for angle in ANGLES]
-            columns = {
-                "rms": rms.value,
-                "rms_error": rms.error,
-                "q95": [float(b.value) for b in bound],
-                "q95_error": [float(b.error) for b in bound],
+        bounds = [[one.quantile(TILT, angle, 0.95) for angle in ANGLES] for one in self.statistics]
+        table = self._joined(
+            {
+                "rms": one["tilt_rms"].value,
+                "rms_error": one["tilt_rms"].error,
+                "q95": [float(bound.value) for bound in of_angles],
+                "q95_error": [float(bound.error) for bound in of_angles],
+                "angle": ANGLES,
             }
-            tables.append(pd.DataFrame(columns, index=pd.Index(ANGLES, name="angle")))
-        table = self._joined(tables)
+            for one, of_angles in zip(self.statistics, bounds, strict=True)
+        )
         table.attrs["units"] = dict.fromkeys(table, "rad")
         return table
 
@@ -186,7 +221,7 @@ class Simulation(Result):
                 continue
             block = one.replicates.simulated
             good = np.flatnonzero(block.converged)
-            numbers = calibrations(cell, block, cell_tilt_error(cell, LEVELING))
+            numbers = of_cells.calibrations(cell, block, of_cells.cell_tilt_error(cell, LEVELING))
             estimate[i, good[:, None], at] = block.estimates[good]
             sigma[i, good[:, None], at] = numbers["sigma_posteriori"]
             tilt[i, good] = numbers["tilt"][:, : len(ANGLES)]
@@ -216,50 +251,13 @@ class Simulation(Result):
             },
         )
 
-    def _joined(self, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-        """Tables of all cells; that of a single one without its name."""
+    def _joined(self, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+        """Table of all cells, whose last column is its index; of several, their names are, too."""
+        tables = [pd.DataFrame(one) for one in rows]
+        tables = [table.set_index(table.columns[-1]) for table in tables]
         if len(tables) == 1:
             return tables[0]
         return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
-
-
-def simulated(
-    names: Mapping[str, Sequence[str]],
-    sigma: Sequence[float],
-    robot_sigma: float,
-    gravity: float,
-    truth: Mapping[str, float | str] | None,
-    replicates: int,
-    seed: int,
-) -> Simulation:
-    """Simulate every combination of models, schemes and approaches; see `accelstudy.simulate`."""
-    for key, values in {**names, "sigma": sigma}.items():
-        if not values:
-            raise InputError(f"{key}: none is given")
-    grid = {
-        "models": [get_model(one).name for one in names["model"]],
-        "schemes": [get_scheme(one).name for one in names["scheme"]],
-        "approaches": [get_approach(one).name for one in names["approach"]],
-        "sensor_sigma_mps2": [tidy(one) for one in sigma],
-        "replicates": replicates,
-    }
-    study = parse_study(
-        {
-            "study": "python",
-            "seed": seed,
-            "gravity_mps2": tidy(gravity),
-            "noise": {
-                "sensor": {"sigma_mps2": tidy(sigma[0])},
-                "robot": {"sigma_mgon": tidy(robot_sigma / MGON)},
-            },
-            "grids": [grid],
-        },
-        "simulate",
-    )
-    cells = _with_truth(study.cells, truth)
-    if not any(cell.estimability.estimable for cell in cells):
-        raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
-    return Simulation([simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -26,37 +26,22 @@ from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import FileOrFolder, Keyword, Names
+from accelstudy.verbs.kinds import Names
 
-Verb = Callable[..., Any]
+Place = Callable[..., AbstractContextManager[Path]]
+"""Where a result is written: called with the path, and with `inputs` and `force`."""
 
 
-def command(
-    verb: Verb,
-    *examples: str,
-    name: str = "",
-    writes: Kind | Literal["file"] | None = None,
-    out: str = "Folder to write to.",
-    optional: bool = False,
-    more: str = "",
-    sections: Mapping[str, str] | None = None,
-    reads: Callable[[Any], Iterable[Any]] = lambda given: (),
-    show: Callable[..., None] = click.echo,
-    run: Callable[..., None] | None = None,
-    options: Iterable[click.Option] = (),
-    retired: Mapping[str, str] | None = None,
-    angles: bool = True,
-    quiet: bool = True,
-) -> click.Command:
-    """Make the command of a verb.
+class Command(click.Command):
+    """The command of a verb, which says what its arguments are, and has its options in sections.
 
     Parameters
     ----------
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
     examples : str, for the end of its help: commands that run as they stand
     name : str, of the command; that of the verb if omitted
-    writes : Kind, of the folder that --out names, if the verb has a result with files; "file" for
-        one file, which `run` writes
+    writes : Kind of the folder that --out names, if the verb returns a result with files; of a
+        result that is a file, a context manager as `accelstudy.files.outputs.new_file`
     out : str, help of --out
     optional : bool, whether nothing is written without --out
     more : str, what its help says of `options` and of files, beside the docstring
@@ -69,74 +54,162 @@ def command(
     retired : mapping of an option of earlier versions to what to do instead; of a flag it ends in !
     angles, quiet : bool, whether it shows angles, and more than its result
     """
-    arguments = [p for p in inspect.signature(verb).parameters.values() if _is_argument(p)]
 
-    def act(*, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
-        with feedback(quiet), angles_in(angle_unit):
-            if run is not None:
-                run(**given)
-            elif isinstance(writes, Kind):
-                _save(verb, arguments, given, writes, reads)
-            elif (result := _call(verb, arguments, given)) is not None:
-                show(result)
+    def __init__(
+        self,
+        verb: Callable[..., Any],
+        *examples: str,
+        name: str = "",
+        writes: Kind | Place | None = None,
+        out: str = "Folder to write to.",
+        optional: bool = False,
+        more: str = "",
+        sections: Mapping[str, str] | None = None,
+        reads: Callable[[Any], Iterable[Any]] = lambda given: (),
+        show: Callable[[Any], None] = click.echo,
+        run: Callable[..., None] | None = None,
+        options: Iterable[click.Option] = (),
+        retired: Mapping[str, str] | None = None,
+        angles: bool = True,
+        quiet: bool = True,
+    ) -> None:
+        self.verb, self.writes, self.reads, self.show, self.run = verb, writes, reads, show, run
+        self.place = partial(result_folder, kind=writes) if isinstance(writes, Kind) else writes
+        self.sections = {title: names.split() for title, names in (sections or {}).items()}
+        signature = inspect.signature(verb).parameters.values()
+        self.arguments = [p for p in signature if p.kind is p.POSITIONAL_OR_KEYWORD]
+        super().__init__(
+            name or str(verb.__name__).replace("_", "-"),
+            callback=self._act,
+            help="\n\n".join(filter(None, [self._spelled(kinds.summary(verb)), more])),
+            epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in examples)]),
+        )
+        del self.params  # the list of all commands does without them
+        self._options = optional, out, [*options], dict(retired or {}), angles, quiet
 
-    def parameters() -> Iterator[click.Parameter]:
-        yield from (_argument(one, verb) for one in arguments)
+    @cached_property
+    def params(self) -> list[click.Parameter]:  # type: ignore[override]
+        """Options and arguments."""
+        return [*self._params()]
+
+    def _params(self) -> Iterator[click.Parameter]:
+        optional, out, options, retired, angles, quiet = self._options
+        keywords = kinds.keywords(self.verb)
         place = click.Option(["--out"], type=PATH, required=not optional, help=out)
-        if writes is not None and not optional:
+        renamed = {
+            f"--{old.replace('_', '-')}": f"{keywords[new].option} takes it"
+            for old, new in kinds.RENAMED.items()
+            if new in keywords
+        }
+        yield from map(self._argument, self.arguments)
+        if self.writes is not None and not optional:
             yield place
         yield from options
-        yield from (_option(one, verb) for one in kinds.keywords(verb))
-        if writes is not None:
+        yield from map(self._option, keywords.values())
+        if self.writes is not None:
             yield from (place, _FORCE) if optional else (_FORCE,)
         yield from (one for one, wanted in ((_ANGLE_UNIT, angles), (_QUIET, quiet)) if wanted)
-        yield from (_retired(*item) for item in {**_renamed(verb), **(retired or {})}.items())
+        yield from (_retired(*item) for item in (renamed | retired).items())
         # It stands in the help of all commands together.
         yield click.Option(["--plugin"], hidden=True, **PLUGIN)
 
-    return Command(
-        name or str(verb.__name__).replace("_", "-"),
-        parameters,
-        callback=act,
-        help="\n\n".join(filter(None, [_spelled(kinds.summary(verb), verb), more])),
-        epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in examples)]),
-        sections={title: names.split() for title, names in (sections or {}).items()},
-        meanings=lambda: {_metavar(one): kinds.meanings(verb)[one.name] for one in arguments},
-    )
+    def _argument(self, parameter: inspect.Parameter) -> click.Argument:
+        """Argument of a positional parameter: a path or a name."""
+        many = "Sequence" in parameter.annotation
+        return click.Argument(
+            [parameter.name],
+            type=PATH
+            if "Path" in parameter.annotation
+            else _type(kinds.Keyword.of(self.verb, parameter).kind),
+            nargs=-1 if many else 1,
+            required=parameter.default is parameter.empty,
+            metavar=f"{_metavar(parameter)}..." if many else None,
+        )
+
+    def _option(self, keyword: kinds.Keyword) -> click.Option:
+        """Option of a keyword."""
+        needed = keyword.default is inspect.Parameter.empty
+        default = None if needed else keyword.default
+        name, meaning = keyword.option, kinds.meanings(self.verb)[keyword.name]
+        return click.Option(
+            [f"{name}/--no-{name[2:]}" if default is True else name, keyword.name],
+            type=_type(keyword.kind),
+            is_flag=keyword.kind is kinds.FLAG,
+            nargs=2 if keyword.ends else 1,
+            multiple=keyword.many,
+            required=needed,
+            default=default,
+            show_default=default is not False and default not in (None, ()),
+            help=self._spelled(meaning).replace(" [default", "  [default"),
+        )
+
+    def _spelled(self, text: str) -> str:
+        """Text of a docstring with the names of keywords as options."""
+        if "`" not in text:
+            return text
+        keywords = kinds.keywords(self.verb)
+        options = {name: one.option for name, one in keywords.items()}
+        return re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), text)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; messages call keywords by its options."""
+        options = (p for p in self.params if isinstance(p, click.Option))
+        token = OPTIONS.set({str(p.name): p.opts[0] for p in options})
+        try:
+            return super().invoke(ctx)
+        finally:
+            OPTIONS.reset(token)
+
+    def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
+        with feedback(quiet), angles_in(angle_unit):
+            if self.run is not None:
+                self.run(**given)
+            elif self.place is not None:
+                self._save(self.place, given.pop("out"), given.pop("force"), given)
+            elif (result := self._call(given)) is not None:
+                self.show(result)
+
+    def _call(self, given: dict[str, Any]) -> Any:
+        values = [given.pop(one.name) for one in self.arguments]
+        return self.verb(*values, **given)
+
+    def _save(self, place: Place, out: Path | None, force: bool, given: dict[str, Any]) -> None:
+        """Write the result to --out, and print what it says."""
+        named = [path for one in self.arguments for path in _paths(given[one.name])]
+        inputs = [
+            *inputs_of(self.verb, given),
+            *(one for path in named for one in self.reads(path)),
+        ]
+        opened = nullcontext() if out is None else place(out, inputs=inputs, force=force)
+        work = stage(self.writes.name) if isinstance(self.writes, Kind) else nullcontext()
+        with opened as part, work:
+            result = self._call(given)
+            if status := getattr(result, "exit_status", 0):
+                result.tell(None)
+                raise click.exceptions.Exit(status)
+            if part is not None:
+                result.write(part, out)
+        result.tell(out)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the arguments, the sections, and at the end what is in none of them."""
+        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
+        rows = {p.name: row for p in options if (row := p.get_help_record(ctx))}
+        meanings = kinds.meanings(self.verb)
+        lists = {"Arguments": [(_metavar(one), meanings[one.name]) for one in self.arguments]}
+        lists |= {title: [rows.pop(one) for one in own] for title, own in self.sections.items()}
+        lists["Other options" if self.sections else "Options"] = [*rows.values()]
+        for title, records in lists.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
 
 
-def _call(verb: Verb, arguments: Sequence[inspect.Parameter], given: dict[str, Any]) -> Any:
-    values = [given.pop(one.name) for one in arguments]
-    return verb(*values, **given)
-
-
-def _save(
-    verb: Verb,
-    arguments: Sequence[inspect.Parameter],
-    given: dict[str, Any],
-    writes: Kind,
-    reads: Callable[[Any], Iterable[Any]],
-) -> None:
-    """Call a verb, write its result to --out, and print what it says."""
-    out, force = given.pop("out"), given.pop("force")
-    paths = [path for one in arguments for path in _paths(given[one.name])]
-    inputs = [*inputs_of(verb, given), *(each for path in paths for each in reads(path))]
-    place = nullcontext() if out is None else result_folder(out, writes, inputs, force)
-    with place as folder, stage(writes.name):
-        result = _call(verb, arguments, given)
-        if result.exit_status:
-            result.tell(None)
-            raise click.exceptions.Exit(result.exit_status)
-        if folder is not None:
-            result.write(folder, out)
-    result.tell(out)
-
-
-def inputs_of(verb: Verb, given: Mapping[str, Any]) -> list[Path]:
+def inputs_of(verb: Callable[..., Any], given: Mapping[str, Any]) -> list[Path]:
     """Files and folders that a verb reads."""
-    named = {one.name for one in kinds.keywords(verb) if getattr(one.kind, "files", False)}
+    files = {name for name, one in kinds.keywords(verb).items() if getattr(one.kind, "files", 0)}
     inputs = [path for value in given.values() for path in _paths(value)]
-    return inputs + [Path(given[name]) for name in named if isinstance(given[name], str)]
+    return inputs + [Path(given[name]) for name in files if isinstance(given.get(name), str)]
 
 
 def _paths(value: Any) -> list[Path]:
@@ -149,68 +222,11 @@ def _paths(value: Any) -> list[Path]:
 # --- what click is told ---------------------------------------------------------------------------
 
 
-class Command(click.Command):
-    """A command that says what its arguments are, and has its options in sections.
-
-    Parameters
-    ----------
-    name : str
-    parameters : function that makes its options and arguments, when they are first asked for
-    sections : mapping of title to names of options
-    meanings : function that returns the meaning of each argument
-    """
-
-    def __init__(
-        self,
-        name: str,
-        parameters: Callable[[], Iterable[click.Parameter]],
-        *,
-        sections: Mapping[str, Sequence[str]],
-        meanings: Callable[[], Mapping[str, str]],
-        **kwargs: Any,
-    ) -> None:
-        super().__init__(name, **kwargs)
-        del self.params  # the list of all commands does without them
-        self._parameters, self.sections, self.meanings = parameters, sections, meanings
-
-    @cached_property
-    def params(self) -> list[click.Parameter]:  # type: ignore[override]
-        """Options and arguments."""
-        return [*self._parameters()]
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; messages call keywords by its options."""
-        options = (p for p in self.params if isinstance(p, click.Option))
-        token = OPTIONS.set({str(p.name): p.opts[0] for p in options})
-        try:
-            return super().invoke(ctx)
-        finally:
-            OPTIONS.reset(token)
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the arguments, the sections, and at the end what is in none of them."""
-        options = [p for p in self.get_params(ctx) if isinstance(p, click.Option)]
-        rows = {p.name: row for p in options if (row := p.get_help_record(ctx))}
-        meanings = self.meanings()
-        lists = {"Arguments": [*meanings.items()]} if meanings else {}
-        lists |= {title: [rows.pop(one) for one in own] for title, own in self.sections.items()}
-        lists["Other options" if self.sections else "Options"] = list(rows.values())
-        for title, records in lists.items():
-            with formatter.section(title):
-                formatter.write_dl(records)
-
-
-METAVARS = {"given": "quantity", "word": "text", "place": "column", "pairs": "columns"}
-"""What the help calls a value of a kind that has another name."""
-
-
 class Text(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5 on
     """A text that the verb checks; the shell completes names, and files where one may stand."""
 
     def __init__(self, kind: Any) -> None:
-        self.kind = kind
-        usual = type(kind).__name__.lower()
-        self.name = kind.what if isinstance(kind, Names) else METAVARS.get(usual, usual)
+        self.kind, self.name = kind, getattr(kind, "metavar", "quantity")
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
@@ -219,18 +235,16 @@ class Text(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
         if not isinstance(self.kind, Names):
             return []
         before, plus, last = incomplete.rpartition("+" if self.kind.parts else "\0")
-        found = _names(self.kind)
-        if plus and self.kind.parts:
-            found += _names(self.kind.parts)
+        found = [*_names(self.kind), *(_names(self.kind.parts) if plus and self.kind.parts else ())]
         items = [CompletionItem(f"{before}{plus}{one}") for one in found if one.startswith(last)]
         if items or not self.kind.files:
             return items
         return [CompletionItem(incomplete, type="file")]
 
 
-def _names(kind: Names) -> list[str]:
+def _names(kind: Names) -> Iterable[str]:
     names = getattr(import_module(kind.module), kind.names)
-    return [*(names() if callable(names) else names)]
+    return names() if callable(names) else names
 
 
 class Whole(click.IntRange):
@@ -253,6 +267,42 @@ class FilePath(click.Path):
         return super().convert(value, param, ctx)
 
 
+def _type(kind: Any) -> Any:
+    match kind:
+        case Range(least=least, most=most):
+            return Whole(int(least), int(most) if most <= 1e6 else None)
+        case kinds.PATH:
+            return PATH
+        case kinds.FLAG:
+            return bool
+    return Text(kind)
+
+
+def _metavar(parameter: inspect.Parameter) -> str:
+    many = "Sequence" in parameter.annotation
+    return (parameter.name.removesuffix("s") if many else parameter.name).upper()
+
+
+def _load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -> None:
+    """Load files of plug-ins, before anything else of the command is looked at."""
+    if paths and not ctx.resilient_parsing:
+        from accelstudy.basics.plugins import load_files
+
+        load_files(paths)
+
+
+def _retired(name: str, instead: str) -> click.Option:
+    """Option of earlier versions, which ends in a line that says what to do instead."""
+    name, flag, _ = name.partition("!")
+
+    def refuse(context: click.Context, option: click.Parameter, value: Any) -> None:
+        if value:
+            raise InputError(f"{name}: no longer an option; {instead}")
+
+    hidden: Any = {"hidden": True, "expose_value": False, "help": "Retired."}
+    return click.Option([name], is_flag=bool(flag), callback=refuse, **hidden)
+
+
 PATH = FilePath(path_type=Path)
 _QUIET = click.Option(["--quiet"], is_flag=True, help="Print only the result and warnings.")
 _FORCE = click.Option(
@@ -265,16 +315,6 @@ _ANGLE_UNIT = click.Option(
     metavar="[gon|deg]",
     help=f"Unit in which angles are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
 )
-
-
-def _load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -> None:
-    """Load files of plug-ins, before anything else of the command is looked at."""
-    if paths and not ctx.resilient_parsing:
-        from accelstudy.basics.plugins import load_files
-
-        load_files(paths)
-
-
 PLUGIN: dict[str, Any] = {
     "type": PATH,
     "multiple": True,
@@ -284,89 +324,3 @@ PLUGIN: dict[str, Any] = {
     "after the command.",
 }
 """The option of all commands, before their name and after it."""
-
-
-def _is_argument(parameter: inspect.Parameter) -> bool:
-    return parameter.kind is parameter.POSITIONAL_OR_KEYWORD
-
-
-def _argument(parameter: inspect.Parameter, verb: Verb) -> click.Argument:
-    """Argument of a positional parameter: a path or a name."""
-    many = "Sequence" in parameter.annotation
-    return click.Argument(
-        [parameter.name],
-        type=PATH if "Path" in parameter.annotation else _type(kinds.keyword(verb, parameter).kind),
-        nargs=-1 if many else 1,
-        required=parameter.default is parameter.empty,
-        metavar=f"{_metavar(parameter)}..." if many else None,
-    )
-
-
-def _metavar(parameter: inspect.Parameter) -> str:
-    many = "Sequence" in parameter.annotation
-    return (parameter.name.removesuffix("s") if many else parameter.name).upper()
-
-
-def _option(keyword: Keyword, verb: Verb) -> click.Option:
-    """Option of a keyword."""
-    needed = keyword.default is inspect.Parameter.empty
-    default = None if needed else keyword.default
-    name = keyword.option.replace("_", "-")
-    return click.Option(
-        [f"--{name}/--no-{name}" if default is True else f"--{name}", keyword.name],
-        type=_type(keyword.kind),
-        is_flag=keyword.kind is bool,
-        nargs=2 if keyword.ends else 1,
-        multiple=keyword.many,
-        required=needed,
-        default=default,
-        show_default=default is not False and default not in (None, ()),
-        help=_spelled(kinds.meanings(verb)[keyword.name], verb).replace(" [default", "  [default"),
-    )
-
-
-def _renamed(verb: Verb) -> dict[str, str]:
-    """Options of earlier versions whose keywords have another name, with what to do instead."""
-    names = {one.name for one in kinds.keywords(verb)}
-    renamed = [each for each in kinds.RENAMED.items() if each[1] in names]
-    spelled = ([f"--{name.replace('_', '-')}" for name in each] for each in renamed)
-    return {old: f"{new} takes it" for old, new in spelled}
-
-
-def _retired(name: str, instead: str) -> click.Option:
-    """Option of earlier versions, which ends in a line that says what to do instead."""
-    name, flag, _ = name.partition("!")
-
-    def refuse(context: click.Context, option: click.Parameter, value: Any) -> None:
-        if value:
-            raise InputError(f"{name}: no longer an option; {instead}")
-
-    return click.Option(
-        [name],
-        is_flag=bool(flag),
-        hidden=True,
-        expose_value=False,
-        callback=refuse,
-        help="Retired.",
-    )
-
-
-def _type(kind: Any) -> Any:
-    match kind:
-        case Range(least=least, most=most):
-            return Whole(int(least), int(most) if most <= 1e6 else None)
-        case FileOrFolder():
-            return PATH
-    return kind if isinstance(kind, type) else Text(kind)
-
-
-def _spelled(text: str, verb: Verb) -> str:
-    """Text of a docstring with the names of keywords as options."""
-    if "`" not in text:
-        return text
-    options = {
-        name: f"--{kinds.option_of(name, 'Sequence' in one.annotation).replace('_', '-')}"
-        for name, one in inspect.signature(verb).parameters.items()
-        if not _is_argument(one)
-    }
-    return re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), text)

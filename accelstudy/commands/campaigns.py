@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import click
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.basics.wording import counted
-from accelstudy.commands.bridge import PATH, command, inputs_of
+from accelstudy.commands.bridge import PATH, Command, inputs_of
 from accelstudy.files import outputs
 from accelstudy.files.outputs import new_file, result_folder
 from accelstudy.verbs import calibrations, campaigns, planning
@@ -73,7 +73,7 @@ def show_import(campaign: Campaign, holds: Holds | None, out: Path, figure: bool
     click.echo(f"campaign: {out} ({counted(campaign.n_positions, 'position')})")
 
 
-IMPORT = command(
+IMPORT = Command(
     campaigns.find_holds,
     "accelstudy import calibration.csv --out my-campaign",
     "accelstudy import log.csv --out by-number --rate 100 --columns fx=0,fy=1,fz=2",
@@ -128,7 +128,7 @@ def run_simulate_campaign(
     click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
 
 
-SIMULATE_CAMPAIGN = command(
+SIMULATE_CAMPAIGN = Command(
     campaigns.simulate_campaign,
     'accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"',
     writes=outputs.CAMPAIGN,
@@ -172,35 +172,20 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
     click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
 
 
-APPLY = command(
+APPLY = Command(
     calibrations.apply,
     "accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv",
-    writes="file",
+    writes=new_file,
     out="CSV or Parquet file to write.",
     run=run_apply,
 )
 
 
-def run_data_sheet(source: Path, out: Path, force: bool, **given: Any) -> None:
-    """Write a data sheet, and print what it says of a mean."""
-    inputs = [source, *inputs_of(planning.data_sheet, given)]
-    with new_file(out, inputs, force) as path, stage("Allan deviation"):
-        sheet = planning.data_sheet(source, **given)
-        path.write_text(sheet.as_yaml, encoding="utf-8")
-    for duration in (1.0, 10.0, 100.0) if sheet.position_sigma is None else ():
-        sigma = 1e3 * sheet.sigma_mean(duration)
-        click.echo(f"sigma of the mean of {duration:g} s: {sigma:.3g} mm/s²")
-    if sheet.position_sigma is not None:
-        click.echo(f"sigma of the mean of a position: {1e3 * sheet.position_sigma:.3g} mm/s²")
-    say(f"data sheet: {out}")
-
-
-DATA_SHEET = command(
+DATA_SHEET = Command(
     planning.data_sheet,
     "accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml",
-    writes="file",
+    writes=new_file,
     out="YAML file to write.",
-    run=run_data_sheet,
     angles=False,
 )
 
@@ -242,7 +227,7 @@ def public(
     show_import(*imported, place)
 
 
-PUBLIC = command(public, "accelstudy public", "accelstudy public xsens-mti --out xsens")
+PUBLIC = Command(public, "accelstudy public", "accelstudy public xsens-mti --out xsens")
 
 
 def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
@@ -281,7 +266,7 @@ def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
         say("\nended")
 
 
-ADVISE = command(
+ADVISE = Command(
     planning.advise,
     "accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon",
     run=run_advise,
@@ -297,25 +282,20 @@ ADVISE = command(
 )
 
 
-def run_design(out: Path, force: bool, **given: Any) -> None:
-    """Write a design, and print what it brings."""
-    from accelstudy.api.designs import scheme_file
+def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
+    """Yield the file of a design."""
+    from accelstudy.api.designs import new_scheme
 
-    read = inputs_of(planning.find_positions, given)
-    with new_file(scheme_file(out), read, force) as path:
-        design = planning.find_positions(**given)
-        design.write(path, out)
-    design.tell(out)
+    return new_scheme(*place, **how)
 
 
-DESIGN = command(
+DESIGN = Command(
     planning.find_positions,
     "accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon --out my-scheme.yaml",
     "accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign",
     name="design",
-    writes="file",
+    writes=new_scheme,
     out="YAML file for the positions.",
-    run=run_design,
     sections={
         "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
         "What the positions are to be good for": (

@@ -10,7 +10,7 @@ import click
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, track
-from accelstudy.commands.bridge import command
+from accelstudy.commands.bridge import Command
 from accelstudy.verbs.kinds import ApproachName, File, ModelName, SchemeName, UsualApproach, verb
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ def scheme(name: SchemeName) -> None:
     click.echo(table.to_csv(index_label="position", float_format="%.6f"), nl=False)
 
 
-MODELS = command(models, "accelstudy models", angles=False, quiet=False)
-EFFECTS = command(effects, "accelstudy effects", "accelstudy effects --campaign my-campaign")
-SCHEMES = command(schemes, "accelstudy schemes --approach robot fibonacci-24 mclaren-24")
-SCHEME = command(scheme, "accelstudy scheme fibonacci-24", quiet=False)
+MODELS = Command(models, "accelstudy models", angles=False, quiet=False)
+EFFECTS = Command(effects, "accelstudy effects", "accelstudy effects --campaign my-campaign")
+SCHEMES = Command(schemes, "accelstudy schemes --approach robot fibonacci-24 mclaren-24")
+SCHEME = Command(scheme, "accelstudy scheme fibonacci-24", quiet=False)

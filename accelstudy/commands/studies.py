@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import click
 
 from accelstudy.basics.progress import say, warn
-from accelstudy.commands.bridge import command
+from accelstudy.commands.bridge import Command
 from accelstudy.verbs.kinds import Force, Names, SensorName, verb
 
 if TYPE_CHECKING:
@@ -171,13 +171,13 @@ def config_schema() -> None:
     click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-INIT = command(
+INIT = Command(
     init,
     "accelstudy init my-study",
     "accelstudy init mine --sensor adxl355",
     angles=False,
     quiet=False,
 )
-CELLS = command(cells, "accelstudy cells config/config.yaml", angles=False, quiet=False)
-CLAIMS = command(claims, "accelstudy claims results/paper", angles=False, quiet=False)
-CONFIG_SCHEMA = command(config_schema, "accelstudy config-schema", angles=False, quiet=False)
+CELLS = Command(cells, "accelstudy cells config/config.yaml", angles=False, quiet=False)
+CLAIMS = Command(claims, "accelstudy claims results/paper", angles=False, quiet=False)
+CONFIG_SCHEMA = Command(config_schema, "accelstudy config-schema", angles=False, quiet=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from accelstudy.basics.progress import say, warn
-from accelstudy.commands.bridge import command
+from accelstudy.commands.bridge import Command
 from accelstudy.files import outputs
 from accelstudy.verbs import calibrations, planning, sensors
 
@@ -42,46 +42,46 @@ def run_export(calibration: Path, form: str) -> None:
     click.echo(text, nl=False)
 
 
-CALIBRATE = command(
+CALIBRATE = Command(
     calibrations.calibrate,
     "accelstudy calibrate my-campaign --out calibrated",
     writes=outputs.CALIBRATION,
 )
-DIAGNOSE = command(
+DIAGNOSE = Command(
     calibrations.diagnose,
     "accelstudy diagnose my-campaign --out diagnosed",
     writes=outputs.DIAGNOSIS,
 )
-LOT = command(
+LOT = Command(
     sensors.lot,
     "accelstudy lot sensor-1 sensor-2 sensor-3 --out lot",
     writes=outputs.LOT,
     reads=sensors.folders_of,
 )
-CHECK_SIGMAS = command(
+CHECK_SIGMAS = Command(
     calibrations.check_sigmas,
     "accelstudy check-sigmas my-campaign --replicates 500",
     show=show_sigmas,
 )
-EXPORT = command(
+EXPORT = Command(
     calibrations.export,
     "accelstudy export calibrated/calibration.json --form c",
     run=run_export,
     retired={"--level!": LEVELED},
     angles=False,
 )
-COMPARE = command(
+COMPARE = Command(
     sensors.compare,
     "accelstudy compare spring/calibration.json autumn/calibration.json --out both",
     writes=outputs.COMPARISON,
 )
-HISTORY = command(
+HISTORY = Command(
     sensors.history,
     "accelstudy history spring/calibration.json autumn/calibration.json "
     "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years",
     writes=outputs.HISTORY,
 )
-PLAN = command(
+PLAN = Command(
     planning.plan,
     "accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2",
     writes=outputs.PLAN,

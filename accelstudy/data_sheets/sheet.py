@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.files.outputs import new_file
 
@@ -142,7 +143,21 @@ class DataSheet:
         force : bool, whether to replace a file that is there
         """
         with new_file(Path(path), force=force) as file:
-            file.write_text(self.as_yaml, encoding="utf-8")
+            self.write(file, Path(path))
+
+    def write(self, file: Path, place: Path) -> None:
+        """Write a file that becomes `place`."""
+        file.write_text(self.as_yaml, encoding="utf-8")
+
+    def tell(self, place: Path) -> None:
+        """Print what `accelstudy data-sheet` does: the noise of a mean."""
+        if self.position_sigma is not None:
+            show(f"sigma of the mean of a position: {1e3 * self.position_sigma:.3g} mm/s²")
+        for duration in (1.0, 10.0, 100.0) if self.position_sigma is None else ():
+            show(
+                f"sigma of the mean of {duration:g} s: {1e3 * self.sigma_mean(duration):.3g} mm/s²"
+            )
+        say(f"data sheet: {place}")
 
     def sigma_mean(self, seconds: float, session: float | None = None) -> float:
         """Standard deviation of the mean of a hold, m/s².

@@ -95,7 +95,19 @@ SIMULATION = Kind(
     tuple(f"{table}.parquet" for table in
           ("cells", "summary", "correlations", "leveling", "quantiles")),
 )  # fmt: skip
-_KINDS = (BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, PLAN, COMPARISON, HISTORY, LOT, SIMULATION)
+ADVICE = Kind("advice", "advice.json")
+_KINDS = (
+    BATCH_JOB,
+    DIAGNOSIS,
+    CALIBRATION,
+    CAMPAIGN,
+    PLAN,
+    COMPARISON,
+    HISTORY,
+    LOT,
+    SIMULATION,
+    ADVICE,
+)
 
 
 @contextmanager

@@ -3,42 +3,25 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from accelstudy.api.given import SIGMA_READING, START
-from accelstudy.basics.bounds import Range
-from accelstudy.verbs.kinds import (
-    ColumnsOf,
-    Delimiter,
-    ModelName,
-    Quantity,
-    Rate,
-    Seed,
-    Time,
-    TimeUnit,
-    TypeFile,
-    Unit,
-    UsualApproach,
-    Variable,
-    verb,
-)
+from accelstudy.basics.bounds import SIGMA_READING, TIME, Range
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import Quantity, si, verb
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from accelstudy.api.calibrations import Calibration
-    from accelstudy.api.diagnoses import Diagnosis
-    from accelstudy.api.logs import Log
-    from accelstudy.campaign.session import Campaign
+    from accelstudy import Calibration, Campaign, Diagnosis, Log
 
 
 @verb
 def calibrate(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: UsualApproach = None,
-    prior: TypeFile = None,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
+    prior: kinds.TypeFile = None,
 ) -> Calibration:
     """Calibrate a campaign and report on it.
 
@@ -56,11 +39,9 @@ def calibrate(
     InputError
         If the campaign does not determine the model, or a name is unknown.
     """
-    from accelstudy.api.calibrations import Calibration, place_of, resolve
-    from accelstudy.campaign.calibration.fit import fit_campaign
+    from accelstudy.api.calibrations import Calibration, fit_of, place_of
 
-    fit = fit_campaign(*resolve(campaign, model, approach, prior))
-    return Calibration.of_fit(fit, place_of(campaign))
+    return Calibration(None, fit_of(campaign, model, approach, prior), place_of(campaign))
 
 
 @verb
@@ -86,10 +67,10 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
 def check_sigmas(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: UsualApproach = None,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
     replicates: Annotated[int, Range(2, 10**9)] = 2000,
-    seed: Seed = 1,
+    seed: kinds.Seed = 1,
 ) -> pd.DataFrame:
     """Check the sigmas of a calibration by simulation.
 
@@ -110,11 +91,10 @@ def check_sigmas(
         adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
         sd_empirical) and n_converged. What such a check can find is said in ``attrs["finds"]``.
     """
-    from accelstudy.api.calibrations import resolve
+    from accelstudy.api.calibrations import fit_of
     from accelstudy.campaign.calibration import sigma_check
-    from accelstudy.campaign.calibration.fit import fit_campaign
 
-    fit = fit_campaign(*resolve(campaign, model, approach))
+    fit = fit_of(campaign, model, approach)
     table = sigma_check.check_sigmas(fit, replicates, seed)
     table.attrs["finds"] = sigma_check.what_it_finds(fit)
     return table
@@ -125,15 +105,15 @@ def apply(
     calibration: Calibration | str | PathLike[str],
     log: Log | str | PathLike[str] | pd.DataFrame,
     *,
-    columns: ColumnsOf = None,
-    time: Time = None,
-    time_unit: TimeUnit = None,
-    rate: Rate = None,
-    delimiter: Delimiter = None,
-    variable: Variable = None,
-    unit: Unit = None,
-    start: Annotated[Quantity | None, START] = None,
-    sigma: Annotated[Quantity | None, SIGMA_READING] = None,
+    columns: kinds.Columns = None,
+    time: kinds.Time = None,
+    time_unit: kinds.TimeUnit = None,
+    rate: kinds.Rate = None,
+    delimiter: kinds.Delimiter = None,
+    variable: kinds.Variable = None,
+    unit: kinds.Unit = None,
+    start: Annotated[Quantity | None, si("s", 0.0, TIME.most)] = None,
+    sigma: Annotated[Quantity | None, si("m/s^2", 0.0, SIGMA_READING.most)] = None,
 ) -> pd.DataFrame:
     """Apply a calibration to a log and level with it.
 
@@ -172,11 +152,16 @@ def apply(
         names say, and their sigmas; a DataFrame keeps its index. Warnings stand in
         ``attrs["warnings"]``.
     """
-    given = {**locals()}
+    given: dict[str, Any] = {**locals()}
     from accelstudy.api.calibrations import as_calibration
     from accelstudy.api.logs import log_of
+    from accelstudy.campaign.calibration.leveling import level
 
-    return as_calibration(calibration).apply(log_of(log, given), start=start, sigma=sigma)
+    read, sensor = log_of(log, given), as_calibration(calibration).sensor
+    leveled = level(sensor, read.file, read.layout, given["sigma"], given["start"])
+    table = leveled.to_frame(read.table)
+    table.attrs["warnings"] = list(leveled.warnings)
+    return table
 
 
 @verb
@@ -217,10 +202,10 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "json"
 def diagnose(
     campaign: Campaign | str | PathLike[str],
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: UsualApproach = None,
-    prior: TypeFile = None,
-    seed: Seed = 1,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
+    prior: kinds.TypeFile = None,
+    seed: kinds.Seed = 1,
     replicates: Annotated[int, Range(100, 10**9)] = 1000,
 ) -> Diagnosis:
     """Find what a sensor model lacks to explain a campaign.
@@ -240,13 +225,7 @@ def diagnose(
     InputError
         If the campaign does not determine the model, or a name is unknown.
     """
-    from accelstudy.api.calibrations import place_of, resolve
+    given = {**locals()}
     from accelstudy.api.diagnoses import Diagnosis
-    from accelstudy.basics.progress import stage
-    from accelstudy.diagnosis.pipeline import diagnose as diagnosed
 
-    # The diagnosis, not the reader, looks for wrong units and axes.
-    given = resolve(campaign, model, approach, prior, plausible=False)
-    with stage("search for what is missing"):
-        found = diagnosed(*given, seed=seed)
-    return Diagnosis(found, seed, replicates, place_of(campaign))
+    return Diagnosis.of(**given)

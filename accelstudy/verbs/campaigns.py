@@ -6,64 +6,40 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
-from accelstudy.api.given import GRAVITY
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
-from accelstudy.verbs.kinds import (
-    COLUMNS,
-    ApproachName,
-    ColumnsOf,
-    Delimiter,
-    EffectName,
-    File,
-    Force,
-    Frame,
-    GrossErrorName,
-    ModelName,
-    NoiseEffectName,
-    Numbers,
-    Offset,
-    Quantity,
-    Rate,
-    Scale,
-    SchemeName,
-    Seed,
-    Time,
-    TimeUnit,
-    Unit,
-    Variable,
-    Word,
-    si,
-    verb,
-)
+from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import Quantity, angle, si, verb
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from accelstudy import Campaign, Log
     from accelstudy.api.campaigns import SimulatedCampaign
-    from accelstudy.api.logs import Log
-    from accelstudy.campaign.session import Campaign
 
-SIGMA = bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most
-INTERVAL = bounds.INTERVAL.least, bounds.INTERVAL.most
-Seconds = si("s", 1e-9, 1e6)
+SIGMA = si("m/s^2", bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most)
+INTERVAL = si("s", bounds.INTERVAL.least, bounds.INTERVAL.most)
+Seconds = Annotated[Quantity | None, si("s", 1e-9, 1e6)]
+Gravity = Annotated[Quantity, kinds.GRAVITY]
+RobotSigma = Annotated[Quantity, angle(0, 100 * GON)]
+Ends = tuple[float, float] | str
 
 
 @verb
 def read_log(
     log: str | PathLike[str] | pd.DataFrame,
     *,
-    columns: ColumnsOf = None,
-    time: Time = None,
-    time_unit: TimeUnit = None,
-    rate: Rate = None,
-    delimiter: Delimiter = None,
-    variable: Variable = None,
-    unit: Unit = None,
-    scale: Scale = None,
-    offset: Offset = None,
-    frame: Frame = None,
+    columns: kinds.Columns = None,
+    time: kinds.Time = None,
+    time_unit: kinds.TimeUnit = None,
+    rate: kinds.Rate = None,
+    delimiter: kinds.Delimiter = None,
+    variable: kinds.Variable = None,
+    unit: kinds.Unit = None,
+    scale: kinds.Scale = None,
+    offset: kinds.Offset = None,
+    frame: kinds.Frame = None,
 ) -> Log:
     """Say which log to read, and how.
 
@@ -88,34 +64,34 @@ def read_log(
 def find_holds(
     log: Log | str | PathLike[str] | pd.DataFrame | Sequence[str | PathLike[str]],
     *,
-    columns: ColumnsOf = None,
-    time: Time = None,
-    time_unit: TimeUnit = None,
-    rate: Rate = None,
-    delimiter: Delimiter = None,
-    variable: Variable = None,
-    unit: Unit = None,
-    scale: Scale = None,
-    offset: Offset = None,
-    range: Annotated[float | str | None, Word()] = None,
-    frame: Frame = None,
-    threshold: Annotated[Quantity | None, si("m/s^2", *SIGMA)] = None,
-    window: Annotated[Quantity | None, Seconds] = None,
+    columns: kinds.Columns = None,
+    time: kinds.Time = None,
+    time_unit: kinds.TimeUnit = None,
+    rate: kinds.Rate = None,
+    delimiter: kinds.Delimiter = None,
+    variable: kinds.Variable = None,
+    unit: kinds.Unit = None,
+    scale: kinds.Scale = None,
+    offset: kinds.Offset = None,
+    range: Annotated[float | str | None, kinds.NUMBER] = None,
+    frame: kinds.Frame = None,
+    threshold: Annotated[Quantity | None, SIGMA] = None,
+    window: Seconds = None,
     trim: Annotated[Quantity | None, si("s", 0, 1e6)] = None,
-    shortest: Annotated[Quantity | None, Seconds] = None,
+    shortest: Seconds = None,
     exclude: str | Sequence[str] = (),
     join: str | Sequence[str] = (),
     block: Annotated[int, Range(4, 10**9)] | None = None,
     means: bool = False,
-    robot_sigma: Annotated[Quantity | None, Given("rad", "", 0, 100 * GON)] = None,
+    robot_sigma: RobotSigma | None = None,
     robot_unit: str | None = None,
-    reference_log: File | None = None,
-    reference: File | None = None,
-    reference_columns: Annotated[Mapping[str, str | int] | str | None, COLUMNS] = None,
+    reference_log: kinds.File | None = None,
+    reference: kinds.File | None = None,
+    reference_columns: Annotated[Mapping[str, str | int] | str | None, kinds.COLUMNS] = None,
     reference_offset: Annotated[Quantity | None, si("s", -1e12, 1e12)] = None,
     name: str | None = None,
-    gravity: Annotated[Quantity | None, GRAVITY] = None,
-    settings: File | None = None,
+    gravity: Gravity | None = None,
+    settings: kinds.File | None = None,
 ) -> Campaign:
     """Make a campaign of a raw log: find its static holds.
 
@@ -205,7 +181,7 @@ def write_campaign(
     campaign: Campaign,
     folder: str | PathLike[str],
     *,
-    force: Force = False,
+    force: kinds.Force = False,
     plausible: bool = True,
 ) -> None:
     """Write the folder of a campaign, which the commands take.
@@ -231,29 +207,25 @@ def write_campaign(
 def simulate_campaign(
     *,
     name: str | None = None,
-    seed: Seed = 1,
-    scheme: SchemeName = "mclaren-24",
+    seed: kinds.Seed = 1,
+    scheme: kinds.SchemeName = "mclaren-24",
     repeats: Annotated[int, bounds.POSITIONS] = 1,
     repeat_first: Annotated[int, Range(0, bounds.POSITIONS.most)] = 0,
     order: str = "scheme",
-    approach: ApproachName = "robot",
-    model: ModelName = "bias-scale-nonorthogonality",
-    effects: EffectName | Sequence[EffectName] = (),
+    approach: kinds.ApproachName = "robot",
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    effects: kinds.EffectName | Sequence[kinds.EffectName] = (),
     size: Annotated[Quantity, si("1", bounds.SIZE.least, bounds.SIZE.most)] = 1,
-    noise_effects: NoiseEffectName | Sequence[NoiseEffectName] = (),
-    gross_errors: GrossErrorName | Sequence[GrossErrorName] = (),
-    sigma: Annotated[Quantity, si("m/s^2", *SIGMA)] = "2mm/s^2",
+    noise_effects: kinds.NoiseEffectName | Sequence[kinds.NoiseEffectName] = (),
+    gross_errors: kinds.GrossErrorName | Sequence[kinds.GrossErrorName] = (),
+    sigma: Annotated[Quantity, SIGMA] = "2mm/s^2",
     sigma_known: bool = True,
-    robot_sigma: Annotated[Quantity, Given("rad", "", 0, 100 * GON)] = "3.2mgon",
-    gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
-    interval: Annotated[Quantity | None, si("s", *INTERVAL)] = "60s",
-    temperature: Annotated[
-        tuple[float, float] | str | None, Numbers("two numbers, as 20:40", ":", 2)
-    ] = None,
+    robot_sigma: RobotSigma = "3.2mgon",
+    gravity: Gravity = STANDARD_GRAVITY,
+    interval: Annotated[Quantity | None, INTERVAL] = "60s",
+    temperature: Annotated[Ends | None, kinds.numbers("two numbers, as 20:40", ":", 2)] = None,
     temperature_order: str = "linear",
-    vibration: Annotated[
-        tuple[float, float] | str | None, Numbers("two numbers, as 0:1", ":", 2)
-    ] = None,
+    vibration: Annotated[Ends | None, kinds.numbers("two numbers, as 0:1", ":", 2)] = None,
     yaw: str = "none",
     n_samples: Annotated[int, bounds.SAMPLES] | None = None,
 ) -> SimulatedCampaign:

@@ -9,16 +9,16 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
 from os import PathLike
-from pathlib import Path
 from textwrap import fill
 from typing import Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
 
 from accelstudy.api.given import each, of_type, path_of, quantity, whole
 from accelstudy.basics import bounds
+from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, key, shown
 from accelstudy.basics.units import Given, unit_label
 
@@ -27,130 +27,111 @@ Returned = TypeVar("Returned")
 
 
 @dataclass(frozen=True)
-class Names:
-    """A name that a registry knows.
+class Kind:
+    """What a keyword may be.
 
     Attributes
     ----------
-    what : str, what is named
+    read : function of the name of a keyword and of what was given, which returns what the verb
+        works with, and raises `InputError` if it is wrong
+    type : str, in a docstring
+    metavar : str, in the help of a command
+    """
+
+    read: Callable[[str, Any], Any]
+    type: str = "str"
+    metavar: str = "text"
+
+
+@dataclass(frozen=True)
+class Names:
+    """A name that a registry knows; whether there is such a thing, the registry says.
+
+    Attributes
+    ----------
+    metavar : str, what is named
     module, names : str, where the names are: a collection, or a function that returns one
     files : bool, whether a file may stand for a name
     parts : Names, optional, what may be joined to a name by +
     """
 
-    what: str
+    metavar: str
     module: str
     names: str
     files: bool = False
     parts: Names | None = None
+    type = "str"
 
     def read(self, name: str, value: Any) -> str:
-        """Name; whether there is such a thing, its registry says."""
-        article = "an" if self.what[0] in "aeiou" else "a"
+        """Name, or path of a file as text."""
+        article, what = "an" if self.metavar[0] in "aeiou" else "a", self.metavar.replace("_", " ")
         value = str(value) if self.files and isinstance(value, PathLike) else value
-        of_type(name, value, str, expected=f"the name of {article} {self.what.replace('_', ' ')}")
+        of_type(name, value, str, expected=f"the name of {article} {what}")
         return str(value)
 
 
-@dataclass(frozen=True)
-class FileOrFolder:
-    """The path of a file or of a folder."""
-
-    def read(self, name: str, value: Any) -> Path:
-        """Path, which need not be there."""
-        return path_of(name, value)
+def _text(name: str, value: Any) -> str:
+    of_type(name, value, str, expected="a text")
+    return str(value)
 
 
-@dataclass(frozen=True)
-class Share:
-    """A share of all calibrations, ``95%`` or ``0.95``, or their ``rms``."""
-
-    rms: bool = False
-
-    def read(self, name: str, value: Any) -> float | None:
-        """Share, None for the rms."""
-        from accelstudy.planning.question import confidence_of
-
-        of_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
-        share = confidence_of(str(value).strip())
-        if share is None and not self.rms:
-            raise InputError(f"{name}: a probability, such as 95%, not rms")
-        return share
+def _number(name: str, value: Any) -> str:
+    of_type(name, value, str, int, float, expected="a number, or a text with its unit")
+    return str(value)
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """Numbers with a separator as text, or in a list.
+def _flag(name: str, value: Any) -> bool:
+    of_type(name, value, bool, expected="True or False")
+    return bool(value)
 
-    Attributes
-    ----------
-    example : str, as they are written
-    separator : str
-    count : int, how many there are; 0 for any
-    """
 
-    example: str
-    separator: str = ","
-    count: int = 0
+def _column(name: str, value: Any) -> str | int:
+    of_type(name, value, str, int, expected="the name of a column or its number")
+    return value if isinstance(value, str) else int(value)
 
-    def read(self, name: str, value: Any) -> tuple[float, ...]:
-        """Numbers, as many as there are."""
-        parts = value.split(self.separator) if isinstance(value, str) else each(value)
+
+def _share(name: str, value: Any) -> float | None:
+    from accelstudy.planning.question import confidence_of
+
+    of_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
+    return confidence_of(str(value).strip())
+
+
+def _share_only(name: str, value: Any) -> float:
+    if (share := _share(name, value)) is None:
+        raise InputError(f"{name}: a probability, such as 95%, not rms")
+    return share
+
+
+def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:
+    """Numbers in a list, or as text such as the example; `count` of them, or any number."""
+
+    def read(name: str, value: Any) -> tuple[float, ...]:
+        parts = value.split(separator) if isinstance(value, str) else each(value)
         try:
-            numbers = tuple(map(float, parts))
+            read = tuple(map(float, parts))
         except (TypeError, ValueError):
-            numbers = ()
-        if len(numbers) != (self.count or len(numbers) or 1):
-            raise InputError(f"{name}: expected {self.example}, not {shown(value)}")
-        return numbers
+            read = ()
+        if len(read) != (count or len(read) or 1):
+            raise InputError(f"{name}: expected {example}, not {shown(value)}")
+        return read
+
+    return Kind(read, "str, or several float", "numbers")
 
 
-@dataclass(frozen=True)
-class Word:
-    """A text; what it may say, the verb knows."""
+def pairs(example: str) -> Kind:
+    """Names with values, as a mapping, or as text such as the example; the verb knows which."""
 
-    def read(self, name: str, value: Any) -> str:
-        """Text."""
-        of_type(name, value, str, expected="a text")
-        return str(value)
-
-
-@dataclass(frozen=True)
-class Place:
-    """A column by its name, or by its number from 0."""
-
-    def read(self, name: str, value: Any) -> str | int:
-        """Name or number; whether there is such a column, the log says."""
-        of_type(name, value, str, int, expected="the name of a column or its number")
-        return value if isinstance(value, str) else int(value)
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """Names with values, as a mapping, or as text.
-
-    Attributes
-    ----------
-    example : str, as they are written
-    """
-
-    example: str
-
-    def read(self, name: str, value: Any) -> dict[str, Any]:
-        """Mapping; the verb knows the names and what their values may be."""
+    def read(name: str, value: Any) -> dict[str, Any]:
         if isinstance(value, Mapping):
             return dict(value)
-        of_type(name, value, str, expected=f"a mapping, or a text as {self.example}")
+        of_type(name, value, str, expected=f"a mapping, or a text as {example}")
         pairs = [part.split("=", 1) for part in value.split(",")]
         if any(len(pair) != 2 for pair in pairs):
-            raise InputError(f"{name}: expected {self.example} or the like, not {shown(value)}")
+            raise InputError(f"{name}: expected {example} or the like, not {shown(value)}")
         return {key.strip(): said.strip() for key, said in pairs}
 
-
-Quantity = float | str
-"""A number in SI, or a text with a unit."""
-RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
-"""Keywords of earlier versions, and what takes their place."""
+    return Kind(read, "mapping or str", "columns")
 
 
 def si(unit: str, least: float, most: float) -> Given:
@@ -158,11 +139,27 @@ def si(unit: str, least: float, most: float) -> Given:
     return Given(unit, "", least, most, bare=True)
 
 
-File = Annotated[str | PathLike[str], FileOrFolder()]
-Accuracy = Annotated[Quantity, Given("rad", "", 1e-9, math.pi / 2)]
-Tilt = Annotated[Quantity, Given("rad", "", 1e-3, math.pi / 2)]
+def angle(least: float, most: float) -> Given:
+    """Angle with its unit; a number is in rad."""
+    return Given("rad", "", least, most)
+
+
+Quantity = float | str
+"""A number in SI, or a text with a unit."""
+RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
+"""Keywords of earlier versions, and what takes their place."""
+
+TEXT, FLAG, NUMBER = Kind(_text), Kind(_flag, "bool"), Kind(_number, "float or str")
+PATH = Kind(path_of, "path", "path")
+SHARE_OR_RMS = Kind(_share, "float or str", "share")
+GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
+File = Annotated[str | PathLike[str], PATH]
+Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
+Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
+Share = Annotated[float | str, Kind(_share_only, "float or str", "share")]
 
 EFFECTS = Names("effect", "accelstudy.effects", "effect_names")
+APPROACHES = Names("approach", "accelstudy.approaches", "approach_names")
 EffectName = Annotated[str, EFFECTS]
 NoiseEffectName = Annotated[
     str, Names("noise_effect", "accelstudy.noise_effects", "noise_effect_names")
@@ -172,11 +169,10 @@ GrossErrorName = Annotated[
 ]
 SchemeName = Annotated[str, Names("scheme", "accelstudy.schemes", "scheme_names", True)]
 SensorName = Annotated[str, Names("sensor", "accelstudy.data_sheets", "data_sheet_names", True)]
-_APPROACHES = Names("approach", "accelstudy.approaches", "approach_names")
 _BY = "Calibrate by gravity alone, or with the angles of a robot, too."
-ApproachName = Annotated[str, _APPROACHES, _BY]
+ApproachName = Annotated[str, APPROACHES, _BY]
 UsualApproach = Annotated[
-    str | None, _APPROACHES, f"{_BY} [default: robot, if the campaign has its angles]"
+    str | None, APPROACHES, f"{_BY} [default: robot, if the campaign has its angles]"
 ]
 ModelName = Annotated[
     str,
@@ -185,23 +181,27 @@ ModelName = Annotated[
 ]
 TypeFile = Annotated[
     str | PathLike[str] | None,
-    FileOrFolder(),
+    PATH,
     "The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
 ]
-Force = Annotated[bool, "Overwrite files of the same names, but never an input."]
+Force = Annotated[bool, FLAG, "Overwrite files of the same names, but never an input."]
 Seed = Annotated[int, bounds.SEED, "Seed of all random numbers."]
 
 # How the numbers of a log are read.
-COLUMNS = Pairs("fx=1,fy=2,fz=3")
-ColumnsOf = Annotated[
+COLUMNS = pairs("fx=1,fy=2,fz=3")
+Columns = Annotated[
     Mapping[str, str | int] | str | None,
     COLUMNS,
     "Columns of fx, fy, fz, temperature and vibration, by name, or by number from 0: "
     "fx=1,fy=2,fz=3.",
 ]
-Time = Annotated[str | int | None, Place(), "Column of the time, by name or number."]
+Time = Annotated[
+    str | int | None,
+    Kind(_column, "str or int", "column"),
+    "Column of the time, by name or number.",
+]
 TimeUnit = Annotated[
-    str | None, Word(), "Unit of the time: s, ms, us or ns. [default: as named, or s]"
+    str | None, TEXT, "Unit of the time: s, ms, us or ns. [default: as named, or s]"
 ]
 Rate = Annotated[
     Quantity | None,
@@ -209,40 +209,38 @@ Rate = Annotated[
     "Samples per second, where there is no time.",
 ]
 Delimiter = Annotated[
-    str | None, Word(), "Between columns of text: ; or tab or blank. [default: from its rows]"
+    str | None, TEXT, "Between columns of text: ; or tab or blank. [default: from its rows]"
 ]
 Variable = Annotated[
-    str | None, Word(), "Array of a MATLAB file, topic of a bag or instance of a ULog."
+    str | None, TEXT, "Array of a MATLAB file, topic of a bag or instance of a ULog."
 ]
 Unit = Annotated[
-    str | None,
-    Word(),
-    "Unit of the readings: m/s^2, g, mg or counts. [default: as named, or m/s^2]",
+    str | None, TEXT, "Unit of the readings: m/s^2, g, mg or counts. [default: as named, or m/s^2]"
 ]
-PerAxis = Numbers("numbers, as 1.5 or 1,2,3")
+PER_AXIS = numbers("numbers, as 1.5 or 1,2,3")
 Scale = Annotated[
     float | Sequence[float] | str | None,
-    PerAxis,
+    PER_AXIS,
     "For counts: m/s² per count, one number or three.",
 ]
 Offset = Annotated[
     float | Sequence[float] | str | None,
-    PerAxis,
+    PER_AXIS,
     "For counts: reading at 0 m/s². [default: from the holds]",
 ]
 Frame = Annotated[
-    str | None, Word(), "Where x, y, z point: frd, flu, rfu … [default: frd; of ROS flu]"
+    str | None, TEXT, "Where x, y, z point: frd, flu, rfu … [default: frd; of ROS flu]"
 ]
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """A keyword of a verb.
+    """A parameter of a verb.
 
     Attributes
     ----------
     name : str
-    kind : what checks it: Given, Range, one of the classes above, or a plain type
+    kind : what checks it: a quantity, a range of whole numbers, names or another kind
     many : bool, whether it takes several
     ends : bool, whether it takes two values of its kind
     default : of the signature; `inspect.Parameter.empty` if it must be given
@@ -251,148 +249,127 @@ class Keyword:
     """
 
     name: str
-    kind: Any
+    kind: Given | Range | Names | Kind
     many: bool
     ends: bool
     default: Any
     optional: bool
     meaning: str
 
+    @classmethod
+    def of(cls, function: Callable[..., Any], parameter: inspect.Parameter) -> Keyword:
+        """Keyword of a parameter, with the kind of its annotation; without one it is a text."""
+        said = parameter.annotation
+        # Not by `get_type_hints`, which takes all parameters: that of a positional one may name a
+        # result, which is not imported for a help text.
+        hint = eval(said, getattr(inspect.unwrap(function), "__globals__", {}))
+        kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
+        return cls(
+            parameter.name,
+            kind,
+            "Sequence" in said,
+            said.startswith("tuple"),
+            parameter.default,
+            parameter.default is None or "None" in said,
+            "".join(meaning),
+        )
+
     @property
     def option(self) -> str:
-        """Name of the option."""
-        return option_of(self.name, self.many)
+        """Option of the command; one that is repeated is called as a single one."""
+        return f"--{(self.name.removesuffix('s') if self.many else self.name).replace('_', '-')}"
 
     @property
     def type(self) -> str:
         """Type in words, as a docstring has it."""
-        unit = unit_label(getattr(self.kind, "unit", "1"))
-        words = {
-            Given: "float or str" if unit == "1" else f"float in {unit}, or str with a unit",
-            bounds.Range: "int",
-            Names: "str",
-            FileOrFolder: "path",
-            Share: "float or str",
-            Numbers: "str, or several float",
-            Pairs: "mapping or str",
-            Place: "str or int",
-            Word: "str",
-        }
-        word = words.get(type(self.kind)) or str(getattr(self.kind, "__name__", ""))
+        word = "int" if isinstance(self.kind, Range) else getattr(self.kind, "type", "")
+        if isinstance(self.kind, Given):
+            unit = unit_label(self.kind.unit)
+            word = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
         return f"{word}, or several" if self.many else f"two of {word}" if self.ends else word
 
     def check(self, value: Any) -> Any:
         """Value as the verb works with it, quantities in SI; raises `InputError` if it is wrong."""
         if self.optional and (value is None or (isinstance(self.kind, Given) and value == "none")):
             return None
-        name = key(self.name)
-        if self.many:
-            return tuple(self._check(name, one) for one in each(value))
-        if self.ends:
-            values = each(value)
-            if len(values) != 2:
-                raise InputError(f"{name}: expected two values, not {shown(value)}")
-            return tuple(self._check(name, one) for one in values)
-        return self._check(name, value)
+        if not (self.many or self.ends):
+            return self._one(value)
+        values = each(value)
+        if self.ends and len(values) != 2:
+            raise InputError(f"{key(self.name)}: expected two values, not {shown(value)}")
+        return tuple(map(self._one, values))
 
-    def _check(self, name: str, value: Any) -> Any:
+    def _one(self, value: Any) -> Any:
         match self.kind:
             case Given():
-                return quantity(name, value, self.kind)
-            case bounds.Range():
-                return whole(name, value, self.kind)
-        if self.kind is bool:
-            of_type(name, value, bool, expected="True or False")
-            return value
-        return self.kind.read(name, value)
+                return quantity(key(self.name), value, self.kind)
+            case Range():
+                return whole(key(self.name), value, self.kind)
+        return self.kind.read(key(self.name), value)
 
 
-def option_of(name: str, many: bool) -> str:
-    """Name of the option of a keyword; one that is repeated has that of a single one."""
-    return name.removesuffix("s") if many else name
+def _metadata(hint: Any) -> tuple[Any, ...]:
+    """Kind and meaning beside the type, wherever in it they stand."""
+    if get_origin(hint) is Annotated:
+        return tuple(hint.__metadata__)
+    inner: Iterator[tuple[Any, ...]] = map(_metadata, get_args(hint))
+    return next(filter(None, inner), ())
 
 
 @cache
-def keywords(function: Callable[..., Any]) -> tuple[Keyword, ...]:
-    """Keywords of a function, with the kinds of their annotations."""
-    return tuple(
-        keyword(function, one)
-        for one in inspect.signature(function).parameters.values()
-        if one.kind is one.KEYWORD_ONLY
-    )
-
-
-def keyword(function: Callable[..., Any], parameter: inspect.Parameter) -> Keyword:
-    """Keyword of a parameter, with the kind of its annotation."""
-    # Not by `get_type_hints`, which takes all parameters: that of a positional one may name a
-    # result, which is not imported for a help text.
-    hint = eval(parameter.annotation, getattr(inspect.unwrap(function), "__globals__", {}))
-    optional = type(None) in get_args(hint)
-    kind, meaning, ends = None, "", False
-    while get_origin(hint) is not None:
-        first, *more = get_args(hint)
-        ends = ends or get_origin(hint) is tuple
-        if get_origin(hint) is Annotated:
-            optional = optional or type(None) in get_args(first)
-            meaning = next((one for one in more if isinstance(one, str)), "")
-            kind = next((one for one in more if not isinstance(one, str)), None)
-        hint = first
-        if kind is not None:
-            break
-    if kind is None:
-        kind = Word() if hint is str else hint
-    many = "Sequence" in parameter.annotation
-    return Keyword(parameter.name, kind, many, ends, parameter.default, optional, meaning)
+def keywords(function: Callable[..., Any]) -> dict[str, Keyword]:
+    """Keywords of a function by their names, with the kinds of their annotations."""
+    parameters = inspect.signature(function).parameters.values()
+    each = (Keyword.of(function, one) for one in parameters if one.kind is one.KEYWORD_ONLY)
+    return {one.name: one for one in each}
 
 
 # --- docstrings ---------------------------------------------------------------------------------
 
-_SECTION = "\n\nParameters\n----------\n"
+_ITEM = re.compile(r"^(\w+(?:, \w+)*) : .*\n((?: {4}.*\n?)+)", re.MULTILINE)
+"""``name : type`` of a NumPy docstring, and the indented text below it."""
+
+
+def _sections(function: Callable[..., Any]) -> tuple[str, str, list[str]]:
+    """What a docstring says first, its section on parameters, and the other sections."""
+    head, *sections = re.split(r"\n\n(?=\w+\n-+\n)", inspect.getdoc(function) or "")
+    others = [one for one in sections if not one.startswith("Parameters\n")]
+    return head, next((one for one in sections if one not in others), ""), others
 
 
 def summary(function: Callable[..., Any]) -> str:
     """Return what a docstring says before its sections."""
-    return (inspect.getdoc(function) or "").partition("\n\nParameters\n")[0]
+    return _sections(function)[0]
 
 
 @cache
 def meanings(function: Callable[..., Any]) -> dict[str, str]:
-    """Meaning of each parameter: the indented text below ``name : type`` of a NumPy docstring."""
-    said = (inspect.getdoc(function) or "").partition(_SECTION)[2]
-    items = re.findall(r"^(\w+(?:, \w+)*) : .*\n((?: {4}.*\n?)+)", said, re.MULTILINE)
+    """Meaning of each parameter in a docstring."""
+    items = _ITEM.findall(_sections(function)[1])
     return {name: " ".join(text.split()) for names, text in items for name in names.split(", ")}
 
 
 def _documented(function: Callable[..., Any]) -> str:
     """Docstring with the meanings of the kinds of those keywords that it leaves out."""
-    head, _, rest = (inspect.getdoc(function) or "").partition(_SECTION)
-    parts = re.split(r"\n\n(?=\w+\n-+\n)", rest if rest else head)
-    own, sections = (parts[0], parts[1:]) if rest else ("", parts[1:])
-    head = head if rest else parts[0]
-    items = {
-        name: item
-        for item in re.findall(r"^\w.*\n(?: {4}.*\n?)+", own, re.MULTILINE)
-        for name in item.partition(" : ")[0].split(", ")
-    }
-    parameters = inspect.signature(function).parameters
-    for name, parameter in parameters.items():
-        if name not in items and parameter.kind is parameter.KEYWORD_ONLY:
-            one = keyword(function, parameter)
-            text = fill(one.meaning, 88, initial_indent="    ", subsequent_indent="    ")
-            items[name] = f"{name} : {one.type}\n{text}"
-    ordered = dict.fromkeys(items[name].rstrip("\n") for name in parameters if name in items)
-    return "\n\n".join([head + _SECTION + "\n".join(ordered), *sections]) if ordered else head
+    head, own, others = _sections(function)
+    items = {name: item[0] for item in _ITEM.finditer(own) for name in item[1].split(", ")}
+    for name, one in keywords(function).items():
+        text = fill(one.meaning, 88, initial_indent="    ", subsequent_indent="    ")
+        items.setdefault(name, f"{name} : {one.type}\n{text}")
+    names = (name for name in inspect.signature(function).parameters if name in items)
+    listed = "\n".join(dict.fromkeys(items[name].rstrip("\n") for name in names))
+    section = [f"Parameters\n----------\n{listed}"] if listed else []
+    return "\n\n".join([head, *section, *others])
 
 
 def check(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Check keywords as a verb does; those that are not given have their defaults."""
-    values = {one.name: given.get(one.name, one.default) for one in keywords(function)}
-    checked = {
-        one.name: one.check(values[one.name])
-        for one in keywords(function)
-        if values[one.name] is not inspect.Parameter.empty
+    values = {name: given.get(name, one.default) for name, one in keywords(function).items()}
+    return {**given} | {
+        name: one.check(values[name])
+        for name, one in keywords(function).items()
+        if values[name] is not inspect.Parameter.empty
     }
-    return {**given, **checked}
 
 
 def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
@@ -405,15 +382,9 @@ def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returne
         return function(*args, **check(function, given))
 
     within.__doc__ = _documented(function)
-    within.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
     return within
 
 
 def in_si(value: Quantity) -> float:
     """Return a quantity that `verb` has checked, which is in SI."""
     return float(value)
-
-
-def paths(values: Sequence[Any]) -> list[Any]:
-    """Those of some values that are paths."""
-    return [value for value in values if isinstance(value, str | PathLike)]

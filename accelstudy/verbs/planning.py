@@ -2,57 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from accelstudy.api.given import GRAVITY, each
+from accelstudy.api.given import path_of
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import key
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, Given
-from accelstudy.planning.quantities import EQUIPMENT, MOST_POSITIONS, QUANTITIES, REPLICATES
-from accelstudy.verbs.kinds import (
-    Accuracy,
-    ApproachName,
-    ColumnsOf,
-    Delimiter,
-    EffectName,
-    File,
-    ModelName,
-    Names,
-    Pairs,
-    Quantity,
-    Rate,
-    Scale,
-    SchemeName,
-    Seed,
-    SensorName,
-    Share,
-    Tilt,
-    Time,
-    TimeUnit,
-    Unit,
-    UsualApproach,
-    Variable,
-    in_si,
-    verb,
-)
+from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
+from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import Names, Quantity, angle, verb
 
 if TYPE_CHECKING:
-    from accelstudy.api.advice import SessionAdvice
-    from accelstudy.api.designs import Design
-    from accelstudy.api.plans import Plan
-    from accelstudy.api.simulations import Simulation
-    from accelstudy.campaign.session import Campaign
+    from accelstudy import Campaign, Design, Plan, SessionAdvice, Simulation
     from accelstudy.data_sheets.sheet import DataSheet
 
 Hold = Annotated[Quantity, QUANTITIES["hold"]]
 Sigma = Annotated[Quantity, QUANTITIES["sigma"]]
-HalfTurn = Annotated[Quantity, Given("rad", "", -200 * GON, 200 * GON)]
-QuarterTurn = Annotated[Quantity, Given("rad", "", -100 * GON, 100 * GON)]
+RobotSigma = Annotated[Quantity, QUANTITIES["robot_sigma"]]
+Force = Annotated[Quantity, Given("m/s^2")]
+HalfTurn = Annotated[Quantity, angle(-200 * GON, 200 * GON)]
+QuarterTurn = Annotated[Quantity, angle(-100 * GON, 100 * GON)]
 
 
 @verb
@@ -60,22 +31,22 @@ def plan(
     *,
     tilt_accuracy: Annotated[Quantity, QUANTITIES["tilt_accuracy"]],
     tilt_range: Annotated[Quantity, QUANTITIES["tilt_range"]] = "30gon",
-    sensor: SensorName | None = None,
-    sigma: Annotated[Quantity, QUANTITIES["sigma"]] | None = None,
-    history: File | None = None,
+    sensor: kinds.SensorName | None = None,
+    sigma: Sigma | None = None,
+    history: kinds.File | None = None,
     equipment: str = "both",
-    reference: File | None = None,
-    confidence: Annotated[float | str, Share(rms=True)] = "rms",
+    reference: kinds.File | None = None,
+    confidence: Annotated[float | str, kinds.SHARE_OR_RMS] = "rms",
     holds: Hold | Sequence[Hold] = (),
-    schemes: SchemeName | Sequence[SchemeName] = (),
+    schemes: kinds.SchemeName | Sequence[kinds.SchemeName] = (),
     max_time: Annotated[Quantity, QUANTITIES["max_time"]] | None = None,
     max_positions: Annotated[int, Range(*MOST_POSITIONS)] = 200,
     replicates: Annotated[int, Range(*REPLICATES)] = 200,
-    seed: Seed = 1,
+    seed: kinds.Seed = 1,
     moving_time: Annotated[Quantity, QUANTITIES["moving_time"]] = "20s",
     robot_moving_time: Annotated[Quantity, QUANTITIES["robot_moving_time"]] = "10s",
     robot_setup_time: Annotated[Quantity, QUANTITIES["robot_setup_time"]] = "30min",
-    robot_sigma: Annotated[Quantity, QUANTITIES["robot_sigma"]] = "3.2mgon",
+    robot_sigma: RobotSigma = "3.2mgon",
 ) -> Plan:
     """Find the cheapest calibration for a tilt accuracy.
 
@@ -128,73 +99,36 @@ def plan(
     InputError
         If a quantity or a name is wrong, or not one of `sigma` and `sensor` is given.
     """
+    given = {**locals()}
     from accelstudy.api.plans import Plan
-    from accelstudy.basics.errors import InputError, UnknownNameError
-    from accelstudy.basics.progress import begin
-    from accelstudy.data_sheets import of_sigma
-    from accelstudy.data_sheets.measured import with_history
-    from accelstudy.planning.answer import answer
-    from accelstudy.planning.question import (
-        MOUNTING,
-        Equipment,
-        Question,
-        get_sensor,
-        planned_reference,
-    )
 
-    if equipment not in EQUIPMENT:
-        raise UnknownNameError("equipment", equipment, EQUIPMENT)
-    if (sensor is None) == (sigma is None):
-        both = ", not both" if sensor else ""
-        raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
-    sheet = get_sensor(str(sensor)) if sigma is None else of_sigma(in_si(sigma))
-    by_hand = Equipment("gravity", in_si(moving_time), 0.0)
-    robot = Equipment("robot", in_si(robot_moving_time), in_si(robot_setup_time))
-    beside = None
-    if reference is not None:
-        sensor_beside = planned_reference(str(reference), sheet)
-        beside = Equipment("reference", by_hand.moving, MOUNTING, sensor_beside)
-    question = Question(
-        in_si(tilt_accuracy),
-        in_si(tilt_range),
-        sheet if history is None else with_history(sheet, Path(history)),
-        {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
-        None if confidence is None else float(confidence),
-        tuple(sorted({in_si(hold) for hold in each(holds)})),
-        in_si(robot_sigma),
-        math.inf if max_time is None else in_si(max_time),
-        max_positions,
-        tuple(each(schemes)),
-        beside,
-    )
-    begin("comparing calibrations, which takes some seconds ...")
-    return Plan(answer(question, seed, replicates))
+    return Plan.of(**given)
 
 
 @verb
 def find_positions(
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName = "robot",
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.ApproachName = "robot",
     positions: Annotated[int, Range(1, 300)] = 24,
-    sigma: Annotated[Quantity, Given("m/s^2")] = "2mm/s^2",
+    sigma: Force = "2mm/s^2",
     robot_sigma: Annotated[Quantity, Given("rad")] = "3.2mgon",
-    gravity_sigma: Annotated[Quantity, Given("m/s^2")] = "0",
+    gravity_sigma: Force = "0",
     criterion: str = "I",
-    tilt_range: Annotated[Quantity, Given("rad", "", GON / 10, 100 * GON)] = "50gon",
+    tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = "50gon",
     neglect: str | Sequence[str] = (),
-    discriminate: tuple[EffectName, EffectName] | None = None,
+    discriminate: tuple[kinds.EffectName, kinds.EffectName] | None = None,
     prior: str | Sequence[str] = (),
-    after: SchemeName | None = None,
+    after: kinds.SchemeName | None = None,
     attitudes: Annotated[
         str, Names("attitudes", "accelstudy.proposal.request", "SPACES", True)
     ] = "all",
     mountings: Annotated[int, Range(1, 9)] | None = None,
     roll: tuple[HalfTurn, HalfTurn] | None = None,
     pitch: tuple[QuarterTurn, QuarterTurn] | None = None,
-    pole_distance: Annotated[Quantity, Given("rad", "", 0.0, 100 * GON)] | None = None,
-    least_angle: Annotated[Quantity, Given("rad", "", 0.0, 200 * GON)] | None = None,
-    seed: Seed = 1,
+    pole_distance: Annotated[Quantity, angle(0.0, 100 * GON)] | None = None,
+    least_angle: Annotated[Quantity, angle(0.0, 200 * GON)] | None = None,
+    seed: kinds.Seed = 1,
     starts: Annotated[int, Range(1, 1000)] = 8,
 ) -> Design:
     """Find the best positions for a calibration.
@@ -250,35 +184,25 @@ def find_positions(
     """
     given = {**locals()}
     from accelstudy.api.designs import Design
-    from accelstudy.basics.progress import stage
-    from accelstudy.proposal.proposal import Proposal
-    from accelstudy.proposal.request import Request
-    from accelstudy.simulation.sessions import Noise
 
-    sigmas = [given.pop(name) for name in ("sigma", "robot_sigma", "gravity_sigma")]
-    bounds.SIGMA_FORCE.check_key(key("sigma"), sigmas[0])
-    bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), sigmas[1] / MGON)
-    bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), sigmas[2])
-    request = Request(noise=Noise(*sigmas), **given)
-    with stage("search"):
-        return Design(Proposal.of(request))
+    return Design.of(**given)
 
 
 @verb
 def advise(
     campaign: Campaign | str | PathLike[str],
     *,
-    tilt_accuracy: Accuracy,
-    tilt_range: Tilt = "30gon",
-    approach: UsualApproach = None,
-    model: ModelName = "bias-scale-nonorthogonality",
-    prior: File | None = None,
+    tilt_accuracy: kinds.Accuracy,
+    tilt_range: kinds.Tilt = "30gon",
+    approach: kinds.UsualApproach = None,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    prior: kinds.File | None = None,
     attitudes: Annotated[
         str | None, Names("attitudes", "accelstudy.sequential.choice", "SETS", True)
     ] = None,
-    pole_distance: Annotated[Quantity, Given("rad", "", 0.0, 2.0)] | None = None,
-    max_roll: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
-    max_pitch: Annotated[Quantity, Given("rad", "", 0.0, 4.0)] | None = None,
+    pole_distance: Annotated[Quantity, angle(0.0, 2.0)] | None = None,
+    max_roll: Annotated[Quantity, angle(0.0, 4.0)] | None = None,
+    max_pitch: Annotated[Quantity, angle(0.0, 4.0)] | None = None,
 ) -> SessionAdvice:
     """Say in a session where to go next, and when to stop.
 
@@ -315,13 +239,9 @@ def advise(
         If no positions can determine the model, or a name or a value is wrong.
     """
     given = {**locals()}
-    from accelstudy.api.advice import Adviser
-    from accelstudy.api.calibrations import as_campaign, place_of
-    from accelstudy.sequential.running import read_as_it_is
+    from accelstudy.api.advice import SessionAdvice
 
-    session, place = given.pop("campaign"), place_of(campaign)
-    now = as_campaign(session) if place is None else read_as_it_is(place).campaign
-    return Adviser(now, place, **given)(now)
+    return SessionAdvice.of(**given)
 
 
 @verb
@@ -331,11 +251,11 @@ def simulate(
     approach: str | Sequence[str],
     *,
     sigma: Sigma | Sequence[Sigma],
-    robot_sigma: Annotated[Quantity, QUANTITIES["robot_sigma"]] = "3.2mgon",
-    gravity: Annotated[Quantity, GRAVITY] = STANDARD_GRAVITY,
-    truth: Annotated[Mapping[str, float | str] | None, Pairs("b_x=0.05,s_y=200ppm")] = None,
+    robot_sigma: RobotSigma = "3.2mgon",
+    gravity: Annotated[Quantity, kinds.GRAVITY] = STANDARD_GRAVITY,
+    truth: Annotated[Mapping[str, float | str] | None, kinds.pairs("b_x=0.05,s_y=200ppm")] = None,
     replicates: Annotated[int, Range(2, bounds.REPLICATES.most)] = 1000,
-    seed: Seed = 1,
+    seed: kinds.Seed = 1,
 ) -> Simulation:
     """Simulate the calibrations of one set-up, or of every combination of several.
 
@@ -361,30 +281,25 @@ def simulate(
     InputError
         If a name or a value is wrong, or the positions do not determine any of the models.
     """
-    from accelstudy.api.given import names
-    from accelstudy.api.simulations import simulated
+    given = {**locals()}
+    from accelstudy.api.simulations import Simulation
 
-    given = {"model": model, "scheme": scheme, "approach": approach}
-    chosen = {name: names(name, value) for name, value in given.items()}
-    noise: dict[str, Any] = {"sigma": sigma, "robot_sigma": robot_sigma}  # in SI by `verb`
-    return simulated(
-        chosen, **noise, gravity=in_si(gravity), truth=truth, replicates=replicates, seed=seed
-    )
+    return Simulation.of(**given)
 
 
 @verb
 def data_sheet(
     source: str | PathLike[str],
     *,
-    columns: ColumnsOf = None,
-    time: Time = None,
-    time_unit: TimeUnit = None,
-    rate: Rate = None,
-    delimiter: Delimiter = None,
-    variable: Variable = None,
-    unit: Unit = None,
-    scale: Scale = None,
-    settings: File | None = None,
+    columns: kinds.Columns = None,
+    time: kinds.Time = None,
+    time_unit: kinds.TimeUnit = None,
+    rate: kinds.Rate = None,
+    delimiter: kinds.Delimiter = None,
+    variable: kinds.Variable = None,
+    unit: kinds.Unit = None,
+    scale: kinds.Scale = None,
+    settings: kinds.File | None = None,
 ) -> DataSheet:
     """Make a data sheet of a sensor from a log or a campaign.
 
@@ -406,8 +321,9 @@ def data_sheet(
     """
     given = {**locals()}
     from accelstudy.api.campaigns import settings_of
-    from accelstudy.api.given import path_of
+    from accelstudy.basics.progress import stage
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 
     path = path_of("source", given.pop("source"))
-    return sheet_of_campaign(path) if path.is_dir() else sheet_of_log(path, settings_of(given))
+    with stage("Allan deviation"):
+        return sheet_of_campaign(path) if path.is_dir() else sheet_of_log(path, settings_of(given))

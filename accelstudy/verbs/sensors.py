@@ -10,23 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.verbs.kinds import (
-    Accuracy,
-    ModelName,
-    Seed,
-    Share,
-    Tilt,
-    UsualApproach,
-    in_si,
-    paths,
-    verb,
-)
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import in_si, verb
 
 if TYPE_CHECKING:
-    from accelstudy.api.calibrations import Calibration
-    from accelstudy.api.epochs import Comparison, History
-    from accelstudy.api.lots import Lot
-    from accelstudy.campaign.session import Campaign
+    from accelstudy import Calibration, Campaign, Comparison, History, Lot
 
 
 @verb
@@ -34,7 +22,7 @@ def compare(
     first: Calibration | str | PathLike[str],
     second: Calibration | str | PathLike[str],
     *,
-    tilt_range: Tilt = "50gon",
+    tilt_range: kinds.Tilt = "50gon",
 ) -> Comparison:
     """Say whether a sensor is still what it was.
 
@@ -59,12 +47,9 @@ def compare(
     InputError
         If they are not of one sensor, or have no effect in common.
     """
-    from accelstudy.api.calibrations import as_calibration
     from accelstudy.api.epochs import Comparison
-    from accelstudy.epochs.history import compare as compared
 
-    pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
-    return Comparison(compared(*pair), in_si(tilt_range))
+    return Comparison.of(first, second, in_si(tilt_range))
 
 
 @verb
@@ -72,9 +57,9 @@ def history(
     calibrations: Sequence[Calibration | str | PathLike[str]],
     *,
     dates: Sequence[str | datetime] = (),
-    tilt_accuracy: Accuracy | None = None,
-    tilt_range: Tilt = "50gon",
-    confidence: Annotated[float | str, Share()] = "95%",
+    tilt_accuracy: kinds.Accuracy | None = None,
+    tilt_range: kinds.Tilt = "50gon",
+    confidence: kinds.Share = "95%",
 ) -> History:
     """Say how a sensor changes over time.
 
@@ -106,25 +91,19 @@ def history(
     InputError
         If they are fewer than three, of one date, or not of one sensor.
     """
-    from accelstudy.api.calibrations import as_calibration
-    from accelstudy.api.epochs import History, follow
-    from accelstudy.epochs.interval import Interval
+    given = {**locals()}
+    from accelstudy.api.epochs import History
 
-    _once(paths(calibrations), "calibration")
-    course = follow([as_calibration(one) for one in calibrations], dates, calibrations)
-    if tilt_accuracy is None:
-        return History(course, None)
-    wanted = in_si(tilt_accuracy), in_si(tilt_range), in_si(confidence)
-    return History(course, Interval(course, *wanted))
+    return History.of(**given)
 
 
 @verb
 def lot(
     campaigns: Sequence[Campaign | str | PathLike[str]],
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: UsualApproach = None,
-    seed: Seed = 1,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
+    seed: kinds.Seed = 1,
     cores: Annotated[int, Range(1, 10_000)] = 1,
 ) -> Lot:
     """Say what the model of sensors of one type lacks.
@@ -150,16 +129,11 @@ def lot(
     InputError
         If fewer than two campaigns can be judged, or a name is unknown.
     """
-    from accelstudy.api.calibrations import as_campaign, chosen
+    given = {**locals()}
     from accelstudy.api.lots import Lot
-    from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
 
-    given = [one for each in campaigns for one in folders_of(each)]
-    _once(paths(given), "sensor")
-    if len(given) < MIN_SENSORS:
-        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-    measured = [as_campaign(one) for one in given]
-    return Lot(evaluate_lot(measured, *chosen(model, approach), seed, cores))
+    folders = [one for each in campaigns for one in folders_of(each)]
+    return Lot.of(**{**given, "campaigns": folders})
 
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
@@ -197,12 +171,3 @@ def _listed(path: Path) -> list[Path]:
                 "Import it, or run the workflow of the campaigns with a section `lot`"
             )
     return [Path(task.source) for task in tasks]
-
-
-def _once(given: Sequence[str | PathLike[str]], what: str) -> None:
-    """Raise `InputError` if a path is given twice of which each stands for one thing."""
-    seen = set()
-    for path in given:
-        if (place := Path(path).resolve()) in seen:
-            raise InputError(f"{path}: is given twice; each {what} counts once")
-        seen.add(place)

@@ -10,9 +10,8 @@ import pytest
 from calling import refusal
 
 import accelstudy
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import OPTIONS
-from accelstudy.basics.units import STANDARD_GRAVITY, Given
+from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.verbs import kinds
@@ -58,22 +57,22 @@ def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
     paths = [name for name, one in options(verb).items() if isinstance(one, click.Argument)]
     out = [] if verb in ("check-sigmas", "export", "advise") else ["--out", tmp_path / "out.yaml"]
     needed = NEEDED.get(verb, {})
-    for keyword in kinds.keywords(function(verb)):
-        checked = Given | Range | kinds.Share | kinds.Numbers | kinds.Pairs
-        if keyword.ends or not isinstance(keyword.kind, checked):
+    keywords = kinds.keywords(function(verb))
+    for keyword in keywords.values():
+        text = getattr(keyword.kind, "metavar", "") not in ("", "share", "numbers", "columns")
+        if keyword.ends or text:
             continue
         given = {**needed, keyword.name: "5 parsec"}
         words = [
             word
-            for one in kinds.keywords(function(verb)) if one.name in given
-            for word in (f"--{one.option.replace('_', '-')}", given[one.name])
+            for one in keywords.values() if one.name in given
+            for word in (one.option, given[one.name])
         ]  # fmt: skip
         line = refusal(verb, *paths, *words, *out).removeprefix("error: ").strip()
         with pytest.raises(accelstudy.InputError) as refused:
             function(verb)(*paths, **given)
-        option = f"--{keyword.option.replace('_', '-')}"
-        assert line == str(refused.value).replace(keyword.name, option, 1)
-        assert line.startswith(f"{option}: ")
+        assert line == str(refused.value).replace(keyword.name, keyword.option, 1)
+        assert line.startswith(f"{keyword.option}: ")
 
 
 def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() -> None:
@@ -113,7 +112,7 @@ def test_a_message_calls_a_keyword_as_its_user_does() -> None:
 
 @pytest.mark.parametrize("given", ["3", 3, "3:4:5", ("a", 1), "one:2"])
 def test_two_numbers_are_two(given: Any) -> None:
-    kind = kinds.Numbers("two numbers, as 20:40", ":", 2)
+    kind = kinds.numbers("two numbers, as 20:40", ":", 2)
     assert kind.read("temperature", "20:40") == kind.read("temperature", (20, 40)) == (20.0, 40.0)
     with pytest.raises(accelstudy.InputError, match="temperature: expected two numbers, as 20:40"):
         kind.read("temperature", given)

@@ -145,6 +145,14 @@ def test_a_function_gives_what_its_command_writes(tmp_path):
     assert (said.strip(), advice.enough) == (advice.summary().strip(), True)
     assert advice.state == "enough"
     assert advice.verdict in said
+    assert advice.to_frame().loc["roll", "wanted_rad"] == pytest.approx(np.pi / 200)
+    assert advice.plot(Figure().subplots()).has_data()
+    assert (advice.state in repr(advice), "<table" in advice._repr_html_()) == (True, True)
+    advice.save(tmp_path / "advice")
+    kept = json.loads((tmp_path / "advice/advice.json").read_text(encoding="utf-8"))
+    assert (kept["state"], kept["positions"]) == ("enough", [*range(1, 7)])
+    for range_ in (78.5, "78.5 m/s^2"):
+        assert acs.find_holds(log, window=0.5, range=range_, **how).full_range == 78.5
 
 
 @pytest.mark.parametrize("verb", ["calibrate", "diagnose", "compare", "history", "lot"])
