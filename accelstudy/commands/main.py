@@ -15,23 +15,17 @@ from accelstudy.commands import campaigns, choices, studies, verbs
 from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
 
-_COMMANDS = {
-    one.name: one
-    for module in (campaigns, choices, studies, verbs)
-    for one in vars(module).values()
-    if isinstance(one, click.Command)
-}
-_SECTIONS = {
-    "Campaigns, measured or simulated": (
-        "import public simulate-campaign advise calibrate diagnose lot check-sigmas apply export "
-        "compare history"
-    ),
-    "Before a calibration, and what it is worth": "plan data-sheet",
-    "What there is to choose from": "models effects schemes scheme design",
-    "Studies": "init cells claims config-schema",
-}
 SECTIONS = {
-    title: [_COMMANDS[name] for name in names.split()] for title, names in _SECTIONS.items()
+    "Campaigns, measured or simulated": [
+        *(campaigns.IMPORT, campaigns.PUBLIC, campaigns.SIMULATE_CAMPAIGN, campaigns.ADVISE),
+        *(verbs.CALIBRATE, verbs.DIAGNOSE, verbs.LOT, verbs.CHECK_SIGMAS, campaigns.APPLY),
+        *(verbs.EXPORT, verbs.COMPARE, verbs.HISTORY),
+    ],
+    "Before a calibration, and what it is worth": [verbs.PLAN, campaigns.DATA_SHEET],
+    "What there is to choose from": [
+        *(choices.MODELS, choices.EFFECTS, choices.SCHEMES, choices.SCHEME, campaigns.DESIGN),
+    ],
+    "Studies": [studies.INIT, studies.CELLS, studies.CLAIMS, studies.CONFIG_SCHEMA],
 }
 """Commands in the order of use."""
 RETIRED = {
@@ -51,13 +45,9 @@ class Commands(click.Group):
         """Write the sections of the help."""
         width = max(map(len, self.commands))
         for title, commands in SECTIONS.items():
+            rows = [(str(c.name).ljust(width), c.get_short_help_str(74 - width)) for c in commands]
             with formatter.section(title):
-                formatter.write_dl(
-                    [
-                        (str(command.name).ljust(width), command.get_short_help_str(74 - width))
-                        for command in commands
-                    ]
-                )
+                formatter.write_dl(rows)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the command line; also its help may meet a full disk."""
@@ -84,7 +74,7 @@ class Commands(click.Group):
             return super().invoke(ctx)
 
 
-@click.group(cls=Commands, commands=[*_COMMANDS.values()])
+@click.group(cls=Commands, commands=[c for commands in SECTIONS.values() for c in commands])
 @click.version_option(package_name="accelstudy")
 @click.option(
     "--angle-unit",

@@ -73,7 +73,7 @@ def told():
         return plans[0]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("accelstudy.planning.answer.answer", kept)
+        patch.setattr("accelstudy.api.plans.answer", kept)
         printed = succeed(*QUESTION.split()).stdout
     return plans[0], printed
 
