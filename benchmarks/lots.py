@@ -22,11 +22,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import clopper_pearson
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
-from studies.hidden.physics.atlas import visible_effects
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
 from studies.hidden.physics.lots import LotCase, generate_lot, lot_oracle
 from studies.hidden.physics.measuring import NOISES
-from studies.hidden.physics.oracle import visible_outside
+from studies.hidden.physics.oracle import oracle, visible_outside
 from studies.hidden.scoring.judging import all_true, same_effects
 from studies.hidden.study import distinct_pairs
 from timing import table
@@ -53,7 +52,7 @@ class Kind:
 
 def single(design, approach):
     """Effects that a session shows."""
-    return [(name,) for name in visible_effects(design, approach)]
+    return [(name,) for name in oracle(design, approach).visible]
 
 
 def pairs(design, approach):

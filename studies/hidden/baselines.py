@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +40,7 @@ class Problem:
     ----------
     z : (m,) array; redundancy : int
     shapes : list of Hypothesis
+    dims, parts : (s,) arrays, their dimensions, and the squares of what the residuals have in each
     sigma_known : bool; an unknown sigma is that of the residuals
     """
 
@@ -51,37 +51,28 @@ class Problem:
             weighted = replace(campaign, sigma_force=fit.sigma_position_posteriori)
             fit = fit_campaign(weighted, model, approach)
         examined = examine(solve(fit.model, fit.approach, fit.observed, fit.adjustment))
+        self.z = examined.frame.residuals.z
+        self.redundancy = examined.frame.residuals.redundancy
         candidates = examined.candidates.items()
         self.shapes = [h for name, shapes in candidates if name != OUTLIER for h in shapes]
-        residuals = examined.frame.residuals
-        self.z, self.redundancy = residuals.z, residuals.redundancy
-
-    @cached_property
-    def dims(self) -> NDArray[np.int_]:
-        """Dimensions of the shapes, (s,)."""
-        return np.array([h.dim for h in self.shapes])
-
-    @cached_property
-    def parts(self) -> Array:
-        """Squares of what the residuals have in each shape, (s,)."""
-        return np.array([float(np.sum((self.z @ h.basis) ** 2)) for h in self.shapes])
+        self.dims = np.array([h.dim for h in self.shapes])
+        self.parts = np.array([np.sum((self.z @ h.basis) ** 2) for h in self.shapes])
 
     def bic(self, chosen: Sequence[Hypothesis]) -> float:
         """BIC of what shapes leave of the residuals, with a given sigma or an unknown one."""
-        left, r = self.z, self.redundancy
+        left, r, k = self.z, self.redundancy, sum(h.dim for h in chosen)
+        if k >= r:
+            return np.inf
         if chosen:
             basis = np.linalg.qr(np.concatenate([h.basis for h in chosen], axis=1))[0]
             left = left - basis @ (basis.T @ left)
-        omega, k = float(left @ left), sum(h.dim for h in chosen)
+        omega = float(left @ left)
         return (omega if self.sigma_known else r * np.log(omega)) + k * np.log(r)
 
-    def best(self, chosen: Sequence[Hypothesis] = ()) -> tuple[float, list[Hypothesis]]:
-        """Shapes with the one more that has the smallest BIC beside them, and that BIC."""
-        names, used = {h.name for h in chosen}, sum(h.dim for h in chosen)
-        sets = [[*chosen, h] for h in self.shapes
-                if h.name not in names and used + h.dim < self.redundancy]  # fmt: skip
-        return min(((self.bic(each), each) for each in sets), key=lambda pair: pair[0],
-                   default=(np.inf, []))  # fmt: skip
+    def more(self, chosen: Sequence[Hypothesis] = ()) -> list[Hypothesis]:
+        """Shapes with the one more that has the smallest BIC beside them."""
+        names = {h.name for h in chosen}
+        return min(([*chosen, h] for h in self.shapes if h.name not in names), key=self.bic)
 
     def smallest(self, logs: Array) -> Answer:
         """Judge the smallest of the logarithms of p-values (s,)."""
@@ -108,38 +99,31 @@ def f_test(problem: Problem) -> Answer:
     rest = problem.redundancy - dims
     p = stats.f.logsf(parts / dims / ((total - parts) / rest), dims, rest)
     detected, _ = problem.smallest(p)
-    return detected, [h.name for h in problem.best()[1]] if detected else []
+    return detected, [h.name for h in problem.more()] if detected else []
 
 
 def forward_bic(problem: Problem) -> Answer:
     """Add shapes one by one, as long as the BIC becomes smaller."""
     chosen: list[Hypothesis] = []
-    value = problem.bic(chosen)
-    while len(chosen) < MOST:
-        best, more = problem.best(chosen)
-        if best >= value:
-            break
-        value, chosen = best, more
+    while len(chosen) < MOST and problem.bic(more := problem.more(chosen)) < problem.bic(chosen):
+        chosen = more
     return bool(chosen), [h.name for h in chosen]
 
 
 def lasso(problem: Problem) -> Answer:
     """LassoCV on the signatures of all effects, each in the shape that fits best."""
-    from sklearn.exceptions import ConvergenceWarning
     from sklearn.linear_model import LassoCV
 
-    best: dict[str, int] = {}
-    for i, shape in enumerate(problem.shapes):
-        if shape.name not in best or problem.parts[i] > problem.parts[best[shape.name]]:
-            best[shape.name] = i
-    shapes = [problem.shapes[i] for i in best.values()]
-    columns = np.concatenate([h.basis for h in shapes], axis=1)
+    best = {shape.name: shape for shape in problem.shapes}
+    for i in np.argsort(-problem.parts, kind="stable")[::-1]:
+        best[problem.shapes[i].name] = problem.shapes[i]
+    columns = np.concatenate([h.basis for h in best.values()], axis=1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)
+        warnings.simplefilter("ignore")  # of searches that have not converged
         fit = LassoCV(fit_intercept=False, cv=FOLDS, alphas=50)
         fit.fit(columns * np.sqrt(len(problem.z)), problem.z)
-    ends = np.cumsum([h.dim for h in shapes])[:-1]
-    sizes = [float(np.linalg.norm(part)) for part in np.split(fit.coef_, ends)]
+    ends = np.cumsum([h.dim for h in best.values()])[:-1]
+    sizes = map(np.linalg.norm, np.split(fit.coef_, ends))
     ranked = sorted(zip(sizes, best, strict=True), key=lambda pair: -pair[0])
     names = [name for size, name in ranked if size > 0]
     return bool(names), names

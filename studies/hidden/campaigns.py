@@ -20,25 +20,25 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.validation import checked
 from accelstudy.sensors.models import get_model
 from studies.hidden.baselines import METHODS, answers
-from studies.hidden.physics.generate import Case, Truth
+from studies.hidden.physics.generate import Truth
 from studies.hidden.real_noise import RealNoiseConfig
-from studies.hidden.study import HiddenConfig, Job, Row, removed
+from studies.hidden.study import HiddenConfig, Row, removed
+
+Config = HiddenConfig | RealNoiseConfig
 
 
-def parse_hidden(
-    content: Mapping[str, Any], source: str = "config"
-) -> HiddenConfig | RealNoiseConfig:
+def parse_hidden(content: Mapping[str, Any], source: str = "config") -> Config:
     """Check a configuration of either study; raise `InputError` with one line."""
     if "logs" in content:
         return checked(RealNoiseConfig, content, source)
     return checked(HiddenConfig, content, source)
 
 
-def run(job: Job, path: str | Path) -> None:
+def run(config: Config, job: str, path: str | Path) -> None:
     """Make and diagnose the campaigns of a job, and write their rows, one a line."""
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
-        for case, k in job.campaigns:
-            print(json.dumps(row_of(job, case, k)), file=file)
+        for case, k in config.job(job):
+            print(json.dumps(row_of(config, case, k)), file=file)
 
 
 def read_rows(paths: Iterable[str | Path]) -> list[Row]:
@@ -47,21 +47,22 @@ def read_rows(paths: Iterable[str | Path]) -> list[Row]:
     return [json.loads(line) for text in texts for line in text.splitlines()]
 
 
-def row_of(job: Job, case: Case, k: int) -> Row:
+def row_of(config: Config, case: Any, k: int) -> Row:
     """Truth and answer of a campaign, of what JSON has.
 
     The diagnosis gets the campaign and nothing else. One that fails is a row with its error.
     """
-    what, model = f"{case.name} {k}", get_model(job.model)
-    made, failed = tried(lambda: job.make(case, k), f"{what}: not made")
+    log, every = config.logs.get(case.design), config.baselines_every
+    what, model = f"{case.name} {k}", get_model((log and log.model) or config.model)
+    made, failed = tried(lambda: config.make(case, k), f"{what}: not made")
     campaign: Any
     campaign, truth = made or (None, Truth())
     methods = None
     with effects_without(removed(case)):
         answer, error = tried(
-            lambda: outcome(diagnose(campaign, model, seed=job.seed)), what, failed
+            lambda: outcome(diagnose(campaign, model, seed=config.diagnosis_seed)), what, failed
         )
-        if job.baselines_every and int.from_bytes(case.digest(k)[:8]) % job.baselines_every == 0:
+        if every and int.from_bytes(case.digest(k)[:8]) % every == 0:
             told, _ = tried(lambda: dict(answers(campaign, model)), what, failed)
             # Where the model cannot be fitted, no method can work: each finds nothing.
             methods = told or dict.fromkeys(METHODS, (False, []))

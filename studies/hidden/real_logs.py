@@ -7,42 +7,39 @@ effects and the diagnosis of the project.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 from numpy.typing import NDArray
 from scipy import optimize, special
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.recording import Recording, read_log
 from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.importing.sources import TableSource
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.atlas import Atlas, Conditions, Shape
 from studies.hidden.physics.designs import ANGLE_SIGMA, Course, Session
-from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.geometry import GRAVITY, Array, joints_of
-from studies.hidden.physics.kinds import OUTPUTS, Cause, Kind, Setting
+from studies.hidden.physics.kinds import EFFECTS, GROSS_EFFECTS, OUTPUTS, Cause, Kind
 from studies.hidden.physics.measuring import Sensor
+from studies.hidden.physics.oracle import Oracle
 
 Spans = NDArray[np.int_]
 """First sample of each hold, and the one after its last, (n, 2)."""
 
-BUMPED = "outlier_position"
+(BUMPED,) = GROSS_EFFECTS
 PUT: Mapping[str, Kind] = {
     **{name: kind for name, kind in EFFECTS.items() if kind.target in OUTPUTS},
-    BUMPED: Kind(
-        BUMPED,
-        "output",
-        "p * (number == row)",
-        typical=2e-2,
-        row=Setting(lambda x, rng: float(rng.integers(x.n))),
-    ),
+    **GROSS_EFFECTS,
 }
 """What can be put into a log: effects of the sensor, and a bumped hold."""
 BY_HOLD = ("hysteresis", "settling", BUMPED)
@@ -58,26 +55,20 @@ class Donor:
     time : (N,) array, s; without times one position takes an interval, s
     timed : bool, whether the log itself gives the time
     spans : Spans
-    own : tuple of str, an effect that it has by itself, by any of these names
+    own : sequence of str, an effect that it has by itself, by any of these names
     """
 
     def __init__(
-        self,
-        name: str,
-        path: Path,
-        settings: ImportSettings,
-        interval: float,
-        own: Sequence[str] = (),
+        self, name: str, path: Path, given: ImportSettings, interval: float, own: Sequence[str] = ()
     ) -> None:
-        self.name, self.settings, self.own = name, settings, own
-        campaign, holds = import_log(path, settings)
-        self.spans, self.forces = spans_of(campaign, holds), campaign.forces
-        self.timed = not settings.means and settings.block is None
-        if not settings.means:
-            samples = Recording([read_log(path, settings, untimed=not self.timed)])
-            self.forces = samples.forces
+        self.name, self.settings, self.own = name, given, own
+        campaign, holds = import_log(path, given)
+        self.spans, self.timed = spans_of(campaign, holds), not given.means and given.block is None
+        self.forces = campaign.forces if holds is None else holds.log.forces
         middles = np.arange(len(self.forces), dtype=float) + 0.5
-        self.time = samples.time if self.timed else interval / (settings.block or 1) * middles
+        self.time = interval / (given.block or 1) * middles
+        if holds is not None and self.timed:
+            self.time = holds.log.time
 
     @cached_property
     def sensor(self) -> Sensor:
@@ -93,27 +84,7 @@ class Donor:
     @property
     def redundancy(self) -> int:
         """That of a calibration with nine parameters, and with what the log has by itself."""
-        return len(self.spans) - 9 - (EFFECTS[self.own[0]].k if self.own else 0)
-
-    def atlas(self, spans: Spans, course: Course | None, sigma: float = 1.0) -> Atlas:
-        """All that holds can show; what the log has by itself is absorbed."""
-        n, means, (starts, ends) = len(spans), means_of(self.forces, spans), spans.T
-        session = Session(
-            self.name,
-            joints_of((means - self.sensor.bias) @ self.sensor.correction.T),
-            np.zeros(n),
-            sigma,
-            ANGLE_SIGMA,
-            length=float(np.median(self.time[ends - 1] - self.time[starts])),
-            time=(self.time[starts] + self.time[ends - 1]) / 2,
-            course=course,
-        )
-        atlas = Atlas(Conditions(session, "gravity", self.sensor))
-        for name in self.own[:1]:
-            shape = atlas.shape(EFFECTS[name], {})
-            assert shape is not None
-            atlas.conditions.absorb(shape.basis)
-        return atlas
+        return len(self.spans) - 9 - sum(EFFECTS[name].k for name in self.own[:1])
 
     @cached_property
     def sigma(self) -> float:
@@ -121,15 +92,37 @@ class Donor:
         left = residuals(self.atlas(self.spans, None), means_of(self.forces, self.spans))
         return float(np.sqrt(np.sum(left**2) / self.redundancy))
 
-    def unit(self, kind: Kind, settings: dict[str, float], course: Course | None) -> Array:
+    def atlas(self, spans: Spans, course: Course | None, sigma: float = 1.0) -> Oracle:
+        """All that holds can show; what the log has by itself is absorbed."""
+        means, (starts, ends) = means_of(self.forces, spans), spans.T
+        joints = joints_of((means - self.sensor.bias) @ self.sensor.correction.T)
+        length = float(np.median(self.time[ends - 1] - self.time[starts]))
+        time = (self.time[starts] + self.time[ends - 1]) / 2
+        session = Session(
+            self.name,
+            joints,
+            np.zeros(len(spans)),
+            sigma,
+            ANGLE_SIGMA,
+            length=length,
+            time=time,
+            course=course,
+        )
+        atlas = Oracle(Conditions(session, "gravity", self.sensor))
+        for name in self.own[:1]:
+            shape = atlas.shape(EFFECTS[name], {})
+            assert shape is not None
+            atlas.conditions.absorb(shape.basis)
+        return atlas
+
+    def unit(self, kind: Kind, settings: Mapping[str, float], course: Course | None) -> Array:
         """What each parameter of a kind adds to the readings, (k, N, 3)."""
         felt, time = (self.forces - self.sensor.bias) / (1 + self.sensor.scale), self.time
         if kind.name in BY_HOLD:
             felt, time = means_of(felt, self.spans), time[self.spans[:, 0]]
-        session = Session(
-            self.name, np.zeros((len(time), 2)), time, 1.0, 1.0, time=time, course=course
-        )
-        added = Cause(kind, settings, np.eye(kind.k)).change(felt[None], session)
+        joints = np.zeros((len(time), 2))
+        session = Session(self.name, joints, time, 1.0, 1.0, time=time, course=course)
+        added = Cause(kind, dict(settings), np.eye(kind.k)).change(felt[None], session)
         if kind.name not in BY_HOLD:
             return added
         # A move is shared by the holds around it.
@@ -137,7 +130,7 @@ class Donor:
         return added[:, np.searchsorted(middles, np.arange(len(self.forces)), side="right")]
 
     def shape(
-        self, kind: Kind, settings: dict[str, float], atlas: Atlas, spans: Spans
+        self, kind: Kind, settings: Mapping[str, float], atlas: Atlas, spans: Spans
     ) -> tuple[Array, Shape]:
         """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape.
 
@@ -169,14 +162,10 @@ class Donor:
         factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
         return Cause(kind, settings, parameters[None] * factor)
 
-    def write(
-        self,
-        path: Path,
-        causes: Sequence[Cause],
-        course: Course | None,
-        columns: Mapping[str, Array],
-    ) -> ImportSettings:
-        """Write the log with effects in its readings, and columns; returns how it is imported."""
+    def changed(
+        self, causes: Sequence[Cause], course: Course | None, columns: Mapping[str, Array]
+    ) -> tuple[TableSource, ImportSettings]:
+        """The log with effects in its readings, and columns; and how it is imported."""
         given, added = self.settings, np.zeros(self.forces.shape)
         for one in causes:
             added += np.tensordot(one.parameters[0], self.unit(one.kind, one.settings, course), 1)
@@ -187,14 +176,10 @@ class Donor:
         table = {**dict(zip(("fx", "fy", "fz"), raw.T, strict=True)), **columns}
         if given.time is not None:
             table["time"] = self.time
-        pd.DataFrame(table).to_parquet(path)
-        layout = {
-            "columns": {name: name for name in table if name != "time"},
-            "time": "time" if "time" in table else None,
-            "time_unit": "s",
-            "variable": None,
-        }
-        return given.model_copy(update=layout)
+        names = {name: name for name in table if name != "time"}
+        layout = {"columns": names, "time": "time" if "time" in table else None, "time_unit": "s"}
+        settings = given.model_copy(update={**layout, "variable": None})
+        return TableSource(self.name, pa.table(table)), settings
 
 
 def means_of(values: Array, spans: Spans) -> Array:
@@ -215,23 +200,95 @@ def residuals(atlas: Atlas, forces: Array) -> Array:
     return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
-def p_value(log: Donor, z: Array, shapes: Sequence[Shape], holds: int) -> float:
+def p_value(z: Array, shapes: Sequence[Shape], redundancy: int) -> float:
     """p-value of an F test that knows the form of effects, of two that of the less certain one.
 
     Parameters
     ----------
-    log : Donor, of which so many holds are left
     z : (m,) array, residuals of a calibration with the effects
     shapes : what each of them leaves in the holds
+    redundancy : int, of the calibration
     """
-    p = 0.0
-    for shape in shapes:
-        others = [one.basis for one in shapes if one is not shape]
-        beside = np.concatenate([np.zeros((len(z), 0)), *others], axis=1)
-        left = z - beside @ (beside.T @ z)
-        basis = np.linalg.qr(shape.basis - beside @ (beside.T @ shape.basis))[0]
-        gain, d = float(np.sum((left @ basis) ** 2)), basis.shape[1]
-        dof = log.redundancy - (len(log.spans) - holds) - beside.shape[1] - d
-        variance = (float(left @ left) - gain) / dof
-        p = max(p, float(special.fdtrc(d, dof, gain / d / variance)))
+
+    def squares(fitted: Sequence[Shape]) -> float:
+        basis = np.concatenate([np.zeros((len(z), 0)), *(one.basis for one in fitted)], axis=1)
+        return float(np.sum((z - basis @ np.linalg.lstsq(basis, z)[0]) ** 2))
+
+    p, full, dof = 0.0, squares(shapes), redundancy - sum(one.dim for one in shapes)
+    for one in shapes:
+        gain = squares([other for other in shapes if other is not one]) - full
+        p = max(p, float(special.fdtrc(one.dim, dof, gain / one.dim / (full / dof))))
     return p
+
+
+# --- campaigns ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LogCase(Case):
+    """A kind of campaign of a log.
+
+    Attributes
+    ----------
+    recorded : bool, whether the columns on which effects depend are there; None if they need none
+    """
+
+    approach: str = "gravity"
+    sigma_known: bool = False
+    recorded: bool | None = None
+
+    @property
+    def session(self) -> str:
+        """Log, effects and their size."""
+        return f"{self.design}/{self.what or 'nothing'}/{self.size:g}"
+
+    @property
+    def name(self) -> str:
+        """Name, unique within a study."""
+        columns = {None: "as it is", True: "recorded", False: "not recorded"}[self.recorded]
+        return f"{self.session}/{columns}"
+
+    def seed(self, seed: int, campaign: int) -> np.random.SeedSequence:
+        """Seed of a campaign: with and without its columns it is the same session."""
+        return np.random.SeedSequence([seed, zlib.crc32(self.session.encode()), campaign])
+
+
+def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
+    """Put effects into a log, and import it."""
+    rng, course, columns = np.random.default_rng(seed), None, dict[str, Array]()
+    if any("temperature" in PUT[name].needs for name in case.effect) or not case.effect:
+        course = _course(float(log.time[-1]), rng)
+    sizes = [*zip(case.effect, case.lam, strict=True)]
+    causes = [log.drawn(name, lam, course, rng) for name, lam in sizes]
+    if case.recorded and course is not None:
+        columns["temperature"] = np.round(course.at(log.time), 1)
+    if case.recorded and not log.timed:
+        columns["time"] = log.time
+    campaign, holds = import_log(*log.changed(causes, course, columns))
+    truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
+    if not causes:
+        return campaign, truth
+    spans = spans_of(campaign, holds)
+    atlas, lost = log.atlas(spans, course, log.sigma), len(log.spans) - len(spans)
+    shapes = [log.shape(one.kind, one.settings, atlas, spans)[1] for one in causes]
+    z = residuals(atlas, campaign.forces)
+    truth = replace(truth, p_known=p_value(z, shapes, log.redundancy - lost))
+    if BUMPED in case.effect:
+        # The hold in which the bumped one lies, whatever its number became.
+        middle = np.mean(log.spans[int(causes[0].settings["row"])])
+        place = campaign.positions[(spans[:, 0] <= middle) & (middle < spans[:, 1])].tolist()
+        gross = {"name": BUMPED, "settings": {"position": place[0] if place else None}}
+        return campaign, replace(truth, gross=gross)
+    said = atlas.judge(z, case.lam)
+    return campaign, replace(truth, classes=tuple(map(atlas.same_as, shapes)), oracle=said)
+
+
+def _course(duration: float, rng: np.random.Generator) -> Course:
+    """A temperature that rises to a limit, or wanders."""
+    time = np.linspace(0.0, duration, 60)
+    if rng.random() < 0.5:
+        slow = duration * rng.uniform(0.2, 1.0)
+        return Course(time, 21 + rng.uniform(4, 15) * -np.expm1(-time / slow))
+    turns, start = rng.uniform(0.4, 3.0, 3), rng.uniform(0, 2 * np.pi, 3)
+    waves = np.sin(2 * np.pi * np.outer(time / duration, turns) + start)
+    return Course(time, 24 + waves @ rng.uniform(1, 3, 3))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from functools import cache
 from itertools import combinations, product
 from math import ceil
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -21,14 +21,12 @@ from accelstudy.config_names import KnownModel
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.reading import config_hash
 from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, Seed
-from studies.hidden.physics import oracle
-from studies.hidden.physics.atlas import atlas, invisible_effects, visible_effects
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
-from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.generate import Case, Truth, generate
 from studies.hidden.physics.gross import GROSS, visible_gross
+from studies.hidden.physics.kinds import EFFECTS, OUTSIDE, UNFORESEEN
 from studies.hidden.physics.measuring import NOISES
-from studies.hidden.physics.outside import OUTSIDE, UNFORESEEN
+from studies.hidden.physics.oracle import oracle, visible_outside
 
 Names = OneOrMore[str]
 Sizes = OneOrMore[Positive]
@@ -41,40 +39,50 @@ JOB = 1600
 """Campaigns in one job: minutes of work, so that it does not matter that each job starts Python and
 looks which session can show what."""
 
-KINDS: Mapping[str, tuple[Sequence[str], Callable[[str, str], Collection[str]]]] = {
-    "noise": (tuple(NOISES), lambda design, approach: NOISES),
-    "one": (tuple(EFFECTS), visible_effects),
-    "removed": (tuple(EFFECTS), visible_effects),
-    "outside": (tuple(OUTSIDE), oracle.visible_outside),
-    "unforeseen": (tuple(UNFORESEEN), oracle.visible_outside),
-    "gross": (tuple(GROSS), visible_gross),
-    "invisible": (tuple(EFFECTS), invisible_effects),
+
+@cache
+def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
+    """All two effects that a session can show, and that do not mean the same in it."""
+    seen = oracle(design, approach)
+    alike: dict[str, set[str]] = {name: set() for name in seen.visible}
+    for shape in seen.shapes:
+        alike[shape.effect.name].update(seen.same_as(shape))
+    return tuple(pair for pair in combinations(seen.visible, 2) if pair[1] not in alike[pair[0]])
+
+
+TRIPLES, SIMILAR = 60, 0.8
+"""Sets of three effects of a session, and the canonical cosine of two that are not similar."""
+
+
+@cache
+def distinct_triples(design: str, approach: str) -> tuple[tuple[str, str, str], ...]:
+    """Sets of three effects, all over those that a session can show and easily distinguish."""
+    seen = oracle(design, approach)
+    cosines = seen.cosines()
+    triples = [
+        names
+        for names in combinations(seen.visible, 3)
+        if all(cosines[pair] < SIMILAR for pair in combinations(names, 2))
+    ]
+    return tuple(triples[:: len(triples) // TRIPLES + 1])
+
+
+KINDS: Mapping[str, tuple[Collection[str], Callable[[str, str], Collection[str]]]] = {
+    "noise": (NOISES, lambda *session: NOISES),
+    "one": (EFFECTS, lambda *session: oracle(*session).visible),
+    "removed": (EFFECTS, lambda *session: oracle(*session).visible),
+    "outside": (OUTSIDE, visible_outside),
+    "unforeseen": (UNFORESEEN, visible_outside),
+    "gross": (GROSS, visible_gross),
+    "invisible": (EFFECTS, lambda *session: oracle(*session).invisible),
 }
 """Kinds that each set may have, and those that make sense in a design by an approach."""
-SETS = ("nothing", *KINDS, "two", "three")
+SEVERAL = {"two": distinct_pairs, "three": distinct_triples}
+SETS = ("nothing", *KINDS, *SEVERAL)
 """Blocks of campaigns."""
 
 
 Row = dict[str, Any]
-
-
-class Job(NamedTuple):
-    """What a job works on: campaigns, how each is made, and how it is diagnosed.
-
-    Attributes
-    ----------
-    campaigns : cases and numbers
-    make : makes a campaign
-    model : str, name of the model that is diagnosed
-    seed : int, of each diagnosis
-    baselines_every : int, the simpler methods get one in so many campaigns; 0 for none
-    """
-
-    campaigns: Iterable[Numbered]
-    make: Callable[[Any, int], tuple[Campaign, Truth]]
-    model: str
-    seed: int
-    baselines_every: int = 0
 
 
 class Nothing(Block):
@@ -106,7 +114,7 @@ class Several(Block):
 
 
 class Study(Block):
-    """What both studies have."""
+    """What both studies have: which campaigns they make, how, and how they are diagnosed."""
 
     study: PathName = Field(description="name; results go to results/<study>/")
     seed: Seed = Field(description="of all that is random")
@@ -123,6 +131,7 @@ class HiddenConfig(Study):
     """A study of hidden effects; results go to ``results/<study>``."""
 
     score: ClassVar = "score"
+    logs: ClassVar[Mapping[str, Any]] = {}
 
     designs: Names = Field(["all"], description="sessions that are simulated, or all")
     approaches: Names = Field(["all"], description="gravity, robot, or all")
@@ -151,9 +160,9 @@ class HiddenConfig(Study):
     def _names_exist(self) -> Self:
         _known("designs", "design", self.designs, DESIGNS)
         _known("approaches", "approach", self.approaches, APPROACHES)
-        for set_ in KINDS:
+        for set_, (kinds, _) in KINDS.items():
             if block := getattr(self, set_):
-                _known(f"{set_}.kinds", "kind", block.kinds, KINDS[set_][0])
+                _known(f"{set_}.kinds", "kind", block.kinds, kinds)
         if not self.most:
             raise InputError(f"no campaigns; give at least one of {', '.join(SETS)}")
         CAMPAIGNS.check_key("campaigns in all", self.most)
@@ -194,20 +203,14 @@ class HiddenConfig(Study):
 
         return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
 
-    def job(self, name: str) -> Job:
-        """A job by its name: a part of all campaigns."""
+    def job(self, name: str) -> list[Numbered]:
+        """Campaigns of a job by its name: a part of all of them."""
         start = JOB * int(name)
-        return self.simulated(self.campaigns()[start : start + JOB])
+        return self.campaigns()[start : start + JOB]
 
-    def simulated(self, campaigns: Iterable[Numbered]) -> Job:
-        """Campaigns by the physics of the study."""
-        return Job(
-            campaigns,
-            lambda case, k: generate(case, case.seed(self.seed, k)),
-            self.model,
-            self.diagnosis_seed,
-            self.baselines_every,
-        )
+    def make(self, case: Case, k: int) -> tuple[Campaign, Truth]:
+        """Make a campaign by the physics of the study."""
+        return generate(case, case.seed(self.seed, k))
 
     def _wanted(self) -> Iterator[tuple[str, str, float | None, int]]:
         """Block, kind, size and number of the campaigns that are wanted."""
@@ -221,23 +224,24 @@ class HiddenConfig(Study):
         """Cases among which the campaigns of each kind and size are spread, and how many."""
         for name, kind, size, count in self._wanted():
             cases = []
-            for place, hidden in ((p, h) for p in self.places for h in _hidden(name, kind, *p[:2])):
-                lam = () if size is None else (size,) * len(hidden["effect"])
-                cases.append(Case(name.replace("nothing", "null"), *place, lam=lam, **hidden))
+            for place in self.places:
+                for what in _hidden(name, kind, *place[:2]):
+                    hidden = {name: kind} if name in ("noise", "gross") else {"effect": what}
+                    lam = () if size is None else (size,) * len(what)
+                    set_ = name.replace("nothing", "null")
+                    cases.append(Case(set_, *place, lam=lam, **hidden))
             if not cases and kind and getattr(self, name).kinds != ["all"]:
                 raise InputError(f"{name}.kinds: no session of the study can show {kind}")
             yield cases, count
 
 
-def _hidden(name: str, kind: str, design: str, approach: str) -> list[dict[str, Any]]:
-    """What is hidden in campaigns of a block and kind, if a session can show it."""
-    if name == "two":
-        return [{"effect": pair} for pair in distinct_pairs(design, approach)]
-    if name == "three":
-        return [{"effect": triple} for triple in distinct_triples(design, approach)]
-    if kind and kind not in KINDS[name][1](design, approach):
-        return []
-    return [{name: kind} if name in ("noise", "gross") else {"effect": (kind,) if kind else ()}]
+def _hidden(name: str, kind: str, design: str, approach: str) -> Iterable[tuple[str, ...]]:
+    """What may be hidden in campaigns of a block and kind, as a session can show it."""
+    if name == "nothing":
+        return [()]
+    if name in SEVERAL:
+        return SEVERAL[name](design, approach)
+    return [(kind,)] if kind in KINDS[name][1](design, approach) else []
 
 
 def _spread(cases: Sequence[Case], count: int) -> Iterator[Numbered]:
@@ -246,33 +250,6 @@ def _spread(cases: Sequence[Case], count: int) -> Iterator[Numbered]:
     for i, case in enumerate(sorted(cases, key=Case.digest)):
         if number := each + (i < more):
             yield case, number
-
-
-@cache
-def distinct_pairs(design: str, approach: str) -> tuple[tuple[str, str], ...]:
-    """All two effects that a session can show, and that do not mean the same in it."""
-    seen = atlas(design, approach)
-    alike: dict[str, set[str]] = {name: set() for name in seen.visible}
-    for shape in seen.shapes:
-        alike[shape.effect.name].update(seen.same_as(shape))
-    return tuple(pair for pair in combinations(seen.visible, 2) if pair[1] not in alike[pair[0]])
-
-
-TRIPLES, SIMILAR = 60, 0.8
-"""Sets of three effects of a session, and the canonical cosine of two that are not similar."""
-
-
-@cache
-def distinct_triples(design: str, approach: str) -> tuple[tuple[str, str, str], ...]:
-    """Sets of three effects, all over those that a session can show and easily distinguish."""
-    seen = atlas(design, approach)
-    cosines = seen.cosines()
-    triples = [
-        names
-        for names in combinations(seen.visible, 3)
-        if all(cosines[pair] < SIMILAR for pair in combinations(names, 2))
-    ]
-    return tuple(triples[:: len(triples) // TRIPLES + 1])
 
 
 @cache
@@ -287,7 +264,7 @@ def removed(case: Case) -> tuple[str, ...]:
     return family_of(case.effect[0]) if case.set == "removed" else ()
 
 
-def _known(key: str, kind: str, names: Sequence[str], choices: Sequence[str]) -> None:
+def _known(key: str, kind: str, names: Sequence[str], choices: Collection[str]) -> None:
     """Check that names are known, or the one word all."""
     for name in names:
         if list(names) != ["all"] and name not in choices:

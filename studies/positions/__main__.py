@@ -17,10 +17,10 @@ from studies.positions import efficiency, stopping
 def main(folder: Path) -> None:
     """Write the tables and figures of both studies to a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    table = efficiency.efficiency_table(efficiency.TASKS, efficiency.SCHEMES, efficiency.POSITIONS)
     settings = track(stopping.SETTINGS, "sessions")
-    sessions = pd.concat([stopping.simulate(*each) for each in settings])
+    sessions = pd.concat([stopping.simulate(*each) for each in settings], ignore_index=True)
     sessions.to_parquet(folder / "sessions.parquet")
+    table = efficiency.efficiency_table(efficiency.TASKS, efficiency.SCHEMES, efficiency.POSITIONS)
     made = {
         "efficiency": (table, efficiency.efficiency_figure),
         "stopping": (stopping.summary_table(sessions), stopping.stopping_figure),

@@ -49,7 +49,7 @@ def efficiency_table(
         efficiency by each criterion and the rms of roll and pitch together (rad), or the reason
         why it does not determine the model; and least_rms, the lower bound for any n positions.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for task in tasks:
         criteria = {name: get_criterion(name, task) for name in CRITERIA}
         # For shares that sum to one position; n positions have n times the information.
@@ -57,22 +57,21 @@ def efficiency_table(
             name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
             for name, criterion in criteria.items()
         }
-        candidates = [(scheme.title, False, scheme.directions) for scheme in schemes]
+        shown = {scheme.title: scheme.directions for scheme in schemes}
         for n in positions:
             best = optimal_design(task, criteria["I"], n, seed=SEED, bounded=False)
-            candidates.append((f"{n} I-optimal", True, best.directions))
-        for title, designed, directions in candidates:
+            shown[f"{n} I-optimal"] = best.directions
+        for i, (title, directions) in enumerate(shown.items()):
             n, reason = len(directions), task.missing(directions)
-            row: dict[str, Any] = {
-                "approach": task.approach.name, "scheme": title, "designed": designed, "n": n,
-                "reason": reason, "least_rms": float(np.exp(bounds["I"] / 2) / np.sqrt(n)),
+            row = {
+                "approach": task.approach.name, "scheme": title, "designed": i >= len(schemes),
+                "n": n, "reason": reason, "least_rms": np.exp(bounds["I"] / 2) / np.sqrt(n),
             }  # fmt: skip
             if not reason:
-                row["rms"] = float(np.sqrt(np.mean(task.rms_tilt(directions) ** 2)))
+                row["rms"] = np.sqrt(np.mean(task.rms_tilt(directions) ** 2))
                 information = task.normal(directions) / n
-                for name, one in criteria.items():
-                    value = float(one.value(information))
-                    row[name] = min(1.0, one.efficiency(value, bounds[name]))
+                for name, c in criteria.items():
+                    row[name] = min(1.0, c.efficiency(float(c.value(information)), bounds[name]))
             rows.append(row)
     return pd.DataFrame(rows)
 
@@ -86,41 +85,36 @@ def efficiency_figure(table: pd.DataFrame) -> Figure:
     """
     titles = [*table["scheme"].unique()]
     height = 5.2 * len(titles)
-    groups = [*table.groupby("approach", sort=False)]
+    groups = table.groupby("approach", sort=False)
     figure = new_figure(FULL, 40 + height + 62)
-    grid = figure.add_gridspec(2, len(groups), height_ratios=[height + 14, 62])
-    for column, (approach, part) in enumerate(groups):
-        above, below = (figure.add_subplot(grid[row, column]) for row in (0, 1))
-        _efficiencies(above, part)
-        above.set_title(f"{approach}: share of the best there can be")
-        above.set_yticks(range(len(titles)), titles if column == 0 else [])
-        _over_positions(below, part[part["reason"] == ""], approach_colour(str(approach)))
+    axes = figure.subplots(2, len(groups), height_ratios=[height + 14, 62], squeeze=False)
+    for (approach, rows), (above, below) in zip(groups, axes.T, strict=True):
+        for name, (colour, marker) in CRITERIA.items():
+            above.plot(100 * rows[name], titles, marker, color=colour, label=name)
+        for title in rows.loc[rows["reason"] != "", "scheme"]:
+            above.text(
+                2, title, "does not determine the model", va="center", color="#777777", size=7
+            )
+        above.set(title=f"{approach}: share of the best there can be", xlabel="efficiency, %",
+                  xlim=(0, 103), ylim=(len(titles) - 0.4, -0.6))  # fmt: skip
+        _over_positions(below, rows[rows["reason"] == ""], approach_colour(str(approach)))
         below.set_title(f"{approach}: expected rms")
-        if column == 0:
-            above.legend(title="criterion", loc="center left")
-            below.set_ylabel(f"rms of roll and pitch, {display_unit('rad')}")
-    below.legend(loc="best")
+    for ax in axes[0, 1:]:
+        ax.set_yticks(range(len(titles)), [])
+    axes[0, 0].legend(title="criterion", loc="center left")
+    axes[1, 0].set_ylabel(f"rms of roll and pitch, {display_unit('rad')}")
+    axes[1, -1].legend(loc="best")
     return figure
-
-
-def _efficiencies(ax: Axes, rows: pd.DataFrame) -> None:
-    y = np.arange(len(rows))
-    for name, (colour, marker) in CRITERIA.items():
-        ax.plot(100 * rows[name], y, marker, color=colour, label=name)
-    for i in y[rows["reason"] != ""]:
-        ax.text(2, i, "does not determine the model", va="center", color="#777777", size=7)
-    ax.set(xlim=(0, 103), ylim=(len(rows) - 0.4, -0.6), xlabel="efficiency, %")
 
 
 def _over_positions(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
     n = np.geomspace(rows["n"].min(), rows["n"].max(), 60)
     one = float((rows["least_rms"] * np.sqrt(rows["n"])).iloc[0])
     ax.plot(n, to_display(one / np.sqrt(n), "rad"), color=INK, label="no positions are below")
-    looks: Any = {"schemes": {"marker": "o"},
-                  "I-optimal designs": {"marker": "D", "markerfacecolor": "white"}}  # fmt: skip
-    for (_, part), (label, look) in zip(rows.groupby("designed"), looks.items(), strict=True):
-        ax.plot(part["n"], to_display(part["rms"], "rad"), color=colour, linestyle="", label=label,
-                **look)  # fmt: skip
-    ends = (float(to_display(end, "rad")) for end in (rows["least_rms"].min(), rows["rms"].max()))
+    schemes, designs = rows[~rows["designed"]], rows[rows["designed"]]
+    looks = (schemes, "schemes", "o", colour), (designs, "I-optimal designs", "D", "white")
+    for part, label, marker, face in looks:
+        ax.plot(part["n"], to_display(part["rms"], "rad"), marker, color=colour, label=label,
+                markerfacecolor=face)  # fmt: skip
     ax.set(yscale="log", xlabel="positions")
-    log_ticks(ax.yaxis, *ends)
+    log_ticks(ax.yaxis, *to_display(np.array([rows["least_rms"].min(), rows["rms"].max()]), "rad"))

@@ -20,20 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment import Observations
 from accelstudy.approaches import get_approach
+from accelstudy.basics import units
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
-from accelstudy.basics.units import (
-    GON,
-    STANDARD_GRAVITY,
-    attitude_unit,
-    display_unit,
-    to_attitude,
-    to_display,
-)
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import position_rows
-from accelstudy.drawing.style import FULL, INK, approach_colour, approach_handles, new_figure
-from accelstudy.leveling.angles import angles_of
-from accelstudy.leveling.error import tilt_error
+from accelstudy.drawing import style
+from accelstudy.leveling.angles import angles_of, tilt_slope
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import NINE, get_model
 from accelstudy.sequential.choice import DEFAULTS, Chooser, candidates, typical_sizes
@@ -46,15 +38,13 @@ Array = NDArray[np.float64]
 MODEL = get_model(NINE)
 """Of the sensor and of the calibration."""
 FIXED = get_scheme("mclaren-24")
-TILT_RANGE = 30 * GON
+TILT_RANGE = 30 * units.GON
 NOISE = Noise()
-PLACING = 2 * GON
+PLACING = 2 * units.GON
 """Sd per axis by which positions miss the chosen attitudes."""
 MOST_POSITIONS = 120
 """With which a session ends in any case."""
 SEED = 1
-AT_ONCE = 500
-"""Sessions that are simulated together; more would only take memory."""
 ROUNDING = 1e-9
 """Relative excess over the promise that is rounding."""
 
@@ -72,8 +62,8 @@ RULES: dict[str, tuple[Any, Any, str]] = {
     "plain": (plain, ":", "as the residuals seem"),
 }
 """What the variance of unit weight is taken for, its line in the figure, and its label there."""
-SETTINGS = [*product(("gravity", "robot"), RULES, (0.75, 1.0, 1.5, 2.0))]
-"""Approach, rule, and promised accuracy over that of the fixed scheme."""
+SETTINGS = [*product(("gravity", "robot"), RULES, (0.75, 1.0, 1.5, 2.0), range(2))]
+"""Approach, rule, promised accuracy over that of the fixed scheme, and block of sessions."""
 LABELS = ["approach", "rule", "multiple", "promised"]
 """Columns that identify the setting of a session."""
 
@@ -82,7 +72,8 @@ def simulate(
     approach: str,
     rule: str,
     multiple: float = 1.0,
-    sessions: int = 1000,
+    block: int = 0,
+    sessions: int = 500,
     most_positions: int = MOST_POSITIONS,
     seed: int = SEED,
 ) -> pd.DataFrame:
@@ -93,6 +84,7 @@ def simulate(
     approach : str
     rule : str, of `RULES`
     multiple : float, promised accuracy over that of the fixed scheme, by linear theory
+    block : int, another one has other sessions
     sessions : int
     most_positions : int, with which a session ends in any case
     seed : int
@@ -114,80 +106,57 @@ def simulate(
     # All rules share the random numbers, to be compared.
     name = hashlib.sha256(f"{MODEL.name} {approach} {multiple}".encode()).digest()
     entropy = [seed, int.from_bytes(name[:8], "big")]
-    parts = []
-    for i, start in enumerate(range(0, sessions, AT_ONCE)):
-        rng = np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=(i,)))
-        count = min(AT_ONCE, sessions - start)
-        parts.append(_simulate(chooser, approach, rule, count, most_positions, rng))
-    return pd.concat(parts, ignore_index=True).assign(
-        approach=approach, rule=rule, multiple=multiple, promised=promise.accuracy
-    )
-
-
-def _simulate(
-    chooser: Chooser, approach: str, rule: str, sessions: int, most: int, rng: np.random.Generator
-) -> pd.DataFrame:
+    rng = np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=(block,)))
     low, high = np.log([e.typical for e in MODEL.effects for _ in e.parameters]).T
     truth = np.exp(rng.uniform(low, high, (sessions, len(low))))
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
     so_far, last = _estimate(approach, forces, angles), None
     rms, going, ended = np.full((sessions, 2), np.inf), np.ones(sessions, dtype=bool), []
-    for n in range(1, most + 1):
+    while going.any():
         chosen = chooser.choose(so_far.information, so_far.solved, rms, last)
         last = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
         last /= np.linalg.norm(last, axis=1, keepdims=True)
-        f_b = -STANDARD_GRAVITY * last[:, None]
-        noise = rng.standard_normal((sessions, 1, 3)), rng.standard_normal((sessions, 1, 2))
-        force = MODEL.sense(f_b, truth) + NOISE.sigma_force * noise[0]
+        f_b = -units.STANDARD_GRAVITY * last[:, None]
         angle = angles_of(f_b)
-        angle = angle + MODEL.reading_errors(angle, truth) + NOISE.sigma_angle * noise[1]
-        forces = np.concatenate([forces, force], axis=1)
-        angles = np.concatenate([angles, angle], axis=1)
+        force = MODEL.sense(f_b, truth) + NOISE.sigma_force * rng.standard_normal(f_b.shape)
+        angle = angle + MODEL.reading_errors(angle, truth)
+        angle = angle + NOISE.sigma_angle * rng.standard_normal(angle.shape)
+        forces, angles = np.hstack([forces, force]), np.hstack([angles, angle])
         so_far = _estimate(approach, forces, angles)
         ok, rms = so_far.solved, np.full((sessions, 2), np.inf)
         rms[ok] = chooser.rms(so_far.cofactors[ok], so_far.omega[ok], so_far.redundancy)
         kept = chooser.promise.reached(rms)
-        over = np.flatnonzero(going & (kept | (n == most)))
-        if len(over):
-            outcome = _outcome(chooser, rule, so_far, truth, over)
-            ended.append(outcome.assign(kept=kept[over]))
-            going[over] = False
-            if not going.any():
-                break
-    return pd.concat(ended).sort_index()
+        over = np.flatnonzero(going & (kept | (so_far.n_positions == most_positions)))
+        going[over] = False
+        outcome = _outcome(chooser, rule, so_far.sessions(over), truth[over])
+        ended.append(outcome.set_index(over).assign(kept=kept[over]))
+    table = pd.concat(ended).sort_index()
+    table[LABELS] = approach, rule, multiple, promise.accuracy
+    return table
 
 
 def _estimate(approach: str, forces: Array, angles: Array) -> Estimate:
     sigmas = NOISE.sigma_force, NOISE.sigma_angle
-    observed = Observations(forces, sigmas[0], angles, sigmas[1], STANDARD_GRAVITY)
+    observed = Observations(forces, sigmas[0], angles, sigmas[1], units.STANDARD_GRAVITY)
     return estimate(MODEL, get_approach(approach), observed)
 
 
-def _outcome(
-    chooser: Chooser, rule: str, so_far: Estimate, truth: Array, over: NDArray[np.int_]
-) -> pd.DataFrame:
-    """Results of sessions that have ended, one row each."""
-    r, cofactors = so_far.redundancy, so_far.cofactors[over]
-    delta = so_far.parameters[over] - truth[over]
-    width = np.full(len(over), sigmas_95())
+def _outcome(chooser: Chooser, rule: str, at_end: Estimate, truth: Array) -> pd.DataFrame:
+    """Results of sessions that have ended with as many positions, one row each."""
+    r, cofactors, delta = at_end.redundancy, at_end.cofactors, at_end.parameters - truth
+    width = sigmas_95() * np.ones((len(truth), 1))
     if rule != "known":
-        width = sigmas_95(r) * np.sqrt(so_far.omega[over] / r)
-    inside = np.abs(delta) <= width[:, None] * np.sqrt(np.diagonal(cofactors, axis1=1, axis2=2))
+        width = sigmas_95(r) * np.sqrt(at_end.omega[:, None] / r)
     # Intervals of angles are checked level, and tilted by the tilt range.
-    sin, cos, ideal = np.sin(TILT_RANGE), np.cos(TILT_RANGE), np.zeros(MODEL.n_parameters)
-    down = [(0, 0, 1), (sin, 0, cos), (-sin, 0, cos), (0, sin, cos), (0, -sin, cos)]
-    at = [tilt_error(MODEL, ideal, MODEL, ideal, -STANDARD_GRAVITY * np.array([d])) for d in down]
-    angles = np.stack([each.rms(delta) for each in at], axis=1)
-    spread = np.stack([rms_of(each, cofactors) for each in at], axis=1)
-    outcome = pd.DataFrame(
-        {
-            "positions": so_far.n_positions,
-            "parameters_inside": inside.mean(axis=1),
-            "angles_inside": np.mean(angles <= width[:, None, None] * spread, axis=(1, 2)),
-        },
-        index=over,
-    )
+    sin, cos = np.sin(TILT_RANGE), np.cos(TILT_RANGE)
+    down = np.array([(0, 0, 1), (sin, 0, cos), (-sin, 0, cos), (0, sin, cos), (0, -sin, cos)])
+    f_b, ideal = -units.STANDARD_GRAVITY * down, np.zeros(MODEL.n_parameters)
+    slopes = tilt_slope(MODEL, ideal, f_b, f_b, units.STANDARD_GRAVITY).reshape(-1, len(ideal))
+    outcome = pd.DataFrame({"positions": np.full(len(truth), at_end.n_positions)})
+    for what, rows in (("parameters", np.eye(len(ideal))), ("angles", slopes)):
+        sigmas = np.sqrt(np.sum(rows @ cofactors * rows, axis=2))
+        outcome[f"{what}_inside"] = np.mean(abs(delta @ rows.T) <= width * sigmas, axis=1)
     outcome[["true_roll", "true_pitch"]] = rms_of(chooser.error, cofactors)
     outcome[["actual_roll", "actual_pitch"]] = chooser.error.rms(delta)
     return outcome
@@ -218,29 +187,26 @@ def summary_table(sessions: pd.DataFrame) -> pd.DataFrame:
 
 def stopping_figure(summary: pd.DataFrame) -> Figure:
     """Positions that a promise takes, and how often it is broken; of `summary_table`."""
-    figure = new_figure(FULL, 92)
+    figure = style.new_figure(style.FULL, 92)
     left, right = figure.subplots(1, 2)
-    approaches = [*summary["approach"].unique()]
-    handles = approach_handles(approaches, linestyle="-")
-    looks = dict(zip(approaches, handles, strict=True))
     for (approach, rule), rows in summary.groupby(["approach", "rule"], sort=False):
-        part, handle = rows.sort_values("promised"), looks[approach]
-        look: Any = {"color": handle.get_color(), "marker": handle.get_marker(),
-                     "linestyle": RULES[str(rule)][1]}  # fmt: skip
-        x, share = to_display(part["promised"], "rad"), 100 * part["broken"].to_numpy()
+        part, (_, line, _) = rows.sort_values("promised"), RULES[str(rule)]
+        colour, marker = style.approach_colour(str(approach)), style.approach_marker(str(approach))
+        look: Any = {"color": colour, "marker": marker, "linestyle": line}
+        x, share = units.to_display(part["promised"], "rad"), 100 * part["broken"].to_numpy()
         left.plot(x, part["positions"], **look)
         if rule != "plain":
-            left.fill_between(x, part["positions_5"], part["positions_95"], color=look["color"],
-                              alpha=0.12, linewidth=0)  # fmt: skip
+            central = part["positions_5"], part["positions_95"]
+            left.fill_between(x, *central, color=colour, alpha=0.12, linewidth=0)
+        if rule == "known":
+            of_fixed = units.to_display((part["promised"] / part["multiple"]).iloc[0], "rad")
+            left.plot(of_fixed, FIXED.n_positions, "*", color=colour, ms=11, mec="white", zorder=5)
         ends = 100 * part[["broken_low", "broken_high"]].to_numpy().T
         right.errorbar(x, share, yerr=np.abs(ends - share), capsize=2, **look)
-    for approach, part in summary.groupby("approach", sort=False):
-        accuracy = to_display((part["promised"] / part["multiple"]).iloc[0], "rad")
-        left.plot(accuracy, FIXED.n_positions, "*", markersize=11, markeredgecolor="white",
-                  color=approach_colour(str(approach)), zorder=5)  # fmt: skip
-    tilt = f"{float(to_attitude(TILT_RANGE)):.0f} {attitude_unit()}"
+    tilt = f"{float(units.to_attitude(TILT_RANGE)):.0f} {units.attitude_unit()}"
+    unit = units.display_unit("rad")
     for axes in (left, right):
-        axes.set(xscale="log", xlabel=f"promised rms up to {tilt} of tilt [{display_unit('rad')}]")
+        axes.set(xscale="log", xlabel=f"promised rms up to {tilt} of tilt [{unit}]")
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
         axes.xaxis.set_major_formatter("{x:g}")
         axes.minorticks_off()
@@ -248,12 +214,14 @@ def stopping_figure(summary: pd.DataFrame) -> Figure:
     left.set_title("until the promise seems kept: mean, central 90 %", loc="left")
     right.set(ylabel="sessions [%]", ylim=(-2, 102))
     right.set_title("less accurate than promised", loc="left")
-    right.axhline(5, color=INK, linewidth=0.6)
+    right.axhline(5, color=style.INK, linewidth=0.6)
     right.annotate("5 %", (1, 5), xycoords=("axes fraction", "data"), fontsize=7,
                    xytext=(-2, 2), textcoords="offset points", ha="right")  # fmt: skip
-    handles += [Line2D([], [], color=INK, linestyle=RULES[rule][1], label=RULES[rule][2])
-                for rule in summary["rule"].unique()]  # fmt: skip
-    handles.append(Line2D([], [], color=INK, marker="*", markersize=9, linestyle="",
-                          label=f"fixed: {FIXED.name}"))  # fmt: skip
+    handles = style.approach_handles(summary["approach"].unique(), linestyle="-")
+    for _, line, label in (RULES[rule] for rule in summary["rule"].unique()):
+        handles.append(Line2D([], [], color=style.INK, linestyle=line, label=label))
+    handles.append(
+        Line2D([], [], color=style.INK, marker="*", ms=9, ls="", label=f"fixed: {FIXED.name}")
+    )
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
     return figure

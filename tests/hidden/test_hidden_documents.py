@@ -41,8 +41,8 @@ def test_the_score_is_that_of_the_code():
     told = pd.read_csv(SAMPLE, keep_default_na=False).to_dict("records")[::3]
     assert len(told) > 10
     asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
-    job = CONFIG.simulated(asked)._replace(baselines_every=0)
-    judged = frames([row_of(job, case, k) for case, k in asked], CONFIG)["campaigns"]
+    quiet = CONFIG.model_copy(update={"baselines_every": 0})
+    judged = frames([row_of(quiet, case, k) for case, k in asked], CONFIG)["campaigns"]
     now = answers(judged).astype(object).fillna("").to_dict("records")
     changed = [
         f"{old}\n  now {new}" for old, new in zip(told, now, strict=True) if not alike(old, new)

@@ -15,16 +15,21 @@ from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.models import get_model
 from studies.hidden import physics
-from studies.hidden.physics.atlas import atlas, invisible_effects, visible_effects
 from studies.hidden.physics.designs import APPROACHES, Course, session
-from studies.hidden.physics.effects import EFFECTS
 from studies.hidden.physics.generate import Case, generate
 from studies.hidden.physics.geometry import GRAVITY, in_turned_frame, joints_of, rotated
 from studies.hidden.physics.gross import visible_gross
-from studies.hidden.physics.kinds import OF_ROBOT, OUTPUTS, Cause, Kind
+from studies.hidden.physics.kinds import (
+    EFFECTS,
+    NOWHERE,
+    OF_ROBOT,
+    OUTPUTS,
+    OUTSIDE,
+    UNFORESEEN,
+    Cause,
+)
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
 from studies.hidden.physics.oracle import oracle, visible_outside
-from studies.hidden.physics.outside import NOWHERE, OUTSIDE, UNFORESEEN
 
 NINE = get_model("bias-scale-nonorthogonality")
 
@@ -103,7 +108,7 @@ def test_campaigns_without_effects_fit_as_well_as_their_sigma_says(approach):
 def test_the_misfit_of_an_adjustment_is_the_noncentrality_that_was_asked_for(approach):
     """Σ v²/σ² of data without noise, fitted by the adjustment of the project."""
     design, lam = "repeats-30", 100.0
-    for i, name in enumerate(visible_effects(design, approach)):
+    for i, name in enumerate(oracle(design, approach).visible):
         case = Case("one", design, approach, True, (name,), (lam,))
         misfit, truth = misfit_without_noise(case, EFFECTS[name], seeded(6, i))
         assert misfit == pytest.approx(lam, rel=0.01), name
@@ -138,7 +143,7 @@ def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     """Two sets of formulas, written apart, say the same of small effects of an ideal sensor."""
     # Only here does the temperature change linearly from hold to hold, as one must guess of a lag.
     design = "abba-48" if name == "thermal_bias" else "long-60"
-    own, effect = atlas(design, approach), EFFECTS[name]
+    own, effect = oracle(design, approach), EFFECTS[name]
     settings = effect.draw(own.session, np.random.default_rng(12))
     if name == "thermal_bias":
         assert settings["tau"] > 0
@@ -173,8 +178,8 @@ def test_what_is_called_invisible_leaves_nothing_and_what_is_outside_no_effect_e
 ):
     """Of the latter, a third of the kinds in each design."""
     for approach in APPROACHES:
-        own = atlas(design, approach)
-        for name in invisible_effects(design, approach):
+        own = oracle(design, approach)
+        for name in own.invisible:
             case = Case("invisible", design, approach, True, (name,))
             effect = generate(case, seeded(9))[1].effects[0]
             cause = Cause(EFFECTS[name], effect.settings, np.array([effect.parameters]))
@@ -353,8 +358,8 @@ def test_the_noise_is_what_it_is_said_to_be(kind):
 @pytest.mark.parametrize(("share", "seen"), [(1e-6, True), (1e-16, False)])
 def test_what_is_only_rounding_of_the_readings_cannot_be_seen(share, seen):
     """A processor rounds as it likes; what is left of rounding is as large as the rounding."""
-    of_design = atlas("spread-24", "robot")
-    warm_up = Kind("warm_up", "output", "p * exp(-time / tau)", typical=share)
+    of_design = oracle("spread-24", "robot")
+    warm_up = replace(EFFECTS["warm_up"], typical=share)
     shape = of_design.shape(warm_up, {"tau": 600.0})
     assert (shape is not None) == seen
 
@@ -365,7 +370,7 @@ def test_what_is_only_rounding_of_the_readings_cannot_be_seen(share, seen):
     ("wound_supply", "spread-24", "gravity"),
 ])  # fmt: skip
 def test_what_does_nothing_in_a_session_cannot_be_seen(kind, design, approach):
-    of_design, effect = atlas(design, approach), OUTSIDE[kind]
+    of_design, effect = oracle(design, approach), OUTSIDE[kind]
     settings = effect.draw(of_design.session, np.random.default_rng(1))
     assert of_design.shape(effect, settings) is None
     assert kind not in visible_outside(design, approach)
@@ -385,12 +390,12 @@ def test_samples_within_the_holds_tell_the_noise():
 
 def test_the_oracle_keeps_its_level_and_knows_what_is_large():
     knowing = oracle("snub-24", "robot")
-    rng, m = np.random.default_rng(14), len(knowing.atlas.together)
-    nothing = knowing.atlas.conditions.left(rng.standard_normal((600, m)))
+    rng, m = np.random.default_rng(14), len(knowing.together)
+    nothing = knowing.conditions.left(rng.standard_normal((600, m)))
     alarms = np.mean([knowing.judge(z, ()).detected for z in nothing])
     assert alarms == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 600))
     right = []
-    for i, name in enumerate(knowing.atlas.visible):
+    for i, name in enumerate(knowing.visible):
         case = Case("one", "snub-24", "robot", False, (name,), (2000.0,))
         truth = generate(case, seeded(15, i))[1]
         (told,) = truth.oracle.told
@@ -403,8 +408,8 @@ def test_the_oracle_keeps_its_level_and_knows_what_is_large():
 
 def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
     knowing = oracle("hand-18", "robot")
-    pairs, shapes = knowing.pairs, knowing.atlas.shapes
-    z = knowing.atlas.conditions.left(np.random.default_rng(16).standard_normal((1, 54)))[0]
+    pairs, shapes = knowing.pairs, knowing.shapes
+    z = knowing.conditions.left(np.random.default_rng(16).standard_normal((1, 54)))[0]
     found = pairs.parts(z)
     for k in range(0, len(found), 37):
         both = np.column_stack([shapes[pairs.first[k]].basis, shapes[pairs.second[k]].basis])

@@ -11,14 +11,12 @@ from snakemake_helpers import snakemake
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
 from studies.hidden.campaigns import parse_hidden, row_of
-from studies.hidden.physics.effects import EFFECTS
-from studies.hidden.physics.kinds import Cause
-from studies.hidden.real_logs import BUMPED, PUT, Donor
-from studies.hidden.real_noise import LogCase, RealNoiseConfig
+from studies.hidden.physics.kinds import EFFECTS, Cause
+from studies.hidden.real_logs import BUMPED, PUT, Donor, LogCase
+from studies.hidden.real_noise import RealNoiseConfig
 from studies.hidden.scoring.judging import judge
 from studies.hidden.scoring.page import frames, score_page
 
@@ -50,7 +48,9 @@ def log(tmp_path_factory):
     samples = np.repeat(output, SIZE, axis=0) + SIGMA * rng.standard_normal((COUNT * SIZE, 3))
     path = tmp_path_factory.mktemp("log") / "log.csv"
     pd.DataFrame(samples, columns=["fx", "fy", "fz"]).to_csv(path, index=False)
-    return Donor(NAME, path, ImportSettings(block=SIZE), 30.0)
+    donor = Donor(NAME, path, ImportSettings(block=SIZE), 30.0)
+    OURS._opened[NAME] = donor
+    return donor
 
 
 def test_the_sensor_of_a_log_is_found(log):
@@ -60,12 +60,12 @@ def test_the_sensor_of_a_log_is_found(log):
     assert log.redundancy == COUNT - 9
 
 
-def test_an_effect_is_put_into_each_reading(log, tmp_path):
+def test_an_effect_is_put_into_each_reading(log):
     """k f² / g, at the force that the sensor felt then."""
     k = np.array([1e-3, -2e-3, 5e-4])
     one = Cause(EFFECTS["quadratic_scale"], {}, k[None])
-    log.write(tmp_path / "log.parquet", [one], None, {})
-    written = pd.read_parquet(tmp_path / "log.parquet")[["fx", "fy", "fz"]].to_numpy()
+    table = log.changed([one], None, {})[0].table
+    written = table.select(["fx", "fy", "fz"]).to_pandas().to_numpy()
     felt = (log.forces - log.sensor.bias) / (1 + log.sensor.scale)
     np.testing.assert_allclose(written - log.forces, k * felt**2 / G, atol=1e-12)
 
@@ -77,13 +77,12 @@ def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
         assert abs(added).max() == 1
 
 
-def test_p_is_that_of_a_nested_fit(log, tmp_path):
+def test_p_is_that_of_a_nested_fit(log):
     """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
-    (row,) = of_log(log, (SQUARE, 0))
+    row = row_of(OURS, SQUARE, 0)
     rng = np.random.default_rng(SQUARE.seed(OURS.seed, 0))
     one = log.drawn("quadratic_scale", 300, None, rng)
-    settings = log.write(tmp_path / "log.parquet", [one], None, {})
-    means = import_log(tmp_path / "log.parquet", settings)[0].forces
+    means = import_log(*log.changed([one], None, {}))[0].forces
 
     def misclosures(p):
         t = np.array([[p[0], p[1], p[2]], [0, p[3], p[4]], [0, 0, p[5]]])
@@ -106,7 +105,7 @@ def test_p_is_that_of_a_nested_fit(log, tmp_path):
 
 @pytest.fixture(scope="module")
 def campaigns(log):
-    return of_job(OURS.of_log(log))
+    return rows(OURS)
 
 
 @pytest.fixture(scope="module")
@@ -114,14 +113,9 @@ def table(campaigns):
     return judge(campaigns)
 
 
-def of_job(job):
-    """Truths and answers of the campaigns of a job."""
-    return [row_of(job, case, k) for case, k in job.campaigns]
-
-
-def of_log(log, *campaigns, config=OURS):
-    """Those of campaigns of a log."""
-    return of_job(config.of_log(log)._replace(campaigns=campaigns))
+def rows(config):
+    """Truths and answers of the campaigns of the log."""
+    return [row_of(config, case, k) for case, k in config.job(*config.jobs)]
 
 
 def test_plain_effects_in_white_noise_are_found(table):
@@ -234,7 +228,7 @@ def test_two_cases_of_a_real_log():
         {**content, "public_folder": str(DATA), "logs": logs, "sizes": [400], "nothing": 1,
          "effects": ["warm_up"]}
     )  # fmt: skip
-    judged = judge(of_job(config.job("mpu9150-2")))
+    judged = judge(rows(config))
     nothing, warm = judged.to_dict("records")
     assert nothing["said"] == "nothing"
     assert warm["said"] == "right name"
@@ -245,11 +239,10 @@ def test_two_cases_of_a_real_log():
 def test_what_is_beside_a_large_effect_has_an_answer():
     """It is found in what the refit leaves, whose slopes tell otherwise than those of the fit."""
     name = "mpu9150-2"
-    path, settings = public_file(name, DATA), import_settings(name)
-    log = Donor(name, path, settings, CONFIG.interval_s)
+    config = CONFIG.model_copy(update={"public_folder": str(DATA)})
     case = LogCase("two", name, effect=("thermal_bias", "cubic_scale"), lam=(400.0, 400.0),
                    recorded=True)  # fmt: skip
-    (row,) = of_log(log, (case, 4), config=CONFIG)
+    row = row_of(config, case, 4)
     assert row["error"] == ""
     assert "thermal_bias" in row["found"]
 

@@ -19,7 +19,7 @@ from studies.positions.stopping import (
     summary_table,
 )
 
-SETTINGS = [*product(("gravity", "robot"), RULES, (1.0,), (250,))]
+SETTINGS = [*product(("gravity", "robot"), RULES, (1.0,), (0,), (250,))]
 
 
 @pytest.fixture(scope="module")
@@ -63,14 +63,14 @@ def test_stopping_does_not_bias_what_the_noise_is_not_part_of(sessions):
 
 
 def test_sessions_depend_on_the_seed_and_on_nothing_else(sessions):
-    again, other = (simulate("robot", "known", 1.0, 250, seed=seed) for seed in (1, 2))
+    again, other = (simulate("robot", "known", 1.0, 0, 250, seed=seed) for seed in (1, 2))
     first = sessions.query("approach == 'robot' and rule == 'known'")
     pd.testing.assert_frame_equal(again, first[again.columns].reset_index(drop=True))
     assert not np.array_equal(again["actual_roll"], other["actual_roll"])
 
 
 def test_a_session_that_does_not_get_there_ends_and_says_so():
-    table = simulate("gravity", "known", 0.5, 5, most_positions=12)
+    table = simulate("gravity", "known", 0.5, 0, 5, most_positions=12)
     assert not table["kept"].any()
     assert (table["positions"] == 12).all()
 

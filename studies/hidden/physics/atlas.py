@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.hidden.physics.designs import Session, session
-from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.designs import Session
 from studies.hidden.physics.geometry import GRAVITY, Array, level_force
-from studies.hidden.physics.kinds import Cause, Kind
+from studies.hidden.physics.kinds import EFFECTS, Cause, Kind
 from studies.hidden.physics.measuring import Sensor, observe
 
 STEP = 1e-5
@@ -151,21 +150,19 @@ class Atlas:
 
     def shape(self, effect: Kind, settings: Mapping[str, float]) -> Shape | None:
         """Shape of an effect with any settings; None if it cannot be seen."""
-        steps = effect.typical * np.eye(effect.k)
+        k, sigma = effect.k, self.session.sigma
+        steps = effect.typical * np.eye(k)
         cause = Cause(effect, dict(settings), np.concatenate([steps, -steps]))
         output, reading = observe(self.session, self.conditions.sensor, (cause,))
-        change = self.conditions.seen(output, reading)
-        left = (change[: effect.k] - change[effect.k :]) / 2
-        raw_force = output[: effect.k] - output[effect.k :]
-        raw_angle = reading[: effect.k] - reading[effect.k :]
-        size = np.sqrt(
-            np.sum((raw_force / self.session.sigma) ** 2)
-            + np.sum((raw_angle * 9.8 / self.session.sigma) ** 2)
-        ) / (2 * np.sqrt(effect.k))
-        readings = float(np.linalg.norm(self.conditions.directions)) * GRAVITY / self.session.sigma
+        seen = self.conditions.seen(output, reading)
+        left, force, angle = ((each[:k] - each[k:]) / 2 for each in (seen, output, reading))
+        size = float(
+            np.hypot(np.linalg.norm(force), GRAVITY * np.linalg.norm(angle)) / sigma / np.sqrt(k)
+        )
+        readings = float(np.linalg.norm(self.conditions.directions)) * GRAVITY / sigma
         if size < ROUNDING * readings:  # else what is left would be a matter of the processor
             return None
-        return Shape.of(effect, settings, left, float(size))
+        return Shape.of(effect, settings, left, size)
 
     @cached_property
     def shapes(self) -> tuple[Shape, ...]:
@@ -182,6 +179,12 @@ class Atlas:
     def visible(self) -> tuple[str, ...]:
         """Names of the effects that can be seen."""
         return tuple(dict.fromkeys(shape.effect.name for shape in self.shapes))
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Names of the effects that the session has, but that cannot be seen."""
+        had = (name for name, effect in EFFECTS.items() if effect.shows(self.session))
+        return tuple(name for name in had if name not in self.visible)
 
     @cached_property
     def together(self) -> Array:
@@ -222,24 +225,3 @@ class Atlas:
             if cosines[-1] > ALIKE:
                 names.add(self.shapes[i].effect.name)
         return tuple(name for name in EFFECTS if name in names)
-
-
-@cache
-def atlas(design: str, approach: str) -> Atlas:
-    """The atlas of a design by an approach."""
-    return Atlas(Conditions(session(design), approach, Sensor()))
-
-
-def visible_effects(design: str, approach: str) -> tuple[str, ...]:
-    """Names of the effects that a design can see by an approach."""
-    return atlas(design, approach).visible
-
-
-def invisible_effects(design: str, approach: str) -> tuple[str, ...]:
-    """Names of the effects that a design has, but cannot see."""
-    of_design = atlas(design, approach)
-    return tuple(
-        name
-        for name, effect in EFFECTS.items()
-        if effect.shows(of_design.session) and name not in of_design.visible
-    )

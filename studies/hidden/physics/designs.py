@@ -141,13 +141,9 @@ def _snub_cube() -> Array:
     """The 24 corners of a snub cube: even permutations with even signs, and odd ones with odd."""
     t = (1 + np.cbrt(19 + 3 * np.sqrt(33)) + np.cbrt(19 - 3 * np.sqrt(33))) / 3
     corner = np.array([1.0, 1 / t, t]) / np.sqrt(1 + 1 / t**2 + t**2)
-    corners = []
-    for order in permutations(range(3)):
-        parity = np.linalg.det(np.eye(3)[list(order)])
-        for signs in product((1.0, -1.0), repeat=3):
-            if np.prod(signs) == parity:
-                corners.append(np.array(signs) * corner[list(order)])
-    return np.array(corners)
+    ways = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
+    alike = (way for way in ways if np.linalg.det(np.eye(3)[[*way[0]]]) == np.prod(way[1]))
+    return np.array([np.array(signs) * corner[[*order]] for order, signs in alike])
 
 
 def _faces_and_edges() -> Array:
@@ -177,91 +173,70 @@ def _held(
     hold: float = 20.0,
     pause: float | None = None,
     wait: tuple[float, int] = (0.0, 1),
-    warms: Callable[[Array], Array] | tuple[float, ...] | None = None,
+    warms: Callable[[Array], Array] | None = None,
+    blocks: tuple[float, ...] = (),
     yaw: Array | None = None,
     **more: Any,
 ) -> Session:
     """Session of holds of so many seconds with pauses; without a pause no time was written down.
 
     `wait` is how long somebody waits between so many equal blocks of holds. The temperature is a
-    function of the time, or one for each block, and changes between them.
+    function of the time, or one for each of the blocks, and changes between them.
     """
-    n, (between, blocks), course = len(directions), wait, None
-    time: Array | None = None
+    n, time, course = len(directions), None, None
     if pause is not None:
-        waited = between * np.repeat(np.arange(blocks), n // blocks)
-        time = np.asarray(hold / 2 + (hold + pause) * np.arange(n) + waited, dtype=float)
-    if callable(warms) and time is not None:
+        waited = wait[0] * np.repeat(np.arange(wait[1]), n // wait[1])
+        time = hold / 2 + (hold + pause) * np.arange(n) + waited
         grid = np.linspace(0.0, time[-1] + 60.0, 200)
-        course = Course(grid, warms(grid))
-    elif isinstance(warms, tuple) and time is not None:
-        ends = [end for block in np.array_split(time, blocks) for end in (block[0], block[-1])]
-        course = Course(np.array(ends), np.repeat(warms, 2))
+        if warms:
+            course = Course(grid, warms(grid))
+        if blocks:
+            parts = np.array_split(time, wait[1])
+            course = Course(np.ravel([part[[0, -1]] for part in parts]), np.repeat(blocks, 2))
+    yaw = np.zeros(n) if yaw is None else yaw
     joints = joints_of(directions)
-    turned = np.zeros(n) if yaw is None else yaw
-    return Session("", joints, turned, sigma, ANGLE_SIGMA, samples, hold, time, course, **more)
+    return Session("", joints, yaw, sigma, ANGLE_SIGMA, samples, hold, time, course, **more)
 
 
-def _spread_24(rng: np.random.Generator) -> Session:
-    def warms(t: Array) -> Array:
-        return 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170)
-
-    return _held(rng.permutation(_spiral(24, rng)), 0.002, 3000, 30.0, 20.0, warms=warms)
-
-
-def _abba_48(rng: np.random.Generator) -> Session:
+def _there_and_back(rng: np.random.Generator) -> Array:
+    """Twelve directions, the same back, and twice in another order."""
     one = rng.permutation(_spiral(12, rng))
-    all_ = np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)])
-    warms, yaw = (12.0, 34.0, 34.0, 12.0), rng.uniform(-np.pi, np.pi, 48)
-    return _held(all_, 0.001, 2000, 20.0, 20.0, (900.0, 4), warms, yaw)
+    return np.concatenate([one, one[::-1], rng.permutation(one), rng.permutation(one)])
 
 
-def _hand_18(rng: np.random.Generator) -> Session:
-    directions = _by_hand(_faces_and_edges(), rng)
-    return _held(directions, 0.003, 400, yaw=rng.uniform(-0.5, 0.5, 18))
-
-
-def _repeats_30(rng: np.random.Generator) -> Session:
-    def warms(t: Array) -> Array:
-        return 24 - 3 * np.cos(2 * np.pi * t / 1900)
-
-    directions = rng.permutation(np.tile(_spiral(15, rng), (2, 1)))
-    yaw, vibration = rng.uniform(-np.pi, np.pi, 30), 0.1 + 1.4 * rng.random(30) ** 2
-    return _held(directions, 0.0005, 6000, 60.0, 30.0, warms=warms, yaw=yaw, vibration=vibration)
-
-
-def _yaw_50(rng: np.random.Generator) -> Session:
-    directions = rng.permutation(_spiral(50, rng))
-    return _held(directions, 0.003, 1000, 15.0, 12.0, yaw=rng.uniform(-np.pi, np.pi, 50))
-
-
-def _long_60(rng: np.random.Generator) -> Session:
-    def warms(t: Array) -> Array:
-        return 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310)
-
-    directions = rng.permutation(np.tile(_by_hand(_spiral(20, rng), rng), (3, 1)))
-    yaw, vibration = rng.uniform(-np.pi, np.pi, 60), 0.2 + 2.0 * rng.random(60)
-    return _held(directions, 0.005, 200, 20.0, 25.0, warms=warms, yaw=yaw, vibration=vibration,
-                 full_range=19.6133)  # fmt: skip
-
-
-def _two_warm_36(rng: np.random.Generator) -> Session:
+def _twice(rng: np.random.Generator) -> Array:
+    """18 directions in two orders."""
     one = _spiral(18, rng)
-    both = np.concatenate([rng.permutation(one), rng.permutation(one)])
-    return _held(both, 0.002, 2500, 25.0, 10.0, (1200.0, 2), (21.0, 38.0))
+    return np.concatenate([rng.permutation(one), rng.permutation(one)])
 
 
+# Each draws the directions first.
 _DESIGNS: dict[str, Callable[[np.random.Generator], Session]] = {
-    "spread-24": _spread_24,
-    "abba-48": _abba_48,
+    "spread-24": lambda rng: _held(
+        rng.permutation(_spiral(24, rng)), 0.002, 3000, 30.0, 20.0,
+        warms=lambda t: 21 + 7 * (1 - np.exp(-t / 500)) + 0.6 * np.sin(t / 170)),
+    "abba-48": lambda rng: _held(
+        _there_and_back(rng), 0.001, 2000, 20.0, 20.0, (900.0, 4),
+        blocks=(12.0, 34.0, 34.0, 12.0), yaw=rng.uniform(-np.pi, np.pi, 48)),
     "circles-24": lambda rng: _held(_three_circles(), 0.002, 500, 10.0, 15.0),
     "snub-24": lambda rng: _held(rng.permutation(_snub_cube()), 0.002),
-    "hand-18": _hand_18,
-    "repeats-30": _repeats_30,
-    "yaw-50": _yaw_50,
-    "long-60": _long_60,
-    "two-warm-36": _two_warm_36,
-}
+    "hand-18": lambda rng: _held(
+        _by_hand(_faces_and_edges(), rng), 0.003, 400, yaw=rng.uniform(-0.5, 0.5, 18)),
+    "repeats-30": lambda rng: _held(
+        rng.permutation(np.tile(_spiral(15, rng), (2, 1))), 0.0005, 6000, 60.0, 30.0,
+        warms=lambda t: 24 - 3 * np.cos(2 * np.pi * t / 1900),
+        yaw=rng.uniform(-np.pi, np.pi, 30), vibration=0.1 + 1.4 * rng.random(30) ** 2),
+    "yaw-50": lambda rng: _held(
+        rng.permutation(_spiral(50, rng)), 0.003, 1000, 15.0, 12.0,
+        yaw=rng.uniform(-np.pi, np.pi, 50)),
+    "long-60": lambda rng: _held(
+        rng.permutation(np.tile(_by_hand(_spiral(20, rng), rng), (3, 1))), 0.005, 200, 20.0, 25.0,
+        warms=lambda t: 30 - 9 * np.exp(-t / 700) + 2.5 * np.sin(t / 310),
+        yaw=rng.uniform(-np.pi, np.pi, 60), vibration=0.2 + 2.0 * rng.random(60),
+        full_range=19.6133),
+    "two-warm-36": lambda rng: _held(
+        _twice(rng), 0.002, 2500, 25.0, 10.0, (1200.0, 2), blocks=(21.0, 38.0)),
+}  # fmt: skip
 
 DESIGNS = tuple(_DESIGNS)
 """Names of the designs."""

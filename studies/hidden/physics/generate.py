@@ -13,14 +13,12 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
-from studies.hidden.physics.atlas import Atlas, Conditions, Shape
-from studies.hidden.physics.effects import EFFECTS
+from studies.hidden.physics.atlas import Conditions, Shape
 from studies.hidden.physics.geometry import GRAVITY, Array
 from studies.hidden.physics.gross import GROSS
-from studies.hidden.physics.kinds import Cause, Place
+from studies.hidden.physics.kinds import EFFECTS, NOWHERE, Cause, Place
 from studies.hidden.physics.measuring import Noise, Sensor, observe
 from studies.hidden.physics.oracle import Oracle, Verdict, oracle
-from studies.hidden.physics.outside import NOWHERE
 
 
 @dataclass(frozen=True)
@@ -156,7 +154,7 @@ def generate(
     """
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
-    planned = knowing.atlas.session
+    planned = knowing.session
     # No joint comes to rest exactly where it was sent.
     arrived = planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape)
     session = replace(
@@ -201,7 +199,7 @@ def generate(
     truth = Truth(
         effects=tuple(map(HiddenEffect.of, causes, sizes)),
         classes=tuple(same for _, same in known),
-        oracle=knowing.judge(left_of(knowing.atlas, sensor, forces, reading), case.lam),
+        oracle=knowing.judge(left_of(knowing, sensor, forces, reading), case.lam),
         noise=dict(vars(noise)),
         gross={"name": case.gross or "", "settings": settings},
         sensor={name: value.tolist() for name, value in vars(sensor).items()},
@@ -210,10 +208,10 @@ def generate(
     return campaign, truth
 
 
-def left_of(of_design: Atlas, sensor: Sensor, output: Array, reading: Array) -> Array:
+def left_of(knowing: Oracle, sensor: Sensor, output: Array, reading: Array) -> Array:
     """What a calibration leaves of the misclosures, (m,), whatever the sensor is."""
     corrected = (output - sensor.bias) @ sensor.correction.T
-    return of_design.conditions.seen(corrected[None], reading[None])[0]
+    return knowing.conditions.seen(corrected[None], reading[None])[0]
 
 
 DRAWS = 200
@@ -243,23 +241,22 @@ def drawn(
     InputError
         If the design cannot see the effect.
     """
-    of_design = knowing.atlas
     effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
         parameters = effect.typical * rng.standard_normal((1, effect.k))
         return Cause(effect, effect.draw(conditions.session, rng), parameters), (name,)
-    if effect.shows(of_design.session):
+    if effect.shows(knowing.session):
         for _ in range(DRAWS):
-            shape = of_design.shape(effect, effect.draw(of_design.session, rng))
+            shape = knowing.shape(effect, effect.draw(knowing.session, rng))
             if shape is None:
                 continue
             cause, change = _scaled(shape, lam, conditions, rng)
             if name in EFFECTS or knowing.is_outside(change):
-                return cause, of_design.same_as(shape)
+                return cause, knowing.same_as(shape)
     approach = "robot" if conditions.robot else "gravity"
     raise InputError(
-        f"{of_design.session.name}, {approach}: cannot see {name} as such; "
-        f"it sees {', '.join(of_design.visible)}"
+        f"{knowing.session.name}, {approach}: cannot see {name} as such; "
+        f"it sees {', '.join(knowing.visible)}"
     )
 
 

@@ -1,7 +1,8 @@
-"""What a kind of physics is: a formula, what it changes, and how its settings are drawn.
+"""Kinds of physics: a formula, what it changes, and how its settings are drawn.
 
-A formula is an expression of the parameters p (B, 1, k), the forces f (B, n, 3) along the axes, the
-settings of the kind, and what is known of the holds: `COORDINATES` in columns, (n, 1), with the
+`kinds.yaml` is the table of all of them: what the catalogue of effects knows, and what was never in
+it. A formula is an expression of the parameters p (B, 1, k), the forces f (B, n, 3) along the axes,
+the settings of the kind, and what is known of the holds: `COORDINATES` in columns, (n, 1), with the
 functions of `VOCABULARY`. So a kind needs of a session what its formula names.
 """
 
@@ -9,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
+from pathlib import Path
+from types import CodeType
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 
 from studies.hidden.physics.designs import REFERENCE, Session
 from studies.hidden.physics.geometry import GRAVITY, Array, flange_force
@@ -35,12 +40,6 @@ RIG: Mapping[str, Array | float] = {
 which it sees g (a, b, −1) for g (0, 0, −1), (B, n, 2); turn of the roll axis against the pitch axis
 (B, n); attitude of the flange less that of the joints (B, n, 2); rotation of the sensor on it
 (B, n, 3); errors of the encoders (B, n, 2)."""
-USUAL: Mapping[str, tuple[int, float]] = {
-    "bias": (3, 5e-3), "scale": (3, 5e-4), "output": (3, 2e-3), "clipping": (3, 5e-2),
-    "gravity": (1, 3e-3), "tilt": (2, 5e-4), "skew": (1, 3e-4), "deflection": (2, 2e-4),
-    "mounting": (3, 1e-3), "reading": (2, 2e-4),
-}  # fmt: skip
-"""Target -> number of parameters and usual size of one, SI, where a kind has no other."""
 OF_ROBOT = ("angle", "yaw", "move")
 """Coordinates that a campaign without the robot's angles does not have."""
 STILL = 0.02
@@ -152,69 +151,104 @@ class Setting(NamedTuple):
     grid: Callable[[Session], Sequence[float]] = lambda x: ()
 
 
-def between(low: float, high: float) -> Setting:
-    """Anything between two bounds."""
-    return Setting(lambda x, rng: rng.uniform(low, high))
+FEWEST = 3
+"""Least number of holds on either side of a sudden change."""
 
 
-def one_of(*values: float) -> Setting:
-    """One of some values."""
+def _between_holds(x: Session, i: int, part: float) -> float:
+    """Time when hold i (from 0) is over and the next has not begun."""
+    low, high = x.clock[i], x.clock[i + 1]
+    pause = 0.0 if x.time is None else min(x.length, 0.9 * (high - low))
+    return float(low + pause / 2 + part * (high - low - pause))
+
+
+def _moment(x: Session, rng: np.random.Generator) -> float:
+    i = int(rng.integers(FEWEST - 1, x.n - FEWEST))
+    return _between_holds(x, i, rng.uniform(0.1, 0.9))
+
+
+SETTINGS = {
+    "phase": Setting(lambda x, rng: rng.uniform(0, TURN)),
+    "seed": Setting(lambda x, rng: float(rng.integers(1 << 31))),  # of what is random in itself
+    "hold": Setting(lambda x, rng: float(rng.integers(x.n))),
+    "moment": Setting(_moment, lambda x: [_between_holds(x, i, 0.5) for i in range(1, x.n - 2)]),
+    "decay": Setting(
+        lambda x, rng: x.duration * float(np.exp(rng.uniform(np.log(0.06), np.log(0.8)))),
+        lambda x: [x.duration * float(part) for part in np.geomspace(0.05, 1.0, 9)],
+    ),
+    "knee": Setting(
+        lambda x, rng: GRAVITY * rng.uniform(0.55, 0.93),
+        lambda x: [GRAVITY * float(part) for part in np.arange(0.525, 0.98, 0.05)],
+    ),
+    "lag": Setting(
+        lambda x, rng: x.duration * rng.uniform(0.05, 0.33) if rng.random() < 0.5 else 0.0,
+        lambda x: [x.duration * part for part in (0.0, 0.04, 0.08, 0.14, 0.2, 0.27, 0.34)],
+    ),
+}
+"""Settings by the names that the table has for them."""
+
+
+def setting(said: str | list[float] | dict[str, list[float]]) -> Setting:
+    """Setting of the table: a name, two bounds, or values."""
+    if isinstance(said, str):
+        return SETTINGS[said]
+    if isinstance(said, list):
+        low, high = said
+        return Setting(lambda x, rng: rng.uniform(low, high))
+    values = said["one of"]
     return Setting(lambda x, rng: float(rng.choice(values)), lambda x: values)
 
-
-PHASE = between(0, TURN)
-SEED = Setting(lambda x, rng: float(rng.integers(1 << 31)))
-"""Of what is random in itself."""
 
 # --- kinds ----------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, eq=False)
 class Kind:
     """One kind of physics.
 
     Attributes
     ----------
     name : str, canonical, if the catalogue has it
-    target : str, of `USUAL`
-    code : the formula, which gives the change of the target
-    coordinate : str, if it is a function of one coordinate of the holds; empty else
-    typical : float, usual size of a parameter, SI
+    target : str, of the sensor (`OUTPUTS`) or the rig (`RIG`)
+    change : str, the formula, which gives the change of the target
     k : int, number of parameters
+    typical : float, usual size of a parameter, SI
     settings : mapping of str to Setting
-    needs : set of the attributes of a session without which it does not exist
+    of : str, if it is a function of one coordinate of the holds, which; empty else
     """
 
-    def __init__(
-        self,
-        name: str,
-        target: str,
-        formula: str,
-        coordinate: str = "",
-        *,
-        typical: float | None = None,
-        count: int | None = None,
-        **settings: Setting,
-    ) -> None:
-        self.name, self.target, self.coordinate = name, target, coordinate
-        k, size = USUAL[target]
-        self.k, self.typical, self.settings = count or k, typical or size, settings
-        self.code = compile(formula, name, "eval")
-        named = (COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES)
-        self.needs = set(filter(None, named))
+    name: str
+    target: str
+    change: str
+    k: int
+    typical: float
+    settings: Mapping[str, Setting]
+    of: str = ""
+
+    @cached_property
+    def code(self) -> CodeType:
+        """The formula, to be evaluated."""
+        return compile(self.change, self.name, "eval")
 
     @property
     def place(self) -> Place | None:
         """Coordinate and target; to turn the flange is to misread the joints."""
         target = "reading" if self.target == "deflection" else self.target
-        return (self.coordinate, target) if self.coordinate else None
+        return (self.of, target) if self.of else None
 
     def shows(self, session: Session) -> bool:
         """Whether a session has what it needs."""
         return all(getattr(session, name) is not None for name in self.needs)
 
+    @property
+    def needs(self) -> set[str]:
+        """Attributes of a session without which it does not exist."""
+        named = {COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES}
+        return named - {""}
+
     def has_place(self, robot: bool) -> bool:
         """Whether it has a place whose coordinate a campaign records, with the robot or without."""
-        return self.place is not None and (robot or self.coordinate not in OF_ROBOT)
+        return self.place is not None and (robot or self.of not in OF_ROBOT)
 
     def draw(self, session: Session, rng: np.random.Generator) -> dict[str, float]:
         """Draw its settings."""
@@ -243,6 +277,21 @@ class Cause:
         return np.asarray(eval(self.kind.code, VOCABULARY, names))
 
 
-def table(*kinds: Kind) -> dict[str, Kind]:
-    """Kinds by name."""
-    return {kind.name: kind for kind in kinds}
+_TABLE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text("utf-8"))
+
+
+def _kinds(group: str) -> dict[str, Kind]:
+    kinds = {}
+    for name, entry in _TABLE[group].items():
+        settings = {key: setting(said) for key, said in entry.get("settings", {}).items()}
+        kinds[name] = Kind(
+            name, **_TABLE["targets"][entry["target"]] | entry | {"settings": settings}
+        )
+    return kinds
+
+
+EFFECTS, GROSS_EFFECTS = _kinds("catalogue"), _kinds("gross")
+"""What the catalogue knows, by name."""
+OUTSIDE, UNFORESEEN = _kinds("outside"), _kinds("unforeseen")
+NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
+"""Effects that are not in the catalogue, by name."""

@@ -99,7 +99,7 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
     knowing = oracle(case.design, case.approach)
     shown = [
         left_of(
-            knowing.atlas,
+            knowing,
             Sensor(**{name: np.array(values) for name, values in (truth.sensor or {}).items()}),
             campaign.forces,
             np.zeros((len(campaign.forces), 2)) if campaign.angles is None else campaign.angles,
@@ -113,7 +113,7 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
 def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:
     """Effects of the type with their typical parameters; sudden events have none."""
     knowing = oracle(case.design, case.approach)
-    conditions = Conditions(knowing.atlas.session, case.approach, Sensor())
+    conditions = Conditions(knowing.session, case.approach, Sensor())
     known = {
         name: drawn(name, case.lam, conditions, knowing, rng)
         for name, share in zip(case.effects, case.shares, strict=True)

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, softmax
 
-from studies.hidden.physics.atlas import Atlas, atlas
+from studies.hidden.physics.atlas import Atlas, Conditions
+from studies.hidden.physics.designs import session
 from studies.hidden.physics.geometry import Array
-from studies.hidden.physics.outside import NOWHERE
+from studies.hidden.physics.kinds import NOWHERE
+from studies.hidden.physics.measuring import Sensor
 
 Class = tuple[str, ...]
 
@@ -55,29 +57,26 @@ class Verdict:
     alternatives: int = 0
 
 
-@dataclass(frozen=True)
-class Oracle:
-    """The oracle of a design by one approach."""
-
-    atlas: Atlas
+class Oracle(Atlas):
+    """The oracle of a session by one approach: an atlas of it, by which campaigns are judged."""
 
     @cached_property
     def threshold(self) -> float:
         """Smallest p-value of a shape that chance beats in 5 % of all campaigns."""
-        m = len(self.atlas.together)
+        m = len(self.together)
         z = np.random.default_rng(m).standard_normal((SIMULATIONS, m))
-        smallest = np.min(self._p_values(self.atlas.conditions.left(z)), axis=1)
+        smallest = np.min(self._p_values(self.conditions.left(z)), axis=1)
         return float(np.quantile(smallest, LEVEL))
 
     @cached_property
     def pairs(self) -> Pairs:
         """All pairs of shapes of different effects."""
-        return Pairs(self.atlas)
+        return Pairs(self)
 
     @cached_property
     def classes(self) -> tuple[Class, ...]:
         """What each shape cannot be told from."""
-        return tuple(self.atlas.same_as(shape) for shape in self.atlas.shapes)
+        return tuple(self.same_as(shape) for shape in self.shapes)
 
     def is_outside(self, change: Array) -> bool:
         """Whether misclosures (m,) are not like those of any two effects of the catalogue."""
@@ -102,14 +101,14 @@ class Oracle:
         return Verdict(detected, told if detected else (), told, alternatives)
 
     def _p_values(self, z: Array) -> Array:
-        return np.asarray(chdtrc(self.atlas.dims, self.atlas.parts(z)))
+        return np.asarray(chdtrc(self.dims, self.parts(z)))
 
     def _one(self, z: Array, sizes: Sequence[float]) -> tuple[tuple[Class, ...], int]:
         # Where nothing is missing, or nothing of the catalogue, any usual size will do.
-        atlas, size = self.atlas, sizes[0] if sizes else 25.0
-        names = [shape.effect.name for shape in atlas.shapes]
+        size = sizes[0] if sizes else 25.0
+        names = [shape.effect.name for shape in self.shapes]
         starts = np.array([i for i, name in enumerate(names) if i == 0 or name != names[i - 1]])
-        logs, best = _most_probable(_evidence(atlas.parts(z), atlas.dims, size), starts)
+        logs, best = _most_probable(_evidence(self.parts(z), self.dims, size), starts)
         by_class: dict[Class, float] = {}
         for i, log in zip(starts, logs, strict=True):
             alike = self.classes[i]
@@ -182,21 +181,20 @@ def _evidence(parts: Array, dims: Array | NDArray[np.int_], size: float) -> Arra
 @cache
 def oracle(design: str, approach: str) -> Oracle:
     """The oracle of a design by an approach."""
-    return Oracle(atlas(design, approach))
+    return Oracle(Conditions(session(design), approach, Sensor()))
 
 
 @cache
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
     """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
     knowing, visible = oracle(design, approach), []
-    session = knowing.atlas.session
     for name, effect in NOWHERE.items():
-        if not effect.shows(session):
+        if not effect.shows(knowing.session):
             continue
         # No kind changes what another one draws.
         rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
         for _ in range(DRAWS):
-            shape = knowing.atlas.shape(effect, effect.draw(session, rng))
+            shape = knowing.shape(effect, effect.draw(knowing.session, rng))
             if shape is not None:
                 direction = rng.standard_normal(shape.dim)
                 outside += knowing.is_outside(shape.basis @ direction)

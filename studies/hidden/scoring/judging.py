@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from accelstudy.effects import effect_names
 from studies.hidden.physics.designs import DESIGNS, session
+from studies.hidden.physics.kinds import NOWHERE
 from studies.hidden.physics.oracle import CREDIBLE
-from studies.hidden.physics.outside import NOWHERE
+from studies.hidden.scoring.tables import SCORES
 from studies.hidden.study import Row, family_of
 
-Class = Sequence[str]
+Class = Collection[str]
 """Names that mean the same in a campaign."""
 
 LARGE = 150.0
@@ -28,9 +30,6 @@ LEARNABLE: Mapping[str, Sequence[str]] = {
 }
 """Target -> coordinates of which the diagnosis can learn a function for it."""
 
-VERDICTS = ("named", "narrowed", "learned", "unknown", "noise_model", "gross_error")
-"""Verdicts that something is missing; the first two give effects."""
-RIGHT, NEAR, OTHER, NONE = "right name", "family or set", "other name", "no answer"
 P_CLASSES = {"> 0.01": 1.1, "10⁻⁴ … 0.01": 1e-2, "< 10⁻⁴": 1e-4}
 """Classes of the p-value of the F test that knows the form, and their upper ends."""
 
@@ -64,61 +63,55 @@ def judge(rows: Iterable[Row], own: Mapping[str, Sequence[str]] | None = None) -
     DataFrame
         The same with the answers to all questions; of a diagnosis that failed all are no
     """
-    return pd.DataFrame([_judged(row, (own or {}).get(row["design"], ())) for row in rows])
+    judged = pd.DataFrame([_judged(row, (own or {}).get(row["design"], ())) for row in rows])
+    for name, question in SCORES["score"]["columns"].items():
+        judged[name] = judged.eval(question, engine="python")
+    return judged.assign(said=[_said(row) for row in judged.to_dict("records")])
 
 
 def _judged(row: Row, own: Sequence[str]) -> Row:
-    """Truth and answer of a campaign, and the answers to all questions about it."""
+    """Truth and answer of a campaign, and what else is asked about it."""
     ok, true, place, oracle = not row["error"], row["classes"], row["true_place"], row["oracle"]
-    explanations = row.get("credible_set", [])
-    given = [*zip(row.get("found", ()), row.get("positions", ()), strict=True)]
-    verdict = row["verdict"] if ok else ""
-    if own:
-        explanations = [
-            {**one, "names": names}
-            for one in explanations
-            if (names := [name for name in one["names"] if name not in own])
-        ]
-        given = [(name, position) for name, position in given if name not in own]
-        if verdict in ("named", "narrowed") and not given:
-            verdict = "no_effect"
-    found = [name for name, _ in given]
+    explanations = [
+        {**one, "names": names}
+        for one in row.get("credible_set", ())
+        if (names := [name for name in one["names"] if name not in own])
+    ]
+    answers = zip(row.get("found", ()), row.get("positions", ()), strict=True)
+    given = [(name, position) for name, position in answers if name not in own]
+    found, verdict = [name for name, _ in given], row["verdict"] if ok else ""
+    if own and verdict in ("named", "narrowed") and not found:
+        verdict = "no_effect"
     names = [[name] for name in found]
     hits = [same_effects([[name] for name in one["names"]], true) for one in explanations]
     in_set = {name for one in explanations for name in one["names"]}
     answered, learned = verdict in ("named", "narrowed"), verdict == "learned"
-    right, correct = answered and same_effects(names, true), answered and all_true(names, true)
-    has_oracle = bool(true and oracle)
-    oracle_found = has_oracle and oracle["detected"]
+    best, told = (oracle[key] if oracle else [] for key in ("best", "told"))
     top: Row = explanations[0] if explanations else {"names": [], "posterior": np.nan}
     certain = [{*names} for names in row.get("certain", ())]
     stated = [any(names & {*one} for one in true) for names in certain]
     covered = [any(names & {*one} for names in certain) for one in true]
-    strange = NOWHERE.get(row["what"])
+    strange, gross = NOWHERE.get(row["what"]), row["gross"]
+    bump = gross["settings"].get("position")
     true_noise = row["design"] in DESIGNS  # of a log it is not known
-    judged = {
+    return {
         **row,
         "verdict": verdict,
         "found": found,
         "credible_set": explanations,
         "ok": ok,
-        "alarm": ok and verdict != "no_effect",
         "confirmed": ok and row["confirmed"],
-        **{name: verdict == name for name in VERDICTS},
-        "answered": answered,
-        "right": right,
-        # A narrowed answer only says that it is one of the set.
-        "wrong": answered and not correct and not (verdict == "narrowed" and any(hits)),
-        "one_of_two": correct and not right,
-        "recognised": verdict == "gross_error" and _recognised(row["gross"], dict(given)),
-        "one_name": len(names) == 1,
+        # All effects, and no others; of some effects the names, and no others.
+        "right": answered and same_effects(names, true),
+        "correct": answered and all_true(names, true),
+        # A gross error is named, and a bumped position where it is.
+        "recognised": verdict == "gross_error"
+        and any(name == gross["name"] and bump in (None, at) for name, at in given),
         "large": row["size"] >= LARGE
         and (row["sigma"] == "given" or (true_noise and session(row["design"]).repeats)),
         "explained": explained(row["fits"], row["design"]) if learned and true_noise else np.nan,
-        "set_given": bool(explanations),
         "set_holds": any(hits),
         "set_names": len(in_set),
-        "set_explanations": len(explanations),
         "set_has_noise": bool(in_set - {*effect_names()}),
         "set_posterior": sum(one["posterior"] for one in explanations),
         "explanation": "+".join(top["names"]),
@@ -126,43 +119,35 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "top_right": any(hits[:1]),
         "covered": np.mean(covered) if ok and true else np.nan,
         "misstated": np.mean(np.logical_not(stated)) if stated else np.nan,
-        "has_oracle": has_oracle,
-        "oracle_found": oracle_found,
-        "oracle_right": oracle_found and same_effects(oracle["best"], true),
-        "oracle_told": oracle["told"] if oracle else [],
+        "has_oracle": bool(true and oracle),
+        "oracle_found": bool(true and oracle and oracle["detected"]),
+        "oracle_right": same_effects(best, true),
+        "oracle_told": told,
         "oracle_alternatives": oracle["alternatives"] if oracle else np.nan,
-        "told_right": has_oracle and same_effects(oracle["told"], true),
+        "told_right": same_effects(told, true),
         "its_place": ", ".join(strange.place if strange and strange.place else ("–",)),
         "has_place": place is not None,
         "learnable": place is not None and place[0] in LEARNABLE.get(place[1], ()),
         "place_right": learned and place is not None and row["place"] == place,
-        "place_wrong": learned and place is not None and row["place"] != place,
         "its_column": "not recorded" if row["recorded"] is False else "recorded",
         "p_class": next((p for p, end in [*P_CLASSES.items()][::-1] if row["p_known"] < end), None),
     }
-    return judged | {"said": _said(judged)}
 
 
-def _recognised(gross: Row, places: Mapping[str, float | None]) -> bool:
-    """Whether a gross error is named, and a bumped position where it is."""
-    true, name = gross["settings"].get("position"), gross["name"]
-    return name in places and (true is None or places[name] == true)
-
-
-def _said(row: Row) -> str:
+def _said(row: Mapping[Any, Any]) -> str:
     """What an answer says of what is hidden, in two or three words.
 
     "family or set": of two effects one; a set that holds the right names; other names of the same
     families; or a verdict "unknown" that leaves no doubt of such a family. Without its column, what
     a temperature does is a slow change in time.
     """
-    verdict = row["verdict"]
+    verdict, near = row["verdict"], "family or set"
     if not row["ok"]:
-        return NONE
+        return "no answer"
     if row["right"] or row["recognised"]:
-        return RIGHT
+        return "right name"
     if row["one_of_two"] or (verdict == "narrowed" and row["set_holds"]):
-        return NEAR
+        return near
     slow = family_of("warm_up") if row["its_column"] == "not recorded" else ()
     heat = family_of("thermal_bias") if slow else ()
     families = [
@@ -171,13 +156,13 @@ def _said(row: Row) -> str:
     ]
     if verdict in ("named", "narrowed", "gross_error"):
         found = [[name] for name in row["found"]]
-        return NEAR if families and all_true(found, [[*family] for family in families]) else OTHER
+        return near if families and all_true(found, families) else "other name"
     certain = [
         sum(one["posterior"] for one in row["credible_set"] if family & {*one["names"]})
         for family in families
     ]
     if verdict == "unknown" and max(certain, default=0.0) >= CREDIBLE:
-        return NEAR
+        return near
     return str({"no_effect": "nothing", "noise_model": "noise"}.get(verdict, verdict))
 
 

@@ -54,9 +54,8 @@ def write_score(
 
 def frames(rows: Sequence[Row], config: Config) -> Frames:
     """What a score asks: the judged campaigns, and the simpler methods on some of them."""
-    logs = config.logs if isinstance(config, RealNoiseConfig) else {}
-    judged = judge(rows, {name: log.own for name, log in logs.items()})
-    judged["truth"] = judged["design"].map({name: log.note for name, log in logs.items()})
+    judged = judge(rows, {name: log.own for name, log in config.logs.items()})
+    judged["truth"] = judged["design"].map({name: log.note for name, log in config.logs.items()})
     order = {"set": pd.CategoricalDtype([*SETS]), "p_class": pd.CategoricalDtype([*P_CLASSES])}
     return {"campaigns": judged.astype(order), "methods": method_rows(judged)}
 
@@ -65,8 +64,8 @@ def method_rows(judged: pd.DataFrame) -> pd.DataFrame:
     """The simpler methods, the diagnosis and the oracle on the same campaigns, a row of each."""
     rows = []
     for row in judged.dropna(subset="methods").to_dict("records"):
-        answers = {**row["methods"]}
-        answers["diagnosis"] = row["alarm"], row["found"] if row["answered"] else []
+        named = row["found"] if row["answered"] else []
+        answers = row["methods"] | {"diagnosis": (row["alarm"], named)}
         if row["oracle"]:
             answers["oracle"] = row["oracle"]["detected"], row["oracle"]["best"]
         true = row["classes"]

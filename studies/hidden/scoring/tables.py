@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
-from accelstudy.basics.wording import number, words
+from accelstudy.basics.wording import words
 from studies.hidden.study import Row
 
 HERE = Path(__file__).parent
@@ -37,18 +37,18 @@ class Measured(NamedTuple):
     high: float
     n: int
 
-    def text(self, how: str = "share") -> str:
-        """Write it as a share, mean or median, or as its `interval`, `n`, `count`, or `of` n."""
+    def text(self, statistic: str = "share") -> str:
+        """Write it as a share, mean or median, or as its n, count, or count of n."""
         count = f"{self.value * self.n:.0f}" if self.n else "0"
-        low, high = map(share_text, (self.low, self.high))
-        between = "–" if low == "–" else f"{low} … {high}"
-        texts = {
-            "interval": between if self.n else "",
-            "n": str(self.n),
-            "count": count,
-            "of": f"{count} of {self.n}" if self.n else "–",
-        }
-        return texts.get(how, share_text(self.value))
+        of = f"{count} of {self.n}" if self.n else "–"
+        texts = {"n": str(self.n), "count": count, "of": of}
+        return texts.get(statistic, share_text(self.value))
+
+    @property
+    def interval(self) -> str:
+        """Write the interval."""
+        ends = [*map(share_text, (self.low, self.high))]
+        return "" if not self.n else "–" if "–" in ends else " … ".join(ends)
 
 
 def chosen(rows: pd.DataFrame, question: Mapping[str, Any]) -> pd.DataFrame:
@@ -98,17 +98,11 @@ def answer(rows: pd.DataFrame, question: Question) -> str:
 
 
 def label(value: Any) -> str:
-    """Write a cell that is no share: names, sets of them, a number or a yes."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return number(value)
+    """Write a cell that is no share: a name, or lists of names."""
     if isinstance(value, list):
-        names = (one if isinstance(one, str) else " = ".join(one) for one in value)
-        value = " + ".join(names) or None
-    if value is None or "/" in str(value):  # what identifies a campaign stays as it is
-        return str(value or "–")
-    return words(str(value))
+        value = " + ".join(one if isinstance(one, str) else " = ".join(one) for one in value)
+    text = str(value or "–")
+    return text if "/" in text else words(text)  # what identifies a campaign stays as it is
 
 
 # --- tables ---------------------------------------------------------------------------------------
@@ -161,7 +155,7 @@ def target_rows(line: Mapping[str, Any], rows: pd.DataFrame) -> Iterator[Row]:
         yield {
             **{"figure": line["figure"], "campaigns": line["campaigns"].format(size=size)},
             **{"target": target, "measured": measured.text()},
-            **{"95 % interval": measured.text("interval"), "n": measured.n, "met": met},
+            **{"95 % interval": measured.interval, "n": measured.n, "met": met},
         }
 
 
