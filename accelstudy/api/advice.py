@@ -29,7 +29,7 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential import wording
 from accelstudy.sequential.advisor import Advice, advise
 from accelstudy.sequential.choice import DEFAULTS, candidates
-from accelstudy.sequential.estimate import NOTHING_KNOWN, Prior
+from accelstudy.sequential.prior import Prior
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_as_it_is
 
@@ -187,10 +187,10 @@ class Adviser:
         return suggested.calibrate(self.place, self._called, self.approach.name, self.type)
 
 
-def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType:
-    """What an earlier calibration, or a type, says; nothing without one."""
+def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:
+    """What an earlier calibration, or a type, says; None without one."""
     if given is None:
-        return NOTHING_KNOWN
+        return None
     if given.suffix in TYPES:
         return read_type(given, wanted)
     earlier = as_calibration(given).sensor
