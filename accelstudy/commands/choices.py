@@ -158,13 +158,14 @@ def schemes(
     from accelstudy.schemes import get_scheme, scheme_families, scheme_names
     from accelstudy.sensors.models import get_model
     from accelstudy.simulation.hold_plan import check_needs_no_plan
+    from accelstudy.simulation.sessions import Noise
 
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
     check_needs_no_plan(chosen_model)
     rows = []
     for name in track(names or scheme_names(), "schemes"):
         chosen = get_scheme(name)
-        determined = estimability(chosen, chosen_model, chosen_approach)
+        determined = estimability(chosen, chosen_model, chosen_approach, blur=Noise().sigma_force)
         rows.append(
             {
                 "scheme": chosen.name,

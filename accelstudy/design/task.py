@@ -181,16 +181,20 @@ class Task:
         return np.full(2, np.inf) if tilt is None else tilt.rms
 
     def missing(self, directions: Array) -> str:
-        """Why positions do not determine the model; empty if they do."""
-        columns = np.flatnonzero(self.estimated)
-        if not self.information(directions).undetermined(columns).any():
-            return ""
-        scheme = Scheme("allowed", "allowed", directions, "generated", "")
-        hold = HoldPlan().hold(len(directions))
-        determined = estimability(
-            scheme, self.model, self.approach, self.noise, None, self.gravity, hold
-        )
-        return determined.reason or "they hardly determine the model"
+        """Why readings in positions do not determine the model; empty if they do."""
+        measured = directions
+        if self.measured is not None:
+            measured = np.concatenate([self.measured, directions])
+        return estimability(
+            Scheme("allowed", "allowed", measured, "generated", ""),
+            self.model,
+            self.approach,
+            self.noise,
+            gravity=self.gravity,
+            hold=HoldPlan().hold(len(measured)),
+            known={name: (0.0, sigma) for name, sigma in self.prior_sigmas.items()},
+            blur=self.noise.sigma_force,
+        ).reason
 
 
 def extended_model(model: SensorModel, effects: list[str]) -> SensorModel:
