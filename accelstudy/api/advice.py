@@ -50,6 +50,7 @@ class SessionAdvice(Result):
 
     def __init__(self, advice: Advice, session: Campaign, adviser: Adviser) -> None:
         self.advice, self.session, self._adviser = advice, session, adviser
+        self.name = session.name
 
     @classmethod
     def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
@@ -57,11 +58,6 @@ class SessionAdvice(Result):
         place = place_of(campaign)
         now = as_campaign(campaign) if place is None else read_as_it_is(place).campaign
         return Adviser(now, place, **given)(now)
-
-    @property
-    def name(self) -> str:
-        """Name of the campaign."""
-        return self.session.name
 
     @property
     def enough(self) -> bool:
