@@ -176,7 +176,7 @@ class Calibration(Result):
         """
         return accelstudy.apply(self, log, start=start, sigma=sigma)
 
-    def export(self, form: str = "json") -> str:
+    def export(self, form: str = "c") -> str:
         """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
         return export.export(self.sensor, form)
 
