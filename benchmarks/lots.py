@@ -23,6 +23,7 @@ from accelstudy.basics.shares import clopper_pearson
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
+from studies.hidden.physics.generate import Case
 from studies.hidden.physics.lots import LotCase, generate_lot, lot_oracle
 from studies.hidden.physics.measuring import NOISES
 from studies.hidden.physics.oracle import oracle, visible_outside
@@ -89,23 +90,23 @@ def lot_of(kind, seed):
         design, approach = rng.choice(DESIGNS), rng.choice(APPROACHES)
         choices = kind.choices(str(design), str(approach))
         known = bool(rng.integers(2))
-        if kind.mixed:
-            # What is not stated cannot be stated wrongly.
-            known = True if kind.noises else (True, False, None)[rng.integers(3)]
+        # What is not stated cannot be stated wrongly.
+        sigmas = ()
+        if kind.mixed and kind.noises:
+            known = True
+        elif kind.mixed:
+            sigmas = ((True,), (False,), (False, True))[rng.integers(3)]
         if not choices:
             continue
         effects = choices[rng.integers(len(choices))]
+        lam = (kind.lam,) * len(effects)
+        noise = str(rng.choice(kind.noises)) if kind.noises else None
         case = LotCase(
-            kind.title,
-            str(design),
-            str(approach),
-            known,
-            effects,
+            Case("lot", str(design), str(approach), known, effects, lam, noise),
             kind.shares,
-            kind.lam,
-            str(rng.choice(kind.noises)) if kind.noises else None,
-            MIXED if kind.mixed else (1.0,),
             DESIGNS if kind.mixed and not effects else (),
+            sigmas,
+            MIXED if kind.mixed else (),
         )
         try:
             return case, list(generate_lot(case, SENSORS, seed.spawn(1)[0]))
@@ -118,7 +119,8 @@ def judged(job):
     logging.disable()
     number, i, seed = job
     kind = KINDS[number]
-    case, made = lot_of(kind, np.random.SeedSequence([seed, number, i]))
+    asked, made = lot_of(kind, np.random.SeedSequence([seed, number, i]))
+    case = asked.case
     truths = [truth for _, truth in made]
     lot = weigh_lot([campaign for campaign, _ in made], get_model(MODEL))
     classes = {}
@@ -126,7 +128,7 @@ def judged(job):
         for effect, same in zip(truth.effects, truth.classes, strict=True):
             classes.setdefault(effect.name, {effect.name}).update(same)
     if case.noise is not None:
-        classes = {case.noise: {NOISES[case.noise]}}
+        classes = {case.noise: {NOISES[case.noise][0]}}
     told = [found for found, _ in lot.effects] if lot.explained else []
     told = [found for found in told if not found.names[0].startswith(UNNAMED)]
     right = {
@@ -144,9 +146,9 @@ def judged(job):
         "shares": [f.share_ci95[0] <= np.mean(has[n]) <= f.share_ci95[1] for n, f in right.items()
                    if kind.shares],
         "sensors": [
-            bool({*names} & classes[case.effects[0]]) for _, names, _ in lot.each()
+            bool({*names} & classes[case.effect[0]]) for _, names, _ in lot.each()
         ] if kind.shares == (1.0,) and kind.named else [],
-        "oracle": same_effects(lot_oracle(case, made).told, [*classes.values()])
+        "oracle": same_effects(lot_oracle(asked, made).told, [*classes.values()])
                   if kind.named and len(kind.shares) == 1 and of_type and not kind.mixed else None,
         "odd": None if of_type else carriers <= odd,
         "odd wrongly": bool(odd - carriers),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +26,7 @@ from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import TableSource
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
-from studies.hidden.physics.atlas import Atlas, Conditions, Shape
+from studies.hidden.physics.conditions import Conditions, Shape
 from studies.hidden.physics.designs import ANGLE_SIGMA, Course, Session
 from studies.hidden.physics.generate import Case, HiddenEffect, Truth
 from studies.hidden.physics.geometry import GRAVITY, Array, joints_of
@@ -56,7 +57,10 @@ class Donor:
     timed : bool, whether the log itself gives the time
     spans : Spans
     own : sequence of str, an effect that it has by itself, by any of these names
+    course : Course, of a temperature that acts on the sensor; None for none
     """
+
+    course: Course | None = None
 
     def __init__(
         self, name: str, path: Path, given: ImportSettings, interval: float, own: Sequence[str] = ()
@@ -89,40 +93,41 @@ class Donor:
     @cached_property
     def sigma(self) -> float:
         """Noise of a position mean, m/s², as the residuals of the log itself have it."""
-        left = residuals(self.atlas(self.spans, None), means_of(self.forces, self.spans))
+        left = residuals(self.oracle(self.spans), means_of(self.forces, self.spans))
         return float(np.sqrt(np.sum(left**2) / self.redundancy))
 
-    def atlas(self, spans: Spans, course: Course | None, sigma: float = 1.0) -> Oracle:
-        """All that holds can show; what the log has by itself is absorbed."""
-        means, (starts, ends) = means_of(self.forces, spans), spans.T
-        joints = joints_of((means - self.sensor.bias) @ self.sensor.correction.T)
-        length = float(np.median(self.time[ends - 1] - self.time[starts]))
-        time = (self.time[starts] + self.time[ends - 1]) / 2
-        session = Session(
-            self.name,
-            joints,
-            np.zeros(len(spans)),
-            sigma,
-            ANGLE_SIGMA,
-            length=length,
-            time=time,
-            course=course,
-        )
-        atlas = Oracle(Conditions(session, "gravity", self.sensor))
-        for name in self.own[:1]:
-            shape = atlas.shape(EFFECTS[name], {})
-            assert shape is not None
-            atlas.conditions.absorb(shape.basis)
-        return atlas
+    def at(self, course: Course | None) -> Donor:
+        """The same log at another temperature."""
+        other = copy(self)
+        other.course = course
+        return other
 
-    def unit(self, kind: Kind, settings: Mapping[str, float], course: Course | None) -> Array:
+    def oracle(self, spans: Spans, sigma: float = 1.0) -> Oracle:
+        """All that holds can show; what the log has by itself is absorbed."""
+        felt = (means_of(self.forces, spans) - self.sensor.bias) @ self.sensor.correction.T
+        first, last = self.time[spans[:, 0]], self.time[spans[:, 1] - 1]
+        length, time, still = (
+            float(np.median(last - first)),
+            (first + last) / 2,
+            np.zeros(len(felt)),
+        )
+        noise = sigma, ANGLE_SIGMA, 0
+        session = Session(self.name, joints_of(felt), still, *noise, length, time, self.course)
+        knowing = Oracle(Conditions(session, "gravity", self.sensor))
+        for name in self.own[:1]:
+            shape = knowing.shape(EFFECTS[name], {})
+            assert shape is not None
+            knowing.conditions.absorb(shape.basis)
+        return knowing
+
+    def unit(self, kind: Kind, settings: dict[str, float]) -> Array:
         """What each parameter of a kind adds to the readings, (k, N, 3)."""
         felt, time = (self.forces - self.sensor.bias) / (1 + self.sensor.scale), self.time
         if kind.name in BY_HOLD:
             felt, time = means_of(felt, self.spans), time[self.spans[:, 0]]
         joints = np.zeros((len(time), 2))
-        session = Session(self.name, joints, time, 1.0, 1.0, time=time, course=course)
-        added = Cause(kind, dict(settings), np.eye(kind.k)).change(felt[None], session)
+        session = Session(self.name, joints, time, 1.0, 1.0, time=time, course=self.course)
+        added = Cause(kind, settings, np.eye(kind.k)).change(felt[None], session)
         if kind.name not in BY_HOLD:
             return added
         # A move is shared by the holds around it.
@@ -130,7 +135,7 @@ class Donor:
         return added[:, np.searchsorted(middles, np.arange(len(self.forces)), side="right")]
 
     def shape(
-        self, kind: Kind, settings: Mapping[str, float], atlas: Atlas, spans: Spans
+        self, kind: Kind, settings: dict[str, float], knowing: Oracle, spans: Spans
     ) -> tuple[Array, Shape]:
         """What each parameter of a kind leaves in holds, (k, m), of unit weight, and its shape.
 
@@ -139,47 +144,48 @@ class Donor:
         InputError
             If they cannot show it.
         """
-        holds = means_of(self.unit(kind, settings, atlas.session.course), spans)
-        left = atlas.conditions.left(atlas.conditions.changed(holds))
-        size = float(np.linalg.norm(holds)) / atlas.session.sigma / np.sqrt(kind.k)
+        holds = means_of(self.unit(kind, settings), spans)
+        left = knowing.conditions.left(knowing.conditions.changed(holds))
+        size = float(np.linalg.norm(holds)) / knowing.session.sigma / np.sqrt(kind.k)
         shape = Shape.of(kind, settings, left, size)
         if shape is None:
             raise InputError(f"{self.name}: cannot show {kind.name}")
         return left, shape
 
-    def drawn(
-        self, name: str, size: float, course: Course | None, rng: np.random.Generator
-    ) -> Cause:
+    def drawn(self, name: str, size: float, rng: np.random.Generator) -> Cause:
         """Draw an effect that has a noncentrality in the log."""
-        kind, atlas = PUT[name], self.atlas(self.spans, course, self.sigma)
-        settings = kind.draw(atlas.session, rng)
+        kind, knowing = PUT[name], self.oracle(self.spans, self.sigma)
+        settings = kind.draw(knowing.session, rng)
         if "t" in settings:  # between two holds: what jumps within one is another effect
             starts, ends = self.spans.T
             between = (self.time[ends[:-1] - 1] + self.time[starts[1:]]) / 2
             settings["t"] = float(between[np.argmin(abs(between - settings["t"]))])
-        left, shape = self.shape(kind, settings, atlas, self.spans)
+        left, shape = self.shape(kind, settings, knowing, self.spans)
         parameters = shape.drawn(rng)
         factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
-        return Cause(kind, settings, parameters[None] * factor)
+        return Cause(kind, settings, parameters[None] * factor, size)
 
     def changed(
-        self, causes: Sequence[Cause], course: Course | None, columns: Mapping[str, Array]
+        self, causes: Sequence[Cause], recorded: bool
     ) -> tuple[TableSource, ImportSettings]:
-        """The log with effects in its readings, and columns; and how it is imported."""
+        """The log with effects in its readings, and how it is imported.
+
+        If that is `recorded`, it has columns of the temperature and the time.
+        """
         given, added = self.settings, np.zeros(self.forces.shape)
         for one in causes:
-            added += np.tensordot(one.parameters[0], self.unit(one.kind, one.settings, course), 1)
+            added += np.tensordot(one.parameters[0], self.unit(one.kind, one.settings), 1)
         conversion = conversion_of(given.unit, given.scale, given.offset)
         raw = conversion.from_si(given.axes.from_frd(self.forces + added))
-        if given.unit == "counts":
-            raw = np.round(raw)
-        table = {**dict(zip(("fx", "fy", "fz"), raw.T, strict=True)), **columns}
-        if given.time is not None:
-            table["time"] = self.time
-        names = {name: name for name in table if name != "time"}
-        layout = {"columns": names, "time": "time" if "time" in table else None, "time_unit": "s"}
-        settings = given.model_copy(update={**layout, "variable": None})
-        return TableSource(self.name, pa.table(table)), settings
+        raw = np.round(raw) if given.unit == "counts" else raw
+        table = dict(zip(("fx", "fy", "fz"), raw.T, strict=True))
+        if recorded and self.course is not None:
+            table["temperature"] = np.round(self.course.at(self.time), 1)
+        columns, time = {name: name for name in table}, None
+        if given.time is not None or (recorded and not self.timed):
+            table["time"], time = self.time, "time"
+        layout = {"columns": columns, "time": time, "time_unit": "s", "variable": None}
+        return TableSource(self.name, pa.table(table)), given.model_copy(update=layout)
 
 
 def means_of(values: Array, spans: Spans) -> Array:
@@ -195,9 +201,9 @@ def spans_of(campaign: Campaign, holds: Holds | None) -> Spans:
     return holds.table.loc[campaign.positions, ["start", "end"]].to_numpy()
 
 
-def residuals(atlas: Atlas, forces: Array) -> Array:
+def residuals(knowing: Oracle, forces: Array) -> Array:
     """Residuals (m,) of unit weight of a calibration by forces (n, 3)."""
-    return atlas.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
+    return knowing.conditions.seen(forces[None], np.zeros((1, len(forces), 2)))[0]
 
 
 def p_value(z: Array, shapes: Sequence[Shape], redundancy: int) -> float:
@@ -255,23 +261,18 @@ class LogCase(Case):
 
 def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tuple[Campaign, Truth]:
     """Put effects into a log, and import it."""
-    rng, course, columns = np.random.default_rng(seed), None, dict[str, Array]()
+    rng = np.random.default_rng(seed)
     if any("temperature" in PUT[name].needs for name in case.effect) or not case.effect:
-        course = _course(float(log.time[-1]), rng)
-    sizes = [*zip(case.effect, case.lam, strict=True)]
-    causes = [log.drawn(name, lam, course, rng) for name, lam in sizes]
-    if case.recorded and course is not None:
-        columns["temperature"] = np.round(course.at(log.time), 1)
-    if case.recorded and not log.timed:
-        columns["time"] = log.time
-    campaign, holds = import_log(*log.changed(causes, course, columns))
-    truth = Truth(tuple(map(HiddenEffect.of, causes, case.lam)))
+        log = log.at(_course(float(log.time[-1]), rng))
+    causes = [log.drawn(name, lam, rng) for name, lam in zip(case.effect, case.lam, strict=True)]
+    campaign, holds = import_log(*log.changed(causes, bool(case.recorded)))
+    truth = Truth(tuple(map(HiddenEffect.of, causes)))
     if not causes:
         return campaign, truth
     spans = spans_of(campaign, holds)
-    atlas, lost = log.atlas(spans, course, log.sigma), len(log.spans) - len(spans)
-    shapes = [log.shape(one.kind, one.settings, atlas, spans)[1] for one in causes]
-    z = residuals(atlas, campaign.forces)
+    knowing, lost = log.oracle(spans, log.sigma), len(log.spans) - len(spans)
+    shapes = [log.shape(one.kind, one.settings, knowing, spans)[1] for one in causes]
+    z = residuals(knowing, campaign.forces)
     truth = replace(truth, p_known=p_value(z, shapes, log.redundancy - lost))
     if BUMPED in case.effect:
         # The hold in which the bumped one lies, whatever its number became.
@@ -279,8 +280,8 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tupl
         place = campaign.positions[(spans[:, 0] <= middle) & (middle < spans[:, 1])].tolist()
         gross = {"name": BUMPED, "settings": {"position": place[0] if place else None}}
         return campaign, replace(truth, gross=gross)
-    said = atlas.judge(z, case.lam)
-    return campaign, replace(truth, classes=tuple(map(atlas.same_as, shapes)), oracle=said)
+    said = knowing.judge(z, case.lam)
+    return campaign, replace(truth, classes=tuple(map(knowing.same_as, shapes)), oracle=said)
 
 
 def _course(duration: float, rng: np.random.Generator) -> Course:

@@ -6,7 +6,7 @@ that can show it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import combinations, product
 from math import ceil
@@ -28,8 +28,8 @@ from studies.hidden.physics.kinds import EFFECTS, OUTSIDE, UNFORESEEN
 from studies.hidden.physics.measuring import NOISES
 from studies.hidden.physics.oracle import oracle, visible_outside
 
-Names = OneOrMore[str]
-Sizes = OneOrMore[Positive]
+Session = tuple[str, str, bool]
+"""Design, approach and whether sigma is given."""
 Numbered = tuple[Case, int]
 """A case, and the number of the campaign among those of the case."""
 
@@ -58,7 +58,7 @@ TRIPLES, SIMILAR = 60, 0.8
 def distinct_triples(design: str, approach: str) -> tuple[tuple[str, str, str], ...]:
     """Sets of three effects, all over those that a session can show and easily distinguish."""
     seen = oracle(design, approach)
-    cosines = seen.cosines()
+    cosines = dict(zip(combinations(seen.visible, 2), seen.pairs.cosines, strict=True))
     triples = [
         names
         for names in combinations(seen.visible, 3)
@@ -94,22 +94,22 @@ class Nothing(Block):
 class Kinds(Block):
     """Campaigns with one thing each that has no size: wrong noise, gross or invisible."""
 
-    kinds: Names = Field(["all"], description="names, or all")
+    kinds: OneOrMore[str] = Field(["all"], description="names, or all")
     campaigns: Replicates = Field(description="of each kind")
 
 
 class Sized(Block):
     """Campaigns with one thing each, in several sizes."""
 
-    kinds: Names = Field(["all"], description="names, or all")
-    sizes: Sizes = Field(description="noncentralities λ")
+    kinds: OneOrMore[str] = Field(["all"], description="names, or all")
+    sizes: OneOrMore[Positive] = Field(description="noncentralities λ")
     campaigns: Replicates = Field(description="of each kind and size")
 
 
 class Several(Block):
     """Campaigns with two or three effects each."""
 
-    sizes: Sizes = Field(description="noncentralities λ, of each effect")
+    sizes: OneOrMore[Positive] = Field(description="noncentralities λ, of each effect")
     campaigns: Replicates = Field(description="of each size, each with effects at random")
 
 
@@ -133,8 +133,8 @@ class HiddenConfig(Study):
     score: ClassVar = "score"
     logs: ClassVar[Mapping[str, Any]] = {}
 
-    designs: Names = Field(["all"], description="sessions that are simulated, or all")
-    approaches: Names = Field(["all"], description="gravity, robot, or all")
+    designs: OneOrMore[str] = Field(["all"], description="sessions that are simulated, or all")
+    approaches: OneOrMore[str] = Field(["all"], description="gravity, robot, or all")
     sigma: OneOrMore[Literal["given", "not given"]] = Field(
         default=["given", "not given"], description="whether a campaign says how large its noise is"
     )
@@ -169,7 +169,7 @@ class HiddenConfig(Study):
         return self
 
     @property
-    def places(self) -> list[tuple[str, str, bool]]:
+    def places(self) -> list[Session]:
         """Combinations of design, approach and whether sigma is given."""
         designs = DESIGNS if self.designs == ["all"] else self.designs
         approaches = APPROACHES if self.approaches == ["all"] else self.approaches
@@ -194,14 +194,21 @@ class HiddenConfig(Study):
         InputError
             If no session of the study can show a kind that the configuration names.
         """
-        counted = [pair for cases, count in self._cases() for pair in _spread(cases, count)]
-        places = self.places
+        numbered, places = list[Numbered](), self.places
+        for name, kind, size, count in self._wanted():
+            cases = [case for place in places for case in _cases(name, kind, size, place)]
+            if not cases and kind and getattr(self, name).kinds != ["all"]:
+                raise InputError(f"{name}.kinds: no session of the study can show {kind}")
+            # Which cases get one more is as good as random.
+            each, more = divmod(count, max(len(cases), 1))
+            for i, case in enumerate(sorted(cases, key=Case.digest)):
+                numbered += [(case, k) for k in range(each + (i < more))]
 
-        def session(pair: tuple[Case, int]) -> tuple[tuple[str, ...], int]:
-            case = pair[0]
+        def session(one: Numbered) -> tuple[tuple[str, ...], int]:
+            case = one[0]
             return removed(case), places.index((case.design, case.approach, case.sigma_known))
 
-        return [(case, k) for case, count in sorted(counted, key=session) for k in range(count)]
+        return sorted(numbered, key=session)
 
     def job(self, name: str) -> list[Numbered]:
         """Campaigns of a job by its name: a part of all of them."""
@@ -220,36 +227,16 @@ class HiddenConfig(Study):
                 for size in getattr(block, "sizes", [None]):
                     yield name, kind, size, block.campaigns
 
-    def _cases(self) -> Iterator[tuple[list[Case], int]]:
-        """Cases among which the campaigns of each kind and size are spread, and how many."""
-        for name, kind, size, count in self._wanted():
-            cases = []
-            for place in self.places:
-                for what in _hidden(name, kind, *place[:2]):
-                    hidden = {name: kind} if name in ("noise", "gross") else {"effect": what}
-                    lam = () if size is None else (size,) * len(what)
-                    set_ = name.replace("nothing", "null")
-                    cases.append(Case(set_, *place, lam=lam, **hidden))
-            if not cases and kind and getattr(self, name).kinds != ["all"]:
-                raise InputError(f"{name}.kinds: no session of the study can show {kind}")
-            yield cases, count
 
-
-def _hidden(name: str, kind: str, design: str, approach: str) -> Iterable[tuple[str, ...]]:
-    """What may be hidden in campaigns of a block and kind, as a session can show it."""
+def _cases(name: str, kind: str, size: float | None, session: Session) -> Iterator[Case]:
+    """Cases of a block, kind and size, in a session that can show what is hidden."""
     if name == "nothing":
-        return [()]
-    if name in SEVERAL:
-        return SEVERAL[name](design, approach)
-    return [(kind,)] if kind in KINDS[name][1](design, approach) else []
-
-
-def _spread(cases: Sequence[Case], count: int) -> Iterator[Numbered]:
-    """Spread campaigns over cases; which cases get one more is as good as random."""
-    each, more = divmod(count, max(len(cases), 1))
-    for i, case in enumerate(sorted(cases, key=Case.digest)):
-        if number := each + (i < more):
-            yield case, number
+        yield Case("null", *session)
+    elif name in SEVERAL or kind in KINDS[name][1](*session[:2]):
+        for effect in SEVERAL[name](*session[:2]) if name in SEVERAL else [(kind,)]:
+            lam = () if size is None else (size,) * len(effect)
+            hidden = {name: kind} if name in ("noise", "gross") else {"effect": effect, "lam": lam}
+            yield Case(name, *session, **hidden)
 
 
 @cache

@@ -20,9 +20,8 @@ def main(folder: Path) -> None:
     settings = track(stopping.SETTINGS, "sessions")
     sessions = pd.concat([stopping.simulate(*each) for each in settings], ignore_index=True)
     sessions.to_parquet(folder / "sessions.parquet")
-    table = efficiency.efficiency_table(efficiency.TASKS, efficiency.SCHEMES, efficiency.POSITIONS)
     made = {
-        "efficiency": (table, efficiency.efficiency_figure),
+        "efficiency": (efficiency.efficiency_table(), efficiency.efficiency_figure),
         "stopping": (stopping.summary_table(sessions), stopping.stopping_figure),
     }
     for name, (rows, draw) in made.items():

@@ -32,7 +32,9 @@ SEED = 1
 
 
 def efficiency_table(
-    tasks: Iterable[Task], schemes: Sequence[Scheme], positions: Sequence[int]
+    tasks: Iterable[Task] = TASKS,
+    schemes: Sequence[Scheme] = SCHEMES,
+    positions: Sequence[int] = POSITIONS,
 ) -> pd.DataFrame:
     """Efficiency of schemes and of I-optimal designs by each criterion.
 

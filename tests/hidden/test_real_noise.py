@@ -64,7 +64,7 @@ def test_an_effect_is_put_into_each_reading(log):
     """k f² / g, at the force that the sensor felt then."""
     k = np.array([1e-3, -2e-3, 5e-4])
     one = Cause(EFFECTS["quadratic_scale"], {}, k[None])
-    table = log.changed([one], None, {})[0].table
+    table = log.changed([one], False)[0].table
     written = table.select(["fx", "fy", "fz"]).to_pandas().to_numpy()
     felt = (log.forces - log.sensor.bias) / (1 + log.sensor.scale)
     np.testing.assert_allclose(written - log.forces, k * felt**2 / G, atol=1e-12)
@@ -72,7 +72,7 @@ def test_an_effect_is_put_into_each_reading(log):
 
 def test_what_acts_from_hold_to_hold_is_constant_within_each(log):
     for name, settings in (("hysteresis", {}), (BUMPED, {"row": 3.0})):
-        added = log.unit(PUT[name], settings, None).reshape(3, COUNT, SIZE, 3)
+        added = log.unit(PUT[name], settings).reshape(3, COUNT, SIZE, 3)
         assert np.ptp(added, axis=2).max() == 0
         assert abs(added).max() == 1
 
@@ -81,8 +81,8 @@ def test_p_is_that_of_a_nested_fit(log):
     """The misclosures of the norm, fitted without and with the form, by a solver of its own."""
     row = row_of(OURS, SQUARE, 0)
     rng = np.random.default_rng(SQUARE.seed(OURS.seed, 0))
-    one = log.drawn("quadratic_scale", 300, None, rng)
-    means = import_log(*log.changed([one], None, {}))[0].forces
+    one = log.drawn("quadratic_scale", 300, rng)
+    means = import_log(*log.changed([one], False))[0].forces
 
     def misclosures(p):
         t = np.array([[p[0], p[1], p[2]], [0, p[3], p[4]], [0, 0, p[5]]])

@@ -13,10 +13,10 @@ import numpy as np
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.session import Campaign
-from studies.hidden.physics.atlas import Conditions, Shape
+from studies.hidden.physics.conditions import Conditions, Shape
 from studies.hidden.physics.geometry import GRAVITY, Array
 from studies.hidden.physics.gross import GROSS
-from studies.hidden.physics.kinds import EFFECTS, NOWHERE, Cause, Place
+from studies.hidden.physics.kinds import EFFECTS, NOWHERE, OF_ROBOT, Cause, Place
 from studies.hidden.physics.measuring import Noise, Sensor, observe
 from studies.hidden.physics.oracle import Oracle, Verdict, oracle
 
@@ -58,15 +58,10 @@ class Case:
         return self.lam[0] if self.lam else nan
 
     @property
-    def sigma(self) -> str:
-        """Whether the campaigns state their sigma, in words."""
-        return "given" if self.sigma_known else "not given"
-
-    @property
     def name(self) -> str:
         """Name, unique within a study."""
-        size = f"{self.size:g}" if self.lam else ""
-        parts = self.set, self.what, size, self.design, self.approach, f"sigma {self.sigma}"
+        size, known = f"{self.size:g}" if self.lam else "", "" if self.sigma_known else "not "
+        parts = self.set, self.what, size, self.design, self.approach, f"sigma {known}given"
         return "/".join(filter(None, parts))
 
     def digest(self, *numbers: int) -> bytes:
@@ -94,9 +89,9 @@ class HiddenEffect:
     lam: float
 
     @classmethod
-    def of(cls, cause: Cause, lam: float) -> HiddenEffect:
+    def of(cls, cause: Cause) -> HiddenEffect:
         """Effect of a cause."""
-        return cls(cause.kind.name, cause.settings, tuple(cause.parameters[0].tolist()), lam)
+        return cls(cause.kind.name, cause.settings, tuple(cause.parameters[0].tolist()), cause.lam)
 
 
 @dataclass(frozen=True)
@@ -128,14 +123,12 @@ class Truth:
 
 ARRIVAL = 5e-4
 """rad, sd of the joints about the attitudes of the design."""
-Known = tuple[Cause, tuple[str, ...]]
-"""An effect, and the names that mean the same."""
 
 
 def generate(
     case: Case,
     seed: np.random.SeedSequence,
-    given: Mapping[str, Known] | None = None,
+    given: Mapping[str, Cause] | None = None,
     roughness: float = 1.0,
 ) -> tuple[Campaign, Truth]:
     """Simulate a campaign.
@@ -155,55 +148,47 @@ def generate(
     rng = np.random.default_rng(seed)
     knowing = oracle(case.design, case.approach)
     planned = knowing.session
-    # No joint comes to rest exactly where it was sent.
-    arrived = planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape)
     session = replace(
         planned,
-        joints=arrived,
+        # No joint comes to rest exactly where it was sent.
+        joints=planned.joints + ARRIVAL * rng.standard_normal(planned.joints.shape),
         sigma=planned.sigma * roughness,
         n_samples=round(planned.n_samples / roughness**2),
     )
     sensor = Sensor.drawn(rng)
     conditions = Conditions(session, case.approach, sensor)
     sizes = case.lam or (0.0,) * len(case.effect)
-    known = [
+    causes = [
         (given or {}).get(name) or drawn(name, lam, conditions, knowing, rng)
         for name, lam in zip(case.effect, sizes, strict=True)
     ]
-    causes = [cause for cause, _ in known]
     output, encoders = (part[0] for part in observe(session, sensor, causes))
     noise = Noise.drawn(case.noise, session, rng)
     forces = noise.read(output, session, rng)
     reading = encoders + session.sigma_angle * rng.standard_normal(encoders.shape)
-    more: dict[str, Any] = {}
+    recorded = ("time", "temperature", "vibration", "full_range")
+    more: dict[str, Any] = {name: getattr(session, name) for name in recorded}
     if conditions.robot:
-        more = {"angles": reading, "sigma_angle": session.sigma_angle, "yaw": session.yaw}
+        more |= {"angles": reading, "sigma_angle": session.sigma_angle, "yaw": session.yaw}
     if n := session.n_samples:
         more |= {"sd": noise.sds(session, rng), "n_samples": np.full(session.n, n)}
-    campaign = Campaign(
-        name=f"hidden {case.design}",
-        positions=np.arange(1, session.n + 1),
-        forces=forces,
-        gravity=GRAVITY,
-        sigma_force=session.sigma if case.sigma_known else None,
-        time=session.time,
-        temperature=session.temperature,
-        vibration=session.vibration,
-        full_range=session.full_range,
-        **more,
-    )
+    if case.sigma_known:
+        more["sigma_force"] = session.sigma
+    positions = np.arange(1, session.n + 1)
+    campaign = Campaign(f"hidden {case.design}", positions, forces, gravity=GRAVITY, **more)
     settings: dict[str, float] = {}
     if case.gross is not None:
         campaign, settings = GROSS[case.gross](campaign, rng, session.sigma, conditions)
     strange = NOWHERE.get(case.effect[0]) if case.effect else None
+    seen = strange and (conditions.robot or strange.of not in OF_ROBOT)
     truth = Truth(
-        effects=tuple(map(HiddenEffect.of, causes, sizes)),
-        classes=tuple(same for _, same in known),
+        effects=tuple(map(HiddenEffect.of, causes)),
+        classes=tuple(cause.same for cause in causes),
         oracle=knowing.judge(left_of(knowing, sensor, forces, reading), case.lam),
         noise=dict(vars(noise)),
         gross={"name": case.gross or "", "settings": settings},
         sensor={name: value.tolist() for name, value in vars(sensor).items()},
-        true_place=strange.place if strange and strange.has_place(conditions.robot) else None,
+        true_place=strange.place if strange and seen else None,
     )
     return campaign, truth
 
@@ -220,8 +205,8 @@ DRAWS = 200
 
 def drawn(
     name: str, lam: float, conditions: Conditions, knowing: Oracle, rng: np.random.Generator
-) -> Known:
-    """Draw an effect, and say what means the same.
+) -> Cause:
+    """Draw an effect.
 
     Parameters
     ----------
@@ -231,11 +216,6 @@ def drawn(
         sensor that has the effect
     knowing : Oracle, of the design
 
-    Returns
-    -------
-    cause : Cause
-    same : tuple of str, names of the catalogue
-
     Raises
     ------
     InputError
@@ -244,15 +224,14 @@ def drawn(
     effect = EFFECTS.get(name) or NOWHERE[name]
     if not lam:
         parameters = effect.typical * rng.standard_normal((1, effect.k))
-        return Cause(effect, effect.draw(conditions.session, rng), parameters), (name,)
+        return Cause(effect, effect.draw(conditions.session, rng), parameters, same=(name,))
     if effect.shows(knowing.session):
         for _ in range(DRAWS):
             shape = knowing.shape(effect, effect.draw(knowing.session, rng))
-            if shape is None:
-                continue
-            cause, change = _scaled(shape, lam, conditions, rng)
-            if name in EFFECTS or knowing.is_outside(change):
-                return cause, knowing.same_as(shape)
+            if shape is not None:
+                cause, change = _scaled(shape, lam, conditions, rng)
+                if name in EFFECTS or knowing.is_outside(change):
+                    return replace(cause, same=knowing.same_as(shape))
     approach = "robot" if conditions.robot else "gravity"
     raise InputError(
         f"{knowing.session.name}, {approach}: cannot see {name} as such; "
@@ -265,7 +244,7 @@ def _scaled(
 ) -> tuple[Cause, Array]:
     """Draw parameters with a given noncentrality; return the effect and what it leaves, (m,)."""
     session, typical = conditions.session, shape.effect.typical
-    cause = Cause(shape.effect, dict(shape.settings), typical * shape.drawn(rng)[None])
+    cause = Cause(shape.effect, shape.settings, typical * shape.drawn(rng)[None], lam)
     without = conditions.misclosures(*observe(session, conditions.sensor, ()))
     for _ in range(2):  # an effect is almost, but not quite, proportional to its parameters
         with_it = conditions.misclosures(*observe(session, conditions.sensor, (cause,)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.campaign.session import Campaign
-from studies.hidden.physics.atlas import Conditions
+from studies.hidden.physics.conditions import Conditions
 from studies.hidden.physics.geometry import GRAVITY, Array
 
 Random = np.random.Generator
@@ -54,20 +54,19 @@ def _unit_error(campaign: Campaign, rng: Random, *_: object) -> Changed:
 
 def _row_order(campaign: Campaign, rng: Random, *_: object) -> Changed:
     """Exchange the readings of two holds, of three in a ring, or reverse the order of some."""
-    n = campaign.n_positions
-    while True:
-        order = np.arange(n)
+    steps = np.zeros((1, 3))
+    while np.any(np.linalg.norm(steps, axis=1) <= FAR):
+        order = np.arange(campaign.n_positions)
         if rng.random() < 0.3:
             length = int(rng.integers(3, 7))
-            start = int(rng.integers(n - length + 1))
-            order[start : start + length] = order[start : start + length][::-1]
+            start = int(rng.integers(len(order) - length + 1))
+            rows = np.arange(start, start + length)
+            order[rows] = rows[::-1]
         else:
-            rows = rng.choice(n, int(rng.integers(2, 4)), replace=False)
+            rows = rng.choice(len(order), int(rng.integers(2, 4)), replace=False)
             order[rows] = np.roll(rows, 1)
-        moved = np.flatnonzero(order != np.arange(n))
+        moved = np.flatnonzero(order != np.arange(len(order)))
         steps = campaign.forces[order[moved]] - campaign.forces[moved]
-        if np.all(np.linalg.norm(steps, axis=1) > FAR):
-            break
     settings = {f"row_{row + 1}": float(order[row] + 1) for row in moved}
     return _with_axes(campaign, lambda values: values[order]), settings
 
@@ -76,17 +75,15 @@ def _outlier_position(
     campaign: Campaign, rng: Random, sigma: float, conditions: Conditions
 ) -> Changed:
     """Bump one hold, by much more than what could be detected."""
-    size = float(np.exp(rng.uniform(np.log(15.0), np.log(150.0))))
+    size = sigma * float(np.exp(rng.uniform(np.log(15.0), np.log(150.0))))
     while True:
-        row = int(rng.integers(campaign.n_positions))
-        direction = rng.standard_normal(3)
-        error = size * sigma * direction / np.linalg.norm(direction)
+        row, direction = int(rng.integers(campaign.n_positions)), rng.standard_normal(3)
         change = np.zeros((1, campaign.n_positions, 3))
-        change[0, row] = error
+        change[0, row] = size * direction / np.linalg.norm(direction)
         lam = float(np.sum(conditions.left(conditions.changed(change)) ** 2))
         if lam > LEAST:
-            x, y, z = error.tolist()
-            settings = {"position": row + 1.0, "x": x, "y": y, "z": z, "lam": lam}
+            error = dict(zip("xyz", change[0, row].tolist(), strict=True))
+            settings = {"position": row + 1.0, **error, "lam": lam}
             return replace(campaign, forces=campaign.forces + change[0]), settings
 
 

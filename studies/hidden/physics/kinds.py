@@ -100,10 +100,7 @@ def walk(seed: float, part: Array) -> Array:
 
 TURN = 2 * np.pi
 VOCABULARY: dict[str, Any] = {
-    **{name: getattr(np, name) for name in (
-        "abs", "sign", "sin", "cos", "tanh", "cosh", "exp", "expm1", "log1p", "pi", "where",
-        "maximum", "clip", "array",
-    )},
+    **vars(np),
     **{f.__name__: f for f in (before, after, moves, steps, memory, beside, flips, stays, walk,
                                flange_force)},
     "g": GRAVITY,
@@ -113,7 +110,7 @@ VOCABULARY: dict[str, Any] = {
     "prod": lambda f: np.prod(f, axis=-1, keepdims=True),
     "centred": lambda values: values - values.mean(axis=0),
 }  # fmt: skip
-"""What a formula may use of whatever session."""
+"""What a formula may use of whatever session: NumPy's functions, and these."""
 COORDINATES: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
     "n": ("", lambda x: x.n),
     "number": ("", lambda x: np.arange(x.n)),
@@ -246,10 +243,6 @@ class Kind:
         named = {COORDINATES[one][0] for one in self.code.co_names if one in COORDINATES}
         return named - {""}
 
-    def has_place(self, robot: bool) -> bool:
-        """Whether it has a place whose coordinate a campaign records, with the robot or without."""
-        return self.place is not None and (robot or self.of not in OF_ROBOT)
-
     def draw(self, session: Session, rng: np.random.Generator) -> dict[str, float]:
         """Draw its settings."""
         return {name: one.draw(session, rng) for name, one in self.settings.items()}
@@ -262,11 +255,19 @@ class Kind:
 
 @dataclass(frozen=True)
 class Cause:
-    """A kind with its settings and a batch of its parameters (B, k)."""
+    """A kind with its settings and a batch of its parameters (B, k).
+
+    Attributes
+    ----------
+    lam : float, noncentrality; 0 for one of usual size, however little of it shows
+    same : tuple of str, names of the catalogue that mean the same
+    """
 
     kind: Kind
     settings: dict[str, float]
     parameters: Array
+    lam: float = 0.0
+    same: tuple[str, ...] = ()
 
     def change(self, force: Array | None, session: Session) -> Array:
         """What it adds to its target."""

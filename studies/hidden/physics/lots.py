@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
+from typing import Any
 
 import numpy as np
 
 from accelstudy.campaign.session import Campaign
-from studies.hidden.physics.atlas import Conditions
-from studies.hidden.physics.generate import Case, Known, Truth, drawn, generate, left_of
+from studies.hidden.physics.generate import Case, Truth, drawn, generate, left_of
+from studies.hidden.physics.kinds import Cause
 from studies.hidden.physics.measuring import Sensor
 from studies.hidden.physics.oracle import Verdict, oracle
 
@@ -23,33 +25,22 @@ class LotCase:
 
     Attributes
     ----------
-    set : str, name of the kind
-    design : str
-    approach : str, "gravity" or "robot"
-    sigma_known : bool, whether the campaigns state their sigma; None where half of them do
-    effects : tuple of str, what is missing
-    shares : tuple of float, how many of the sensors have each; 0 for one sensor
-    lam : float, noncentrality of each effect in a typical sensor
-    noise : str, kind of wrong noise of all sensors; None where it is right
-    roughness : tuple of float, factors of the noise of a position mean; each sensor has one of them
-        at random, by long holds or short ones
-    designs : tuple of str, of which each sensor has one at random; none where all have `design`
+    case : Case, of a sensor with all that the lot has
+    shares : tuple of float, how many of the sensors have each effect; 0 for one sensor
+    designs, sigmas, roughness : of which each sensor has one at random instead of that of the case:
+        designs, whether its sigma is stated, and factors of the noise of a position mean, by long
+        holds or short ones
     """
 
-    set: str
-    design: str
-    approach: str
-    sigma_known: bool | None
-    effects: tuple[str, ...] = ()
+    case: Case
     shares: tuple[float, ...] = ()
-    lam: float = 0.0
-    noise: str | None = None
-    roughness: tuple[float, ...] = (1.0,)
     designs: tuple[str, ...] = ()
+    sigmas: tuple[bool, ...] = ()
+    roughness: tuple[float, ...] = ()
 
 
 def generate_lot(
-    case: LotCase, sensors: int, seed: np.random.SeedSequence
+    lot: LotCase, sensors: int, seed: np.random.SeedSequence
 ) -> Iterator[tuple[Campaign, Truth]]:
     """Simulate the campaigns of a lot, one after the other.
 
@@ -59,33 +50,36 @@ def generate_lot(
 
     Parameters
     ----------
-    case : LotCase
+    lot : LotCase
     sensors : int, number of them
     seed : numpy.random.SeedSequence, from which all that is random follows
     """
     type_seed, *seeds = seed.spawn(sensors + 1)
     rng = np.random.default_rng(type_seed)
-    of_type = _of_type(case, rng)
-    has = np.zeros((sensors, len(case.effects)), dtype=bool)
-    for k, share in enumerate(case.shares):
+    usual, of_type = lot.case, _of_type(lot, rng)
+    has = np.zeros((sensors, len(lot.shares)), dtype=bool)
+    for k, share in enumerate(lot.shares):
         has[rng.permutation(sensors)[: max(round(share * sensors), 1)], k] = True
+
+    def one_of(options: Sequence[Any], usual: Any) -> Any:
+        return options[int(rng.integers(len(options)))] if options else usual
+
     for i, its_seed in enumerate(seeds):
-        names = tuple(name for name, there in zip(case.effects, has[i], strict=True) if there)
-        design = str(rng.choice(case.designs)) if case.designs else case.design
-        known = bool(rng.integers(2)) if case.sigma_known is None else case.sigma_known
-        one = Case("lot", design, case.approach, known, names, (case.lam,) * len(names), case.noise)
-        rough = float(rng.choice(case.roughness)) if len(case.roughness) > 1 else case.roughness[0]
-        given = {}
-        for name in names:
-            if (shared := of_type.get(name)) is not None:
-                cause, same = shared
-                factors = np.exp(SCATTER * rng.standard_normal(cause.parameters.shape))
-                given[name] = replace(cause, parameters=cause.parameters * factors), same
-        campaign, truth = generate(one, its_seed, given, rough)
+        effect = tuple(compress(usual.effect, has[i]))
+        design, known = one_of(lot.designs, usual.design), one_of(lot.sigmas, usual.sigma_known)
+        lam = usual.lam[: len(effect)]
+        case = replace(usual, effect=effect, lam=lam, design=design, sigma_known=known)
+        rough, given = one_of(lot.roughness, 1.0), {}
+        for name in case.effect:
+            if name in of_type:
+                parameters = of_type[name].parameters
+                factors = np.exp(SCATTER * rng.standard_normal(parameters.shape))
+                given[name] = replace(of_type[name], parameters=parameters * factors)
+        campaign, truth = generate(case, its_seed, given, rough)
         yield replace(campaign, name=f"sensor-{i + 1}"), truth
 
 
-def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
+def lot_oracle(lot: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
     """Say what the oracle says of a lot with one hidden effect in a share of its sensors.
 
     It knows which sensors have it, and judges their mean, which has all that a size of the type
@@ -93,10 +87,10 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
 
     Parameters
     ----------
-    case : LotCase
+    lot : LotCase
     made : campaigns and truths of `generate_lot`
     """
-    knowing = oracle(case.design, case.approach)
+    knowing = oracle(lot.case.design, lot.case.approach)
     shown = [
         left_of(
             knowing,
@@ -107,16 +101,18 @@ def lot_oracle(case: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict
         for campaign, truth in made
         if truth.effects
     ]
-    return knowing.judge(np.sum(shown, axis=0) / np.sqrt(len(shown)), (case.lam * len(shown),))
+    return knowing.judge(
+        np.sum(shown, axis=0) / np.sqrt(len(shown)), (lot.case.lam[0] * len(shown),)
+    )
 
 
-def _of_type(case: LotCase, rng: np.random.Generator) -> Mapping[str, Known]:
+def _of_type(lot: LotCase, rng: np.random.Generator) -> Mapping[str, Cause]:
     """Effects of the type with their typical parameters; sudden events have none."""
+    case = lot.case
     knowing = oracle(case.design, case.approach)
-    conditions = Conditions(knowing.session, case.approach, Sensor())
     known = {
-        name: drawn(name, case.lam, conditions, knowing, rng)
-        for name, share in zip(case.effects, case.shares, strict=True)
+        name: drawn(name, lam, knowing.conditions, knowing, rng)
+        for name, lam, share in zip(case.effect, case.lam, lot.shares, strict=True)
         if share > 0
     }
-    return {name: one for name, one in known.items() if "t" not in one[0].settings}
+    return {name: one for name, one in known.items() if "t" not in one.settings}

@@ -41,7 +41,7 @@ class Sensor:
         return np.asarray(np.linalg.inv((1 + self.scale)[:, None] * self.axes), dtype=float)
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Sensor:
+    def drawn(cls, rng: Random) -> Sensor:
         """A sensor as consumers buy it: some are good, some are not."""
         grade = np.exp(rng.uniform(np.log(0.1), 0.0))
         bias, scale, lean = rng.standard_normal((3, 3))
@@ -68,38 +68,30 @@ def observe(session: Session, sensor: Sensor, causes: Sequence[Cause]) -> tuple[
     return output, session.joints + rig["reading"] + np.zeros((len(output), 1, 1))
 
 
-NOISES = {
-    "level": "noise_level",
-    "axes": "axis_noise",
-    "tails": "heavy_tails",
-    "autoregressive": "coloured_noise",
-    "offsets": "coloured_noise",
-    "coarse": "quantisation",
-}
-"""Kind of wrong noise -> its name in the catalogue."""
 COARSE_SAMPLES = 64
 """Samples that are drawn for the mean of a hold with coarse readings."""
+Random = np.random.Generator
 
 
-def _axis_factors(sigma: float, rng: np.random.Generator) -> dict[str, Any]:
+def _axis_factors(sigma: float, rng: Random) -> dict[str, Any]:
     other = float(rng.choice([1 / rng.uniform(1.5, 2.5), rng.uniform(1.5, 3)]))
     axis = rng.integers(3)
     return {"axes": tuple(other if i == axis else 1.0 for i in range(3))}
 
 
-_SETTINGS: Mapping[str, Callable[[float, np.random.Generator], dict[str, Any]]] = {
+NOISES: Mapping[str, tuple[str, Callable[[float, Random], dict[str, Any]]]] = {
     # What disturbs the means may show within the holds, or not.
-    "level": lambda sigma, rng: {
+    "level": ("noise_level", lambda sigma, rng: {
         "factor": rng.uniform(0.6, 0.8) if rng.random() < 0.4 else rng.uniform(1.25, 2.0),
-        "within": rng.random() < 0.5,
-    },
-    "axes": _axis_factors,
-    "tails": lambda sigma, rng: {"freedom": 4.0},
-    "autoregressive": lambda sigma, rng: {"correlation": rng.uniform(0.3, 0.9)},
-    "offsets": lambda sigma, rng: {"ratio": rng.uniform(0.7, 2.0)},
-    "coarse": lambda sigma, rng: {"step": sigma * rng.uniform(4.0, 12.0)},
-}
-"""Kind of wrong noise -> a draw of its settings, by the sigma of a position mean."""
+        "within": rng.random() < 0.5}),
+    "axes": ("axis_noise", _axis_factors),
+    "tails": ("heavy_tails", lambda sigma, rng: {"freedom": 4.0}),
+    "autoregressive": ("coloured_noise", lambda sigma, rng: {"correlation": rng.uniform(0.3, 0.9)}),
+    "offsets": ("coloured_noise", lambda sigma, rng: {"ratio": rng.uniform(0.7, 2.0)}),
+    "coarse": ("quantisation", lambda sigma, rng: {"step": sigma * rng.uniform(4.0, 12.0)}),
+}  # fmt: skip
+"""Kind of wrong noise -> its name in the catalogue, and a draw of its settings, by the sigma of a
+position mean."""
 
 
 @dataclass(frozen=True)
@@ -128,11 +120,11 @@ class Noise:
     step: float = 0.0
 
     @classmethod
-    def drawn(cls, kind: str | None, session: Session, rng: np.random.Generator) -> Noise:
+    def drawn(cls, kind: str | None, session: Session, rng: Random) -> Noise:
         """Draw the settings of a kind of noise."""
-        return cls(kind, **_SETTINGS[kind](session.sigma, rng)) if kind else cls()
+        return cls(kind, **NOISES[kind][1](session.sigma, rng)) if kind else cls()
 
-    def read(self, output: Array, session: Session, rng: np.random.Generator) -> Array:
+    def read(self, output: Array, session: Session, rng: Random) -> Array:
         """Means of the holds (n, 3) of true outputs, as they are read."""
         shape, sigma, rho = output.shape, session.sigma, self.correlation
         if self.step:
@@ -158,7 +150,7 @@ class Noise:
         within = self.factor if self.within else 1.0
         return session.sigma * np.sqrt(session.n_samples) * within * np.array(self.axes)
 
-    def sds(self, session: Session, rng: np.random.Generator) -> Array:
+    def sds(self, session: Session, rng: Random) -> Array:
         """Sds of the samples within the holds, as they are found, (n, 3), m/s²."""
         freedom = session.n_samples - 1
         ratio = np.sqrt(rng.chisquare(freedom, (session.n, 3)) / freedom)

@@ -15,16 +15,20 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, softmax
+from scipy.special import chdtrc, logsumexp, softmax
 
-from studies.hidden.physics.atlas import Atlas, Conditions
+from studies.hidden.physics.conditions import Conditions, Shape
 from studies.hidden.physics.designs import session
-from studies.hidden.physics.geometry import Array
-from studies.hidden.physics.kinds import NOWHERE
-from studies.hidden.physics.measuring import Sensor
+from studies.hidden.physics.geometry import GRAVITY, Array
+from studies.hidden.physics.kinds import EFFECTS, NOWHERE, Cause, Kind
+from studies.hidden.physics.measuring import Sensor, observe
 
 Class = tuple[str, ...]
 
+ROUNDING = 1e-12
+"""Share of the readings themselves up to which an effect is only their rounding."""
+ALIKE = 0.9999
+"""Canonical cosine from which on two effects are the same."""
 OUTSIDE_SHARE = 0.15
 """Least share that two effects of the catalogue leave of the noncentrality of one outside it."""
 DRAWS = 7
@@ -57,8 +61,77 @@ class Verdict:
     alternatives: int = 0
 
 
-class Oracle(Atlas):
-    """The oracle of a session by one approach: an atlas of it, by which campaigns are judged."""
+class Oracle:
+    """What is known of a session by one approach: all shapes that a calibration can see of it.
+
+    Attributes
+    ----------
+    conditions : Conditions, of an ideal sensor
+    """
+
+    def __init__(self, conditions: Conditions) -> None:
+        self.conditions, self.session = conditions, conditions.session
+
+    def shape(self, effect: Kind, settings: dict[str, float]) -> Shape | None:
+        """Shape of an effect with any settings; None if it cannot be seen."""
+        k, sigma = effect.k, self.session.sigma
+        steps = effect.typical * np.eye(k)
+        cause = Cause(effect, settings, np.concatenate([steps, -steps]))
+        output, reading = observe(self.session, self.conditions.sensor, (cause,))
+        seen = self.conditions.seen(output, reading)
+        left, force, angle = ((each[:k] - each[k:]) / 2 for each in (seen, output, reading))
+        raw = np.hypot(np.linalg.norm(force), GRAVITY * np.linalg.norm(angle))
+        size = float(raw / sigma / np.sqrt(k))
+        readings = float(np.linalg.norm(self.conditions.directions)) * GRAVITY / sigma
+        if size < ROUNDING * readings:  # else what is left would be a matter of the processor
+            return None
+        return Shape.of(effect, settings, left, size)
+
+    @cached_property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Shapes of all effects, in settings that cover all their values."""
+        candidates = (
+            self.shape(effect, settings)
+            for effect in EFFECTS.values()
+            if effect.shows(self.session)
+            for settings in effect.grid(self.session)
+        )
+        return tuple(shape for shape in candidates if shape is not None)
+
+    @cached_property
+    def visible(self) -> tuple[str, ...]:
+        """Names of the effects that can be seen."""
+        return tuple(dict.fromkeys(shape.effect.name for shape in self.shapes))
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Names of the effects that the session has, but that cannot be seen."""
+        had = (name for name, effect in EFFECTS.items() if effect.shows(self.session))
+        return tuple(name for name in had if name not in self.visible)
+
+    @cached_property
+    def dims(self) -> NDArray[np.int_]:
+        """Dimensions of all shapes."""
+        return np.array([shape.dim for shape in self.shapes])
+
+    @cached_property
+    def together(self) -> Array:
+        """Bases of all shapes side by side, (m, k)."""
+        return np.concatenate([shape.basis for shape in self.shapes], axis=1)
+
+    def parts(self, z: Array) -> Array:
+        """Squares of what misclosures (..., m) have in each shape, (..., s)."""
+        starts = np.cumsum(self.dims) - self.dims
+        return np.asarray(np.add.reduceat((z @ self.together) ** 2, starts, axis=-1))
+
+    def same_as(self, shape: Shape) -> tuple[str, ...]:
+        """Names of the effects with a shape that cannot be told from the given one."""
+        others = [one for one in self.shapes if one.dim == shape.dim]
+        products = shape.basis.T @ np.array([one.basis for one in others])
+        least = np.linalg.svd(products, compute_uv=False)[:, -1] if others else ()
+        alike = [one for one, cosine in zip(others, least, strict=True) if cosine > ALIKE]
+        names = {one.effect.name for one in (shape, *alike)}
+        return tuple(name for name in EFFECTS if name in names)
 
     @cached_property
     def threshold(self) -> float:
@@ -93,33 +166,29 @@ class Oracle(Atlas):
         """
         detected = bool(np.min(self._p_values(z)) < self.threshold)
         if len(sizes) > 2:  # of which it would have to try too many
-            return Verdict(detected, (), (), 0)
+            return Verdict(detected, (), ())
         if len(sizes) == 2:
-            told, alternatives = self._two(z, float(sum(sizes))), 0
-        else:
-            told, alternatives = self._one(z, sizes)
-        return Verdict(detected, told if detected else (), told, alternatives)
-
-    def _p_values(self, z: Array) -> Array:
-        return np.asarray(chdtrc(self.dims, self.parts(z)))
-
-    def _one(self, z: Array, sizes: Sequence[float]) -> tuple[tuple[Class, ...], int]:
+            pairs = self.pairs
+            logs = _evidence(pairs.parts(z), pairs.dims, float(sum(sizes)))
+            _, best = _most_probable(logs, pairs.starts)
+            both = self.classes[pairs.first[best]], self.classes[pairs.second[best]]
+            return Verdict(detected, both if detected else (), both)
         # Where nothing is missing, or nothing of the catalogue, any usual size will do.
-        size = sizes[0] if sizes else 25.0
+        logs = _evidence(self.parts(z), self.dims, sizes[0] if sizes else 25.0)
         names = [shape.effect.name for shape in self.shapes]
-        starts = np.array([i for i, name in enumerate(names) if i == 0 or name != names[i - 1]])
-        logs, best = _most_probable(_evidence(self.parts(z), self.dims, size), starts)
+        starts = np.array([names.index(name) for name in self.visible])
+        of_effects, best = _most_probable(logs, starts)
         by_class: dict[Class, float] = {}
-        for i, log in zip(starts, logs, strict=True):
+        for i, log in zip(starts, of_effects, strict=True):
             alike = self.classes[i]
             by_class[alike] = float(np.logaddexp(by_class.get(alike, -np.inf), log))
         p = np.sort(softmax([*by_class.values()]))[::-1]
-        return (self.classes[best],), int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
+        alternatives = int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
+        one = (self.classes[best],)
+        return Verdict(detected, one if detected else (), one, alternatives)
 
-    def _two(self, z: Array, size: float) -> tuple[Class, ...]:
-        pairs = self.pairs
-        _, best = _most_probable(_evidence(pairs.parts(z), pairs.dims, size), pairs.starts)
-        return (self.classes[pairs.first[best]], self.classes[pairs.second[best]])
+    def _p_values(self, z: Array) -> Array:
+        return np.asarray(chdtrc(self.dims, self.parts(z)))
 
 
 class Pairs:
@@ -130,19 +199,20 @@ class Pairs:
     first, second : (q,) int arrays, shapes
     dims : (q,) array, dimensions of both together
     starts : (g,) int array, first pair of each two effects
+    cosines : (g,) array, largest canonical cosine of any shapes of each two effects
     """
 
-    def __init__(self, atlas: Atlas) -> None:
-        order = {name: i for i, name in enumerate(atlas.visible)}
-        effect = np.array([order[shape.effect.name] for shape in atlas.shapes])
+    def __init__(self, knowing: Oracle) -> None:
+        order = {name: i for i, name in enumerate(knowing.visible)}
+        effect = np.array([order[shape.effect.name] for shape in knowing.shapes])
         first, second = np.nonzero(effect[:, None] < effect[None, :])
         group = effect[first] * len(order) + effect[second]
         sorted_ = np.argsort(group, kind="stable")
         first, second, group = first[sorted_], second[sorted_], group[sorted_]
         self.first, self.second = first, second
         # Bases with columns of zeros, so that all are equally wide, (s, m, d).
-        d = int(atlas.dims.max())
-        self._bases = np.stack([np.pad(s.basis, ((0, 0), (0, d - s.dim))) for s in atlas.shapes])
+        d = int(knowing.dims.max())
+        self._bases = np.stack([np.pad(s.basis, ((0, 0), (0, d - s.dim))) for s in knowing.shapes])
         flat = self._bases.transpose(1, 0, 2).reshape(self._bases.shape[1], -1)
         products = (flat.T @ flat).reshape(len(effect), d, len(effect), d)
         # With both bases B side by side the square is zᵀ B (Bᵀ B)⁺ Bᵀ z.
@@ -154,6 +224,8 @@ class Pairs:
         self._inverse = (vectors * weights[:, None, :]) @ np.swapaxes(vectors, 1, 2)
         self.dims = np.sum(kept, axis=1, dtype=float)
         self.starts = np.flatnonzero(np.diff(group, prepend=-1))
+        # Those of two bases and their cosines c are 1 ± c.
+        self.cosines = np.maximum.reduceat(values[:, -1], self.starts) - 1
 
     def parts(self, z: Array) -> Array:
         """Squares of what misclosures (m,) have in each pair, (q,)."""
@@ -164,12 +236,10 @@ class Pairs:
 
 def _most_probable(evidence: Array, starts: NDArray[np.int_]) -> tuple[Array, int]:
     """Log evidence of groups, that of their members on average, and the best member of the best."""
-    counts = np.diff(np.append(starts, len(evidence)))
-    top = np.maximum.reduceat(evidence, starts)
-    sums = np.add.reduceat(np.exp(evidence - np.repeat(top, counts)), starts)
-    logs = top + np.log(sums / counts)
-    start, count = (int(each[np.argmax(logs)]) for each in (starts, counts))
-    return logs, start + int(np.argmax(evidence[start : start + count]))
+    groups = np.split(evidence, starts[1:])
+    logs = np.array([logsumexp(group) - np.log(len(group)) for group in groups])
+    best = int(np.argmax(logs))
+    return logs, int(starts[best] + np.argmax(groups[best]))
 
 
 def _evidence(parts: Array, dims: Array | NDArray[np.int_], size: float) -> Array:
@@ -187,17 +257,14 @@ def oracle(design: str, approach: str) -> Oracle:
 @cache
 def visible_outside(design: str, approach: str) -> tuple[str, ...]:
     """Names of effects outside the catalogue that show, and that no two effects of it imitate."""
-    knowing, visible = oracle(design, approach), []
-    for name, effect in NOWHERE.items():
-        if not effect.shows(knowing.session):
-            continue
+    knowing = oracle(design, approach)
+
+    def shows(name: str, kind: Kind) -> bool:
         # No kind changes what another one draws.
-        rng, outside = np.random.default_rng(zlib.crc32(name.encode())), 0
-        for _ in range(DRAWS):
-            shape = knowing.shape(effect, effect.draw(knowing.session, rng))
-            if shape is not None:
-                direction = rng.standard_normal(shape.dim)
-                outside += knowing.is_outside(shape.basis @ direction)
-        if outside > DRAWS / 2:
-            visible.append(name)
-    return tuple(visible)
+        rng = np.random.default_rng(zlib.crc32(name.encode()))
+        drawn = (knowing.shape(kind, kind.draw(knowing.session, rng)) for _ in range(DRAWS))
+        changes = (one.basis @ rng.standard_normal(one.dim) for one in drawn if one is not None)
+        return sum(map(knowing.is_outside, changes)) > DRAWS / 2
+
+    had = {name: kind for name, kind in NOWHERE.items() if kind.shows(knowing.session)}
+    return tuple(name for name, kind in had.items() if shows(name, kind))

@@ -39,7 +39,12 @@ def draw(figure: Mapping[str, Any], frames: Frames) -> Figure:
         drawn = [_curve(ax, rows, curve, panel.get("bins")) for curve in panel["curves"]]
         ax.set(title=panel.get("title", ""), **panel.get("axes", {}))
         if "bins" not in panel:
-            _over_sizes(ax, np.unique(np.concatenate(drawn)), APART * len(panels) / 2)
+            sizes = np.unique(np.concatenate(drawn))
+            ax.set(xscale="log", xlabel="noncentrality $\\lambda$")
+            # A tick at each size that has room for it.
+            ax.set_xticks(sizes[style.spread(np.log(sizes), APART * len(panels) / 2)])
+            ax.xaxis.set_major_formatter("{x:g}")
+            ax.minorticks_off()
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
         if not any(map(len, drawn)):
@@ -66,12 +71,3 @@ def _curve(ax: Axes, rows: pd.DataFrame, curve: Mapping[str, Any], bins: list[fl
         error = None if plain else np.nan_to_num(np.abs(np.stack([value - low, high - value])))
         ax.errorbar(at, value, error, elinewidth=0.8, **look)
     return at
-
-
-def _over_sizes(ax: Axes, sizes: Any, apart: float) -> None:
-    """Make the abscissa one of sizes, with a tick at each one that has room for it."""
-    ax.set_xscale("log")
-    ax.set_xticks(sizes[style.spread(np.log(sizes), apart)])
-    ax.xaxis.set_major_formatter("{x:g}")
-    ax.minorticks_off()
-    ax.set_xlabel("noncentrality $\\lambda$")

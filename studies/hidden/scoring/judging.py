@@ -21,17 +21,7 @@ Class = Collection[str]
 
 LARGE = 150.0
 """λ from which on physics outside the catalogue must not get a name of the catalogue."""
-LEARNABLE: Mapping[str, Sequence[str]] = {
-    "bias": ("force", "previous", "next", "yaw", "vibration", "temperature", "dT/dt", "time"),
-    "scale": ("vibration", "temperature", "dT/dt", "time"),
-    "nonorthogonality": ("temperature", "time"),
-    "tilt": ("yaw", "vibration", "temperature", "time"),
-    "reading": ("angle", "yaw", "move", "vibration", "temperature", "time"),
-}
-"""Target -> coordinates of which the diagnosis can learn a function for it."""
-
-P_CLASSES = {"> 0.01": 1.1, "10⁻⁴ … 0.01": 1e-2, "< 10⁻⁴": 1e-4}
-"""Classes of the p-value of the F test that knows the form, and their upper ends."""
+LEARNABLE, P_CLASSES = (SCORES["score"][name] for name in ("learnable", "p_classes"))
 
 
 def same_effects(given: Sequence[Class], true: Sequence[Class]) -> bool:
@@ -130,7 +120,9 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "learnable": place is not None and place[0] in LEARNABLE.get(place[1], ()),
         "place_right": learned and place is not None and row["place"] == place,
         "its_column": "not recorded" if row["recorded"] is False else "recorded",
-        "p_class": next((p for p, end in [*P_CLASSES.items()][::-1] if row["p_known"] < end), None),
+        "p_class": next(
+            (p for p, end in reversed(P_CLASSES.items()) if row["p_known"] < end), None
+        ),
     }
 
 

@@ -36,13 +36,15 @@ class Measured(NamedTuple):
     low: float
     high: float
     n: int
+    statistic: str
 
-    def text(self, statistic: str = "share") -> str:
+    @property
+    def text(self) -> str:
         """Write it as a share, mean or median, or as its n, count, or count of n."""
         count = f"{self.value * self.n:.0f}" if self.n else "0"
         of = f"{count} of {self.n}" if self.n else "–"
         texts = {"n": str(self.n), "count": count, "of": of}
-        return texts.get(statistic, share_text(self.value))
+        return texts.get(self.statistic, share_text(self.value))
 
     @property
     def interval(self) -> str:
@@ -78,9 +80,9 @@ def statistic(x: NDArray[np.float64], name: str) -> Measured:
         # The interval of a median is between two order statistics.
         if name == "median" and (k := int(binom.ppf(0.025, n, 0.5))):
             low, high = x[k - 1], x[n - k]
-        return Measured(value, low, high, n)
+        return Measured(value, low, high, n, name)
     low, high = map(float, clopper_pearson(x.sum(), n))
-    return Measured(float(x.sum() / n) if n else np.nan, low, high, n)
+    return Measured(float(x.sum() / n) if n else np.nan, low, high, n, name)
 
 
 # --- text -----------------------------------------------------------------------------------------
@@ -89,12 +91,6 @@ def statistic(x: NDArray[np.float64], name: str) -> Measured:
 def share_text(value: float) -> str:
     """Write a share to two digits, or three decimals."""
     return "–" if np.isnan(value) else f"{value:.3f}" if value < 0.0995 else f"{value:.2f}"
-
-
-def answer(rows: pd.DataFrame, question: Question) -> str:
-    """Answer a question in a cell of a table."""
-    how = "share" if isinstance(question, str) else question.get("statistic", "share")
-    return measure(rows, question).text(how)
 
 
 def label(value: Any) -> str:
@@ -121,7 +117,7 @@ def table(section: Mapping[str, Any], frames: Mapping[str, pd.DataFrame]) -> pd.
     heads, lines = [*section["by"]], []
     for key, part in rows.groupby([*section["by"].values()], observed=True):
         cells = [f"{one:g}" if isinstance(one, float) else label(SETS.get(one, one)) for one in key]
-        answers = {head: answer(part, one) for head, one in section["columns"].items()}
+        answers = {head: measure(part, one).text for head, one in section["columns"].items()}
         lines.append(dict(zip(heads, cells, strict=True)) | answers)
     return pd.DataFrame(lines)
 
@@ -129,8 +125,7 @@ def table(section: Mapping[str, Any], frames: Mapping[str, pd.DataFrame]) -> pd.
 def target_rows(line: Mapping[str, Any], rows: pd.DataFrame) -> Iterator[Row]:
     """Rows of a target: one, or one for each λ; bounds that are of some λ leave out the others."""
     of_set = rows[rows["set"] == line["set"]] if "set" in line else rows
-    for size in sorted(of_set["size"].unique()) if "each" in line else [np.nan]:
-        of_size = of_set[of_set["size"] == size] if "each" in line else of_set
+    for size, of_size in of_set.groupby("size") if "each" in line else [(np.nan, of_set)]:
         asked, measured = chosen(of_size, line), measure(of_size, line)
         fewest, oracle, target, met = line.get("n", 0), "", "", ""
         least, most = (
@@ -154,7 +149,7 @@ def target_rows(line: Mapping[str, Any], rows: pd.DataFrame) -> Iterator[Row]:
             continue
         yield {
             **{"figure": line["figure"], "campaigns": line["campaigns"].format(size=size)},
-            **{"target": target, "measured": measured.text()},
+            **{"target": target, "measured": measured.text},
             **{"95 % interval": measured.interval, "n": measured.n, "met": met},
         }
 
