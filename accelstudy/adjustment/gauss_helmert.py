@@ -257,8 +257,8 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
 
     # All three must vanish: the step in x, the step in v, and ψ at the adjusted observations.
     size_x = np.sqrt((half**2).sum(axis=0))
-    size_v = (np.abs(v_new - v) / _sigma(q)[:, None]).max(axis=(0, 2))
-    size_psi = np.abs(cholesky.forward(white.factor, at.psi)).max(axis=(0, 2))
+    size_v = (np.abs(v_new - v) / _sigma(q)[:, None]).max(axis=(0, 2), initial=0.0)
+    size_psi = np.abs(cholesky.forward(white.factor, at.psi)).max(axis=(0, 2), initial=0.0)
     size = np.maximum(np.maximum(size_x, size_v), size_psi)
     return _Step(dx, v_new, omega, size, lower, scale)
 

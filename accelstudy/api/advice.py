@@ -29,7 +29,7 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential import wording
 from accelstudy.sequential.advisor import Advice, advise
 from accelstudy.sequential.choice import DEFAULTS, candidates
-from accelstudy.sequential.estimate import NOTHING_KNOWN, Prior
+from accelstudy.sequential.prior import Prior
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_as_it_is
 
@@ -50,6 +50,7 @@ class SessionAdvice(Result):
 
     def __init__(self, advice: Advice, session: Campaign, adviser: Adviser) -> None:
         self.advice, self.session, self._adviser = advice, session, adviser
+        self.name = session.name
 
     @classmethod
     def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
@@ -57,11 +58,6 @@ class SessionAdvice(Result):
         place = place_of(campaign)
         now = as_campaign(campaign) if place is None else read_as_it_is(place).campaign
         return Adviser(now, place, **given)(now)
-
-    @property
-    def name(self) -> str:
-        """Name of the campaign."""
-        return self.session.name
 
     @property
     def enough(self) -> bool:
@@ -187,10 +183,10 @@ class Adviser:
         return suggested.calibrate(self.place, self._called, self.approach.name, self.type)
 
 
-def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType:
-    """What an earlier calibration, or a type, says; nothing without one."""
+def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:
+    """What an earlier calibration, or a type, says; None without one."""
     if given is None:
-        return NOTHING_KNOWN
+        return None
     if given.suffix in TYPES:
         return read_type(given, wanted)
     earlier = as_calibration(given).sensor

@@ -61,16 +61,12 @@ class Calibration(Result):
     ) -> None:
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
         self._content = calibration_content(self._assessment) if content is None else content
+        self.name = str(self._content["campaign"])
 
     @property
     def content(self) -> Mapping[str, Any]:
         """Content of calibration.json."""
         return self._content
-
-    @property
-    def name(self) -> str:
-        """Name of the campaign."""
-        return str(self.content["campaign"])
 
     @property
     def state(self) -> str:
@@ -180,7 +176,7 @@ class Calibration(Result):
         """
         return accelstudy.apply(self, log, start=start, sigma=sigma)
 
-    def export(self, form: str = "json") -> str:
+    def export(self, form: str = "c") -> str:
         """Return the text of a file in a form that a device takes, as `accelstudy.export` does."""
         return export.export(self.sensor, form)
 

@@ -47,7 +47,7 @@ class Design(Result):
     size = FULL, 80.0
 
     def __init__(self, proposal: Proposal) -> None:
-        self.proposal = proposal
+        self.proposal, self.name = proposal, f"{len(proposal.directions)} positions"
 
     @classmethod
     def of(cls, *, sigma: float, robot_sigma: float, gravity_sigma: float, **given: Any) -> Design:
@@ -58,11 +58,6 @@ class Design(Result):
         request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
         with stage("search"):
             return cls(Proposal.of(request))
-
-    @property
-    def name(self) -> str:
-        """How many positions it has."""
-        return f"{len(self.proposal.directions)} positions"
 
     @property
     def state(self) -> str:

@@ -41,29 +41,17 @@ class Diagnosis(Result):
         self, result: Found, seed: int, replicates: int, source: Path | None = None
     ) -> None:
         self.result, self._seed, self._replicates = result, seed, replicates
+        self.name = result.campaign.name
         self.source = Path("CAMPAIGN") if source is None else source
         self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
 
     @classmethod
-    def of(
-        cls,
-        campaign: Any,
-        model: str,
-        approach: str | None,
-        prior: Path | None,
-        seed: int,
-        replicates: int,
-    ) -> Diagnosis:
+    def of(cls, campaign: Any, *, seed: int, replicates: int, **names: Any) -> Diagnosis:
         """Diagnose by the keywords of `accelstudy.diagnose`, checked."""
         # The diagnosis, not the reader, looks for wrong units and axes.
-        given = resolve(campaign, model, approach, prior, plausible=False)
+        given = resolve(campaign, **names, plausible=False)
         with stage("search for what is missing"):
             return cls(pipeline.diagnose(*given, seed=seed), seed, replicates, place_of(campaign))
-
-    @property
-    def name(self) -> str:
-        """Name of the campaign."""
-        return self.result.campaign.name
 
     @cached_property
     def content(self) -> dict[str, Any]:

@@ -38,17 +38,13 @@ class Comparison(Result):
 
     def __init__(self, result: epochs.History, tilt_range: float) -> None:
         self.result, self.tilt_range = result, tilt_range
+        self.name = " and ".join(one.content["campaign"] for one in result.calibrations)
 
     @classmethod
     def of(cls, first: Any, second: Any, tilt_range: float) -> Comparison:
         """Compare by the keywords of `accelstudy.compare`, checked."""
         pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
         return cls(epochs.compare(*pair), tilt_range)
-
-    @property
-    def name(self) -> str:
-        """Names of the campaigns."""
-        return f"{self.content['first']} and {self.content['second']}"
 
     @cached_property
     def content(self) -> dict[str, Any]:
@@ -85,27 +81,23 @@ class History(Result):
 
     def __init__(self, result: epochs.History, interval: Interval | None) -> None:
         self.result, self.interval = result, interval
+        of_sensors = (one.content["sensor"] for one in result.calibrations)
+        self.name = next(filter(None, of_sensors), result.calibrations[0].content["campaign"])
 
     @classmethod
     def of(
         cls,
         calibrations: Sequence[Any],
+        *,
         dates: Sequence[str | datetime],
         tilt_accuracy: float | None,
-        tilt_range: float,
-        confidence: float,
+        **use: float,
     ) -> History:
         """Follow a sensor by the keywords of `accelstudy.history`, checked."""
         check_once(calibrations, "calibration")
         course = follow([*map(as_calibration, calibrations)], dates, calibrations)
-        if tilt_accuracy is None:
-            return cls(course, None)
-        return cls(course, Interval(course, tilt_accuracy, tilt_range, confidence))
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor, or of the first campaign."""
-        return self.content["sensor"] or self.content["calibrations"][0]["campaign"]
+        wanted = None if tilt_accuracy is None else Interval(course, tilt_accuracy, **use)
+        return cls(course, wanted)
 
     @cached_property
     def content(self) -> dict[str, Any]:

@@ -32,23 +32,16 @@ class Lot(Result):
     kind = LOT
 
     def __init__(self, report: CalibratedLot) -> None:
-        self.report = report
+        self.report, self.name = report, f"{len(report.lot.sensors)} sensors"
 
     @classmethod
-    def of(
-        cls, campaigns: Sequence[Any], model: str, approach: str | None, seed: int, cores: int
-    ) -> Lot:
+    def of(cls, campaigns: Sequence[Any], *, seed: int, cores: int, **names: Any) -> Lot:
         """Judge a lot by the keywords of `accelstudy.lot`, checked."""
         check_once(campaigns, "sensor")
         if len(campaigns) < MIN_SENSORS:
             raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
         measured = [as_campaign(one) for one in campaigns]
-        return cls(evaluate_lot(measured, *chosen(model, approach), seed, cores))
-
-    @property
-    def name(self) -> str:
-        """How many sensors it has."""
-        return f"{self.content['sensors']} sensors"
+        return cls(evaluate_lot(measured, *chosen(**names), seed, cores))
 
     @cached_property
     def content(self) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class Plan(Result):
     size = FULL, 95.0
 
     def __init__(self, answer: Answer) -> None:
-        self.answer = answer
+        self.answer, self.name = answer, answer.question.sheet.name
 
     @classmethod
     def of(cls, **given: Any) -> Plan:
@@ -79,11 +79,6 @@ class Plan(Result):
     def exit_status(self) -> int:  # type: ignore[override]
         """1 if nothing reaches the accuracy."""
         return 0 if self.answer.ranked else 1
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.answer.question.sheet.name
 
     @property
     def state(self) -> str:

@@ -23,8 +23,13 @@ class Result(ABC):
     """What a function found: its state in a word, a verdict in sentences, a table and a figure.
 
     Results are equal to themselves alone. `save` writes what the command of the same name does.
+
+    Attributes
+    ----------
+    name : str, what it is the result of
     """
 
+    name: str
     kind: ClassVar[Kind]
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
@@ -35,11 +40,6 @@ class Result(ABC):
     @abstractmethod
     def content(self) -> Mapping[str, Any]:
         """Content of the JSON file that `save` writes, or what it would say if there is none."""
-
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """What it is the result of."""
 
     @property
     def state(self) -> str:

@@ -52,6 +52,7 @@ class Simulation(Result):
     def __init__(self, statistics: Sequence[CellStatistics], seed: int) -> None:
         self.statistics, self._seed = statistics, seed
         self.cells = tuple(one.cell for one in statistics)
+        self.name = self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
         self.size = FULL, 40.0 + 6 * len(self.cells)
 
     @classmethod
@@ -97,11 +98,6 @@ class Simulation(Result):
         if not any(cell.estimability.estimable for cell in cells):
             raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
         return cls([of_cells.simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
-
-    @property
-    def name(self) -> str:
-        """Name of the cell, or how many there are."""
-        return self.cells[0].name if len(self.cells) == 1 else f"{len(self.cells)} cells"
 
     @property
     def state(self) -> str:

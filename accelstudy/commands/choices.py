@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -11,7 +10,8 @@ import click
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, track
 from accelstudy.commands.bridge import Command
-from accelstudy.verbs.kinds import ApproachName, File, ModelName, SchemeName, UsualApproach, verb
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,10 +40,10 @@ def models() -> None:
 @verb
 def effects(
     *,
-    campaign: File | None = None,
-    scheme: SchemeName | None = None,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: UsualApproach = None,
+    campaign: kinds.File | None = None,
+    scheme: kinds.SchemeName | None = None,
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.UsualApproach = None,
 ) -> None:
     """List all effects, or what a campaign can show of them.
 
@@ -66,21 +66,18 @@ def effects(
         return
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
+    from accelstudy.api.calibrations import resolve
     from accelstudy.approaches import get_approach
-    from accelstudy.campaign.format import read_campaign
     from accelstudy.diagnosis import visibility
     from accelstudy.schemes import get_scheme
     from accelstudy.sensors.models import get_model
 
-    chosen = get_model(model)
     with stage("what can be shown"):
         if campaign is not None:
-            named = None if approach is None else get_approach(approach)
-            examined = visibility.examine_campaign(read_campaign(Path(campaign)), chosen, named)
+            examined = visibility.examine_campaign(*resolve(campaign, model, approach))
         else:
-            examined = visibility.examine_scheme(
-                get_scheme(str(scheme)), chosen, get_approach(approach or "robot")
-            )
+            by = get_approach(approach or "robot")
+            examined = visibility.examine_scheme(get_scheme(str(scheme)), get_model(model), by)
         table = visibility.visibility_table(examined).to_string(index=False)
     click.echo(table)
     say(
@@ -138,10 +135,10 @@ def _items(table: pd.DataFrame) -> Iterator[str]:
 
 @verb
 def schemes(
-    names: Sequence[SchemeName] = (),
+    names: Sequence[kinds.SchemeName] = (),
     *,
-    model: ModelName = "bias-scale-nonorthogonality",
-    approach: ApproachName = "gravity",
+    model: kinds.ModelName = "bias-scale-nonorthogonality",
+    approach: kinds.ApproachName = "gravity",
 ) -> None:
     """List position schemes and what they can determine.
 
@@ -158,13 +155,14 @@ def schemes(
     from accelstudy.schemes import get_scheme, scheme_families, scheme_names
     from accelstudy.sensors.models import get_model
     from accelstudy.simulation.hold_plan import check_needs_no_plan
+    from accelstudy.simulation.sessions import Noise
 
     chosen_model, chosen_approach = get_model(model), get_approach(approach)
     check_needs_no_plan(chosen_model)
     rows = []
     for name in track(names or scheme_names(), "schemes"):
         chosen = get_scheme(name)
-        determined = estimability(chosen, chosen_model, chosen_approach)
+        determined = estimability(chosen, chosen_model, chosen_approach, blur=Noise().sigma_force)
         rows.append(
             {
                 "scheme": chosen.name,
@@ -190,7 +188,7 @@ def schemes(
 
 
 @verb
-def scheme(name: SchemeName) -> None:
+def scheme(name: kinds.SchemeName) -> None:
     """Print the directions of a scheme, with its source.
 
     They are directions of gravity in the axes of the sensor, as a CSV table.

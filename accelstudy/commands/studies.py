@@ -10,23 +10,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
+import accelstudy
 from accelstudy.basics.progress import say, warn
 from accelstudy.commands.bridge import Command
-from accelstudy.verbs.kinds import Force, Names, SensorName, verb
+from accelstudy.verbs import kinds
+from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
     from accelstudy.study.new_study import NewSensor
+
+TEMPLATES = kinds.Names("template", "accelstudy.study.new_study", "TEMPLATES")
 
 
 @verb
 def init(
     folder: str | PathLike[str],
     *,
-    template: Annotated[
-        str, Names("template", "accelstudy.study.new_study", "TEMPLATES")
-    ] = "study",
-    sensor: SensorName | None = None,
-    force: Force = False,
+    template: Annotated[str, TEMPLATES] = "study",
+    sensor: kinds.SensorName | None = None,
+    force: kinds.Force = False,
 ) -> None:
     """Set up a study of your own in a new folder.
 
@@ -65,55 +67,42 @@ def init(
 
 
 def sensor_of(given: str) -> NewSensor:
-    """Read the sensor from a data sheet or a campaign."""
+    """Sensor of a data sheet; or of a campaign, whose calibration is taken for the truth."""
+    from accelstudy.api.calibrations import fit_of
     from accelstudy.data_sheets import get_data_sheet
     from accelstudy.planning.question import USUAL_HOLD
+    from accelstudy.sensors.models import NINE
     from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
 
     if Path(given).is_dir():
-        return _sensor_of_campaign(Path(given))
+        sheet, fit = accelstudy.data_sheet(given), fit_of(given, NINE, None)
+        found = dict(zip(fit.model.parameter_names, fit.parameters.tolist(), strict=True))
+        campaign = fit.campaign
+        robot = {} if campaign.sigma_angle is None else {"sigma_angle": campaign.sigma_angle}
+        return NewSensor(
+            sigma=sheet.sigma_mean(1.0),
+            noise=f"as {campaign.name} states it",
+            gravity=campaign.gravity,
+            errors={
+                effect.name: tuple(found[one.name] for one in effect.parameters)
+                for effect in fit.model.effects
+            },
+            source=dict.fromkeys(OF_THE_PAPER, f"as the calibration of {campaign.name} finds them"),
+            campaign=Path(given),
+            **robot,
+        )
     sheet = get_data_sheet(given)
-    errors: dict[str, tuple[float, ...]] = dict(OF_THE_PAPER)
-    source = {}
-    for name in errors:
-        if (size := getattr(sheet, name)) is not None:
-            errors[name] = (size, -size, size)
-            source[name] = f"of the size in the data sheet {sheet.name}"
-    known = sheet.velocity_random_walk is not None
-    mean = f"the mean of {USUAL_HOLD:g} s" if known else "the mean of a position"
+    known = {name: size for name in OF_THE_PAPER if (size := getattr(sheet, name)) is not None}
+    mean = (
+        f"the mean of {USUAL_HOLD:g} s"
+        if sheet.position_sigma is None
+        else "the mean of a position"
+    )
     return NewSensor(
         sigma=sheet.sigma_mean(USUAL_HOLD),
         noise=f"{mean}, by the data sheet {sheet.name}",
-        errors=errors,
-        source=source,
-    )
-
-
-def _sensor_of_campaign(folder: Path) -> NewSensor:
-    """Calibrate a campaign, and take what was found for the truth."""
-    from accelstudy.campaign.calibration.fit import fit_campaign
-    from accelstudy.campaign.format import read_campaign
-    from accelstudy.data_sheets.measured import sheet_of_campaign
-    from accelstudy.sensors.models import get_model
-    from accelstudy.study.new_study import OF_THE_PAPER, NewSensor
-
-    sheet, campaign = sheet_of_campaign(folder), read_campaign(folder)
-    model = get_model("bias-scale-nonorthogonality")
-    fit = fit_campaign(campaign, model)
-    found = dict(zip(model.parameter_names, fit.parameters.tolist(), strict=True))
-    errors = {
-        effect.name: tuple(found[parameter.name] for parameter in effect.parameters)
-        for effect in model.effects
-    }
-    robot = {} if campaign.sigma_angle is None else {"sigma_angle": campaign.sigma_angle}
-    return NewSensor(
-        sigma=sheet.sigma_mean(1.0),
-        noise=f"as {campaign.name} states it",
-        gravity=campaign.gravity,
-        errors=errors,
-        source=dict.fromkeys(OF_THE_PAPER, f"as the calibration of {campaign.name} finds them"),
-        campaign=folder,
-        **robot,
+        errors={**OF_THE_PAPER, **{name: (size, -size, size) for name, size in known.items()}},
+        source=dict.fromkeys(known, f"of the size in the data sheet {sheet.name}"),
     )
 
 

@@ -22,8 +22,6 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-12
 """Added to scaled normal matrices, so that a singular one gives a huge variance, not an error."""
-MAX_VARIANCE = 1e8
-"""Scaled variance of a parameter above which its effect does not show."""
 POWER = 16
 """Exponent of the power mean that stands for the larger of several mean squares."""
 MINIMAX, ROBUST, DISCRIMINATE = "minimax", "robust", "discriminate"
@@ -37,13 +35,13 @@ class Criterion(ABC):
     ----------
     name : str
     text : str, what it minimises, for people
-    unknowns : int, number of parameters that the positions must determine
+    wanted : tuple of (k,) int arrays, sets of parameters that positions must determine
     degree : int, of e^criterion as a function of the variances
     """
 
     name: str
     text: str
-    unknowns: int
+    wanted: tuple[NDArray[np.int_], ...]
     degree: int
 
     @abstractmethod
@@ -67,10 +65,6 @@ class Criterion(ABC):
         """Lower bound of this criterion, given that of `convex`."""
         return convex
 
-    def blind(self, normal: Array) -> str:
-        """What a normal matrix leaves undetermined beyond its rank; empty if nothing."""
-        return ""
-
 
 @dataclass(frozen=True)
 class Determinant(Criterion):
@@ -87,11 +81,14 @@ class Determinant(Criterion):
     text: str = "determinant of the covariance matrix of the parameters"
 
     @property
-    def unknowns(self) -> int:  # type: ignore[override]
+    def wanted(self) -> tuple[NDArray[np.int_], ...]:  # type: ignore[override]
         """The estimated parameters."""
-        return len(self.places)
+        return (self.places,)
 
-    degree = unknowns
+    @property
+    def degree(self) -> int:  # type: ignore[override]
+        """The determinant has one of each parameter."""
+        return len(self.places)
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
@@ -193,9 +190,9 @@ class MeanSquare(Criterion):
     degree = 1
 
     @property
-    def unknowns(self) -> int:  # type: ignore[override]
-        """Parameters of the largest calibration."""
-        return max(len(part.places) for part in self.parts)
+    def wanted(self) -> tuple[NDArray[np.int_], ...]:  # type: ignore[override]
+        """The parameters of each calibration."""
+        return tuple(part.places for part in self.parts)
 
     def squares(self, normal: Array) -> Array:
         """All mean squares, (a, ...)."""
@@ -236,16 +233,6 @@ class MeanSquare(Criterion):
         return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * part.variance)))
 
 
-@dataclass(frozen=True)
-class Discrimination(MeanSquare):
-    """Mean square of the sizes from which two effects can be told from each other."""
-
-    def blind(self, normal: Array) -> str:
-        """Whether a parameter of one of the effects looks like the other, or like nothing."""
-        hidden = self.squares(normal).max() > MAX_VARIANCE
-        return "they do not tell the two effects apart" if hidden else ""
-
-
 def get_criterion(name: str, task: Task) -> Criterion:
     """Return a criterion by its name, of `CRITERIA` or for effects that the task neglects.
 
@@ -262,7 +249,7 @@ def get_criterion(name: str, task: Task) -> Criterion:
         return Determinant(places)
     if name == DISCRIMINATE:
         first, second = (task.places(effect) for effect in task.neglected)
-        return Discrimination(
+        return MeanSquare(
             name,
             "mean square of the sizes at which the two effects can be told from each other",
             tuple(

@@ -84,8 +84,9 @@ def estimability(
     Rank and condition are those at the ideal sensor (all parameters zero): what is singular there
     is near-singular for every real sensor. The cofactors are taken at `parameters`.
 
-    Noise gives any readings full rank. So of readings a combination of parameters counts as
+    Noise gives any readings full rank. So by readings a combination of parameters counts as
     determined only if it shows by `ABOVE_NOISE` times what the noise adds to the design matrix.
+    Without a `blur` the positions are exact, as in a study, whose simulation shows what noise does.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def estimability(
     forces : (n, 3) array, m/s², optional
         Noisy readings in place of the directions, corrected up to a linear map: their lengths
         count, as unit vectors would have the sensor's errors in their directions.
-    blur : float, m/s², noise of these readings
+    blur : float, m/s², noise of readings by which they are judged
     """
     known = known or {}
     noise = noise or Noise()
@@ -111,7 +112,7 @@ def estimability(
     given = (model, approach, noise, ideal, gravity, hold, known)
     a = _design(directions, *given)
     rank, condition, free = exact = rank_of(a)
-    if forces is not None:
+    if blur and not free.any():
         shifts = blur / gravity * np.eye(3)
         changes = np.concatenate([_design(directions + shift, *given) - a for shift in shifts])
         rank, condition, free = rank_of(a, ABOVE_NOISE * changes)

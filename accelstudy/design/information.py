@@ -9,7 +9,7 @@ themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,9 +20,12 @@ from accelstudy.adjustment.equations import equations_of
 from accelstudy.adjustment.gauss_helmert import whitened_design
 from accelstudy.adjustment.observations import AngleErrors
 from accelstudy.approaches import Approach
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import angles_of
+from accelstudy.leveling.distribution import NOISE, Tilt
+from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
@@ -56,9 +59,34 @@ class Information:
         every = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
         return cls(_triangle(every) if len(every) > every.shape[1] else every, len(every))
 
+    @classmethod
+    def of_covariance(cls, covariance: ArrayLike) -> Information:
+        """Information of estimates of this covariance (u, u), SI; `InputError` if singular."""
+        try:
+            root = np.linalg.inv(np.linalg.cholesky(np.asarray(covariance, dtype=float)))
+        except np.linalg.LinAlgError:
+            raise InputError("a covariance matrix must be positive definite") from None
+        return cls(root, len(root))
+
+    @property
+    def normal(self) -> Array:
+        """Normal matrix RᵀR, (u, u)."""
+        return np.asarray(self.rows.T @ self.rows)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix of all parameters, (u, u), at unit weight; NaN if not determined."""
+        errors = self.errors(range(self.rows.shape[1]))
+        return np.full_like(self.normal, np.nan) if errors is None else errors @ errors.T
+
     def beside(self, unknown: int) -> Information:
         """Information on the other parameters if the first ones are unknown, too."""
         return Information(_triangle(self.rows)[unknown:, unknown:], self.conditions - unknown)
+
+    @property
+    def determined(self) -> bool:
+        """Whether all parameters are determined."""
+        return rank_of(self.rows)[0] == self.rows.shape[1]
 
     def undetermined(self, estimated: Sequence[int] | NDArray[np.int_]) -> NDArray[np.bool_]:
         """Which of the estimated parameters are not determined."""
@@ -100,6 +128,62 @@ class Information:
         errors[:, len(estimated) :] *= np.asarray(sizes)
         return errors
 
+    def tilt(
+        self,
+        error: TiltError,
+        estimated: Sequence[int] | NDArray[np.int_],
+        neglected: Mapping[str, tuple[Sequence[int] | NDArray[np.int_], float]] | None = None,
+    ) -> Tilt | None:
+        """Tilt error that a calibration leaves; None if its parameters are not determined.
+
+        Parameters
+        ----------
+        error : TiltError, of the first parameters; those that follow (gravity) cause none in use
+        estimated : columns of the parameters that it estimates
+        neglected : mapping of effect to columns and sd of its parameters, SI; those that are not
+            estimated are neglected, and cause an error
+        """
+        sizes = {
+            i: (effect, size)
+            for effect, (columns, size) in (neglected or {}).items()
+            for i in columns
+            if size and i not in estimated
+        }
+        errors = self.errors(estimated, [*sizes], [size for _, size in sizes.values()])
+        if errors is None:
+            return None
+        causes = (*[NOISE] * len(estimated), *(effect for effect, _ in sizes.values()))
+        root = errors[: len(error.reference)]
+        return Tilt(root.T @ error.quadratic @ root, causes)
+
+    def gain(self, candidates: Array, weight: Array | None = None) -> Array:
+        """What each of k further positions would bring.
+
+        A position with the rows A turns the covariance Q into Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q. So the
+        log-determinant of the information grows by log det (I + A Q Aᵀ), the D criterion, and the
+        mean square tr(W Q) falls by tr[(I + A Q Aᵀ)⁻¹ A Q W Q Aᵀ], the I criterion (Fedorov 1972,
+        Theory of optimal experiments, chapter 4).
+
+        Parameters
+        ----------
+        candidates : (k, c, u) array, rows of the positions
+        weight : (v, v) array, W, of the first parameters; without it the determinant counts
+
+        Returns
+        -------
+        (k,) array; NaN if the parameters are not determined
+        """
+        root = self.errors(range(self.rows.shape[1]))
+        if root is None:
+            return np.full(len(candidates), np.nan)
+        seen = candidates @ root
+        with_noise = np.eye(seen.shape[1]) + seen @ seen.swapaxes(1, 2)
+        if weight is None:
+            return np.asarray(np.linalg.slogdet(with_noise)[1])
+        first = root[: len(weight)]
+        part = seen @ (first.T @ weight @ first) @ seen.swapaxes(1, 2)
+        return np.trace(np.linalg.solve(with_noise, part), axis1=1, axis2=2)
+
 
 def _triangle(rows: Array) -> Array:
     """R of a QR decomposition."""
@@ -131,7 +215,7 @@ def rank_of(a: Array, least: Array | None = None) -> tuple[int, float, NDArray[n
     # R has the same null space, and saves a matrix of all conditions by all conditions.
     triangle = _triangle(a * unit) if len(a) > u else a * unit
     values = np.linalg.svd(triangle, compute_uv=False)
-    floor = np.concatenate([least * unit, SINGULAR * (values[0] or 1.0) * np.eye(u)])
+    floor = np.concatenate([least * unit, SINGULAR * (values.max(initial=0.0) or 1.0) * np.eye(u)])
     back = np.linalg.inv(_triangle(floor))
     # The whole null space is wanted, also of a matrix with fewer rows than columns.
     _, ratios, vt = np.linalg.svd(triangle @ back, full_matrices=True)

@@ -122,18 +122,23 @@ def rounded(directions: Array) -> Array:
 
 def undetermined(task: Task, criterion: Criterion, directions: Array) -> str:
     """Why positions do not determine what is wanted; empty if they do."""
-    return task.missing(directions) or criterion.blind(task.normal(directions))
+    if reason := task.missing(directions):
+        return reason
+    information = task.information(directions)
+    if any(information.undetermined(each).any() for each in criterion.wanted):
+        return "they do not tell the two effects apart"
+    return ""
 
 
 def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
     if reason := undetermined(task, criterion, directions):
         raise InputError(f"the allowed attitudes do not suffice: {reason}")
+    unknown = max(len(each) for each in criterion.wanted)
     rank_before = int(np.linalg.matrix_rank(task.prior))
-    least = -(-(criterion.unknowns - rank_before) // task.approach.n_conditions)
+    least = -(-(unknown - rank_before) // task.approach.n_conditions)
     if n < least:
         raise InputError(
-            f"{n} positions do not determine {criterion.unknowns} parameters; "
-            f"at least {least} are needed"
+            f"{n} positions do not determine {unknown} parameters; at least {least} are needed"
         )
 
 

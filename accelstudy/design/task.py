@@ -33,7 +33,7 @@ LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 class Task:
     """A calibration whose positions are to be chosen.
 
-    All matrices are of scaled parameters. The unit of a parameter is the standard deviation that
+    Normal matrices are of scaled parameters. The unit of a parameter is the standard deviation that
     one position gives it, on average over all attitudes, if all others are known. So no number
     depends on a choice of units, and a criterion weighs all parameters by what positions can tell.
 
@@ -110,37 +110,35 @@ class Task:
             self.extended, self.approach, self.noise, directions, None, self.gravity, hold
         )
 
-    def _scaled_rows(self, directions: ArrayLike) -> Array:
-        return self._rows(np.asarray(directions, dtype=float)) / self.scale
-
     def informations(self, directions: ArrayLike) -> Array:
         """Scaled information of each of k positions, (k, u, u)."""
-        return information(self._scaled_rows(directions))
+        return information(self._rows(np.asarray(directions, dtype=float)) / self.scale)
 
     @cached_property
     def _before(self) -> Array:
-        """Scaled rows of what is known before the first position, (m, u)."""
+        """Rows of what is known before the first position, (m, u), SI."""
         sigmas = dict(self.prior_sigmas)
         if self.noise.sigma_gravity > 0:
             sigmas["g"] = self.noise.sigma_gravity
-        known = np.diag([1 / sigmas.get(name, np.inf) for name in self.names]) / self.scale
+        known = np.diag([1 / sigmas.get(name, np.inf) for name in self.names])
         if self.measured is None:
             return known
-        rows = self._scaled_rows(self.measured)
+        rows = self._rows(self.measured)
         return np.concatenate([known, rows.reshape(-1, len(self.names))])
 
     @cached_property
     def prior(self) -> Array:
         """Scaled information before the first position, (u, u)."""
-        return np.asarray(self._before.T @ self._before)
+        scaled = self._before / self.scale
+        return np.asarray(scaled.T @ scaled)
 
     def normal(self, directions: ArrayLike) -> Array:
         """Scaled normal matrix of positions and of what was known before, (u, u)."""
         return self.prior + self.informations(directions).sum(axis=0)
 
     def information(self, directions: ArrayLike) -> Information:
-        """What positions, and what was known before, tell of the scaled parameters."""
-        return Information.of(self._before, self._scaled_rows(directions))
+        """What positions, and what was known before, tell of all parameters, SI."""
+        return Information.of(self._before, self._rows(np.asarray(directions, dtype=float)))
 
     @cached_property
     def tilt(self) -> TiltError:
@@ -177,23 +175,26 @@ class Task:
         Neglected effects contribute as a scatter of their given size. Infinite where the positions
         do not determine the model.
         """
-        columns = np.flatnonzero(self.estimated), np.flatnonzero(~self.estimated)
-        errors = self.information(directions).errors(*columns, self.neglected_sigmas)
-        if errors is None:
-            return np.full(2, np.inf)
-        return np.sqrt(np.einsum("us,auw,ws->a", errors, self.tilt_weights, errors, optimize=True))
+        neglected = {effect: (self.places(effect), size) for effect, size in self.neglected.items()}
+        estimated = np.flatnonzero(self.estimated)
+        tilt = self.information(directions).tilt(self.tilt, estimated, neglected)
+        return np.full(2, np.inf) if tilt is None else tilt.rms
 
     def missing(self, directions: Array) -> str:
-        """Why positions do not determine the model; empty if they do."""
-        columns = np.flatnonzero(self.estimated)
-        if not self.information(directions).undetermined(columns).any():
-            return ""
-        scheme = Scheme("allowed", "allowed", directions, "generated", "")
-        hold = HoldPlan().hold(len(directions))
-        determined = estimability(
-            scheme, self.model, self.approach, self.noise, None, self.gravity, hold
-        )
-        return determined.reason or "they hardly determine the model"
+        """Why readings in positions do not determine the model; empty if they do."""
+        measured = directions
+        if self.measured is not None:
+            measured = np.concatenate([self.measured, directions])
+        return estimability(
+            Scheme("allowed", "allowed", measured, "generated", ""),
+            self.model,
+            self.approach,
+            self.noise,
+            gravity=self.gravity,
+            hold=HoldPlan().hold(len(measured)),
+            known={name: (0.0, sigma) for name, sigma in self.prior_sigmas.items()},
+            blur=self.noise.sigma_force,
+        ).reason
 
 
 def extended_model(model: SensorModel, effects: list[str]) -> SensorModel:

@@ -38,8 +38,6 @@ COURSES = ("slow change in time", "temperature")
 USUAL_SHARES = (1e-4, 1e-3)
 """Parts of g by which an effect of typical size changes a reading."""
 
-Texts = list[str]
-
 
 @dataclass(frozen=True)
 class Parameter:
@@ -265,27 +263,6 @@ def get_effect(spec: str) -> Effect:
         if name not in names:
             raise UnknownNameError(f"parameter of the effect {effect.name!r}", name, names)
     return effect.only(tuple(i for i, name in enumerate(names) if name in wanted))
-
-
-def formulas(effect: Effect) -> dict[str, Texts | list[Texts]]:
-    """Write what an effect adds as text that a program can evaluate, its settings as numbers.
-
-    Returns
-    -------
-    dict
-        "output" (3), "axes" (3 × 3) and "reading" (2), as far as they are not zero, of f_x, f_y,
-        f_z (m/s², along the sensitive axes; the output of all others for one that acts last), g,
-        the parameters and the columns of `HoldConditions`.
-    """
-    output, axes, reading = expressions(effect)
-    texts: dict[str, Texts | list[Texts]] = {}
-    if any(part != 0 for part in output):
-        texts["output"] = [_text(part) for part in output]
-    if any(part != 0 for row in axes for part in row):
-        texts["axes"] = [[_text(part) for part in row] for row in axes]
-    if any(part != 0 for part in reading):
-        texts["reading"] = [_text(part) for part in reading]
-    return texts
 
 
 def expressions(

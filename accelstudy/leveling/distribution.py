@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -36,6 +36,73 @@ LENGTHS = 40_001
 """Lengths of which shares are tabulated; between them, shares are right to 1e-8."""
 
 
+NOISE = "noise"
+STEPS_OF_BOTH = 17
+"""Errors at which the share of calibrations below is computed, to interpolate between."""
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """Tilt error that calibrations leave on average, of normal errors about the truth.
+
+    A mean square is a weighted sum of χ² variables, approximated by a scaled χ² of the same mean
+    and variance.
+
+    Attributes
+    ----------
+    form : (2, s, s) array, rad², mean squares over attitudes of the errors of roll and of pitch, as
+        quadratic forms of s independent standard normal variables
+    causes : tuple of str, of these variables: `NOISE`, or a neglected effect
+    """
+
+    form: Array
+    causes: tuple[str, ...]
+
+    def with_noise(self, factor: float) -> Tilt:
+        """The same with the noise of all observations multiplied by a factor."""
+        factors = np.array([factor if cause == NOISE else 1.0 for cause in self.causes])
+        return replace(self, form=self.form * np.outer(factors, factors))
+
+    @cached_property
+    def squares(self) -> dict[str, Array]:
+        """Mean square of the errors of roll and of pitch, (2,), rad², by each cause."""
+        each = np.maximum(np.diagonal(self.form, axis1=1, axis2=2), 0.0)  # rounding of zero
+        causes = np.array(self.causes)
+        return {c: each[:, causes == c].sum(axis=1) for c in dict.fromkeys(self.causes)}
+
+    @property
+    def rms(self) -> Array:
+        """Rms over attitudes, calibrations and sensors, (2,), rad."""
+        return np.sqrt(np.trace(self.form, axis1=1, axis2=2))
+
+    @cached_property
+    def _chi_squared(self) -> tuple[Array, Array]:
+        """Factor and degrees of freedom, (2,)."""
+        return scaled_chi_squared(self.rms**2, 2 * np.sum(self.form**2, axis=(1, 2)))
+
+    def quantile(self, probability: float) -> Array:
+        """Error of each angle by itself that this share of the calibrations stays below, (2,)."""
+        factor, freedom = self._chi_squared
+        return np.sqrt(factor * special.chdtri(freedom, 1 - probability))
+
+    def of_both(self, probability: float) -> float:
+        """Error that roll and pitch both stay below in this share of the calibrations, rad.
+
+        The mean squares of the two angles are taken to be independent: their correlation is 0.1 at
+        most, up to tilts of 80 gon.
+        """
+        factor, freedom = self._chi_squared
+        ends = [self.quantile(p).max() for p in (probability, (1 + probability) / 2)]
+        squares = np.linspace(ends[0] ** 2, ends[1] ** 2, STEPS_OF_BOTH)[:, None]
+        both = special.chdtr(freedom, squares / factor).prod(axis=1)
+        return float(np.sqrt(np.interp(probability, both, squares[:, 0])))
+
+
+def scaled_chi_squared(mean: Array, variance: Array) -> tuple[Array, Array]:
+    """Factor and degrees of freedom of the scaled χ² with a mean and a variance."""
+    return variance / (2 * mean), 2 * mean**2 / variance
+
+
 @dataclass(frozen=True)
 class TiltDistribution:
     """The rms over attitudes of the errors of roll and of pitch, and the larger of the two.
@@ -66,7 +133,7 @@ class TiltDistribution:
         """Factor and degrees of freedom, (2,), of the scaled χ² with equal mean and variance."""
         forms, linear = self._forms
         variance = 2 * np.einsum("aij,aij->a", forms, forms) + 4 * (linear**2).sum(axis=1)
-        return variance / (2 * self.mean_squares), 2 * self.mean_squares**2 / variance
+        return scaled_chi_squared(self.mean_squares, variance)
 
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles of roll, of pitch and of the larger, (3, k), rad."""

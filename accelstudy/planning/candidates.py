@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.approaches import get_approach
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.design.information import Information
+from accelstudy.design.information import Information, position_rows
+from accelstudy.effects import HoldConditions
+from accelstudy.leveling.distribution import Tilt
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.planning.question import Equipment, Question
-from accelstudy.planning.theory import Expected, Theory, theory_of
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
+from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -27,6 +31,17 @@ PLANNED_MODELS = (
     f"{NINE}-crossaxis+quadratic_scale",
     f"{NINE}-crossaxis+quadratic_scale+cubic_scale",
 )
+OF_SENSOR = (
+    "bias",
+    "scale",
+    "nonorthogonality",
+    "cross_axis_misalignment",
+    "quadratic_scale",
+    "cubic_scale",
+    "mounting_rotation",
+)
+OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
+"""Effects of the sensor and of the rig that a plan considers."""
 ROTATIONS = {"cross_axis_misalignment", "mounting_rotation"}
 """Effects that have the rotation of the sensor against what tells its attitude."""
 FAMILY = "fibonacci"
@@ -48,7 +63,8 @@ class Candidate:
     scheme : Scheme
     hold : float, s
     sigma : float, m/s², of the mean of a position
-    expected : Expected
+    tilt : Tilt, that it leaves by linear theory
+    redundancy : int
     """
 
     equipment: Equipment
@@ -56,7 +72,8 @@ class Candidate:
     scheme: Scheme
     hold: float
     sigma: float
-    expected: Expected
+    tilt: Tilt
+    redundancy: int
 
     @property
     def seconds(self) -> float:
@@ -71,13 +88,13 @@ class Candidate:
     @cached_property
     def rms(self) -> float:
         """Larger rms of roll and pitch, rad."""
-        return float(self.expected.rms.max())
+        return float(self.tilt.rms.max())
 
     def accuracy(self, confidence: float | None) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
         if confidence is None:
             return self.rms
-        return self.expected.of_both(confidence)
+        return self.tilt.of_both(confidence)
 
     def reaches(self, target: float, confidence: float | None) -> bool:
         """Whether the tilt accuracy is reached."""
@@ -130,31 +147,76 @@ def of_scheme(
     if equipment.reference is not None:  # the rotation between the sensors is unknown
         models = [model for model in models if ROTATIONS & {*names_of(model)}]
 
-    @cache
-    def expected(sigma: float) -> list[Expected | None]:
-        """Errors that each of the models leaves."""
-        theory = theory_of(question.tilt_range)
-        information = information_of(question, equipment, theory, scheme.directions, sigma)
-        return [theory.expected(information, names_of(m), question.neglectable) for m in models]
+    n, single = scheme.n_positions, equipment.name == "gravity"
 
-    n = scheme.n_positions
+    @cache
+    def tilts(sigma: float) -> list[tuple[SensorModel, Tilt | None, int]]:
+        """What each of the models that are checked leaves, and its redundancy."""
+        information = information_of(question, equipment, scheme.directions, sigma)
+        left = {model: information.conditions - model.n_parameters for model in models}
+        return [
+            (model, tilt_of(question, information, model, question.neglectable), r)
+            for model, r in left.items()
+            if r >= LEAST_REDUNDANCY * information.conditions
+        ]
+
     for hold in question.holds:
         if equipment.seconds(n, hold) > question.most_seconds:
             continue
         sigma = sigma_of(question, equipment, n, hold)
-        single = equipment.name == "gravity"  # with a single noise, errors are in proportion to it
-        for model, each in zip(models, expected(1.0 if single else sigma), strict=True):
-            if each is not None and each.redundancy >= LEAST_REDUNDANCY * each.conditions:
-                own = each.with_noise(sigma) if single else each
-                yield Candidate(equipment, model, scheme, hold, sigma, own)
+        # With a single noise, errors are in proportion to it.
+        for model, tilt, redundancy in tilts(1.0 if single else sigma):
+            if tilt is not None:
+                own = tilt.with_noise(sigma) if single else tilt
+                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy)
+
+
+@cache
+def every_effect() -> tuple[SensorModel, dict[str, list[int]]]:
+    """The model with every effect, and the columns of the parameters of each.
+
+    What positions tell of all its parameters is computed once; a calibration with fewer effects
+    estimates some of them, and neglects others.
+    """
+    model = get_model("+".join((*OF_SENSOR, *OF_RIG)))
+    names = list(model.parameter_names)
+    return model, {e.name: [names.index(p.name) for p in e.parameters] for e in model.effects}
+
+
+@cache
+def error_up_to(tilt_range: float) -> TiltError:
+    """Tilt error up to a tilt, rad, by all parameters of `every_effect`."""
+    model, forces = every_effect()[0], cap_forces(tilt_range, ATTITUDES)
+    ideal = np.zeros(model.n_parameters)
+    return tilt_error(model, ideal, model, ideal, forces, hold=HoldPlan().use(forces, 1))
 
 
 def information_of(
-    question: Question, equipment: Equipment, theory: Theory, directions: Array, sigma: float
+    question: Question, equipment: Equipment, directions: Array, sigma: float
 ) -> Information:
-    """What a calibration tells of the parameters of every effect."""
-    noise = Noise(sigma, angle_sigma(question, equipment))
-    return theory.information(directions, equipment.approach, noise, equipment.reference)
+    """What a calibration tells of the parameters of every effect.
+
+    Errors of a reference, 0 ± 1 and common to all positions, are unknown beside them.
+    """
+    hold, errors = HoldConditions(yaw=np.zeros(len(directions))), None
+    if equipment.reference is not None:
+        errors = partial(equipment.reference.errors, gravity=STANDARD_GRAVITY)
+    noise, model = Noise(sigma, angle_sigma(question, equipment)), every_effect()[0]
+    approach = get_approach(equipment.approach)
+    rows = position_rows(model, approach, noise, directions, hold=hold, errors=errors)
+    shared = rows.shape[-1] - model.n_parameters
+    rows = np.roll(rows, shared, axis=-1)  # errors of the reference come first
+    return Information.of(rows, np.eye(shared, rows.shape[-1])).beside(shared)
+
+
+def tilt_of(
+    question: Question, information: Information, model: SensorModel, sizes: Mapping[str, float]
+) -> Tilt | None:
+    """Tilt error that a model leaves beside effects of some sizes, SI; None if undetermined."""
+    _, columns = every_effect()
+    estimated = [i for effect in names_of(model) for i in columns[effect]]
+    neglected = {effect: (columns[effect], size) for effect, size in sizes.items()}
+    return information.tilt(error_up_to(question.tilt_range), estimated, neglected)
 
 
 def angle_sigma(question: Question, equipment: Equipment) -> float:

@@ -14,11 +14,11 @@ import yaml
 from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
+from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.reasons import limits
-from accelstudy.planning.theory import NOISE
 from accelstudy.planning.wording import (
     answer_lines,
     assumption_lines,
@@ -136,9 +136,9 @@ def _row(candidate: Candidate) -> dict[str, Any]:
         "hold_s": candidate.hold,
         "sensor_sigma_mps2": candidate.sigma,
         "minutes": candidate.seconds / 60,
-        "redundancy": candidate.expected.redundancy,
+        "redundancy": candidate.redundancy,
     }
     for i, angle in enumerate(ANGLES):
-        row[f"{angle}_rms_mgon"] = float(candidate.expected.rms[i]) / MGON
-        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.expected.squares[NOISE][i])) / MGON
+        row[f"{angle}_rms_mgon"] = float(candidate.tilt.rms[i]) / MGON
+        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.tilt.squares[NOISE][i])) / MGON
     return row

@@ -9,9 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from accelstudy.effects import get_effect
-from accelstudy.planning.candidates import Candidate, information_of, names_of
+from accelstudy.leveling.distribution import NOISE, Tilt
+from accelstudy.planning.candidates import (
+    OF_RIG,
+    Candidate,
+    error_up_to,
+    every_effect,
+    information_of,
+    names_of,
+    tilt_of,
+)
 from accelstudy.planning.question import Question
-from accelstudy.planning.theory import NOISE, OF_RIG, Expected, theory_of
 
 PLAIN = {
     "nonorthogonality": "angles between the axes",
@@ -79,13 +87,13 @@ class InUse:
 
 def limits(question: Question, candidate: Candidate) -> str:
     """What limits the accuracy of a candidate, in a few words."""
-    worse = int(np.argmax(candidate.expected.rms))
-    parts = {cause: each[worse] for cause, each in candidate.expected.squares.items()}
+    worse = int(np.argmax(candidate.tilt.rms))
+    parts = {cause: each[worse] for cause, each in candidate.tilt.squares.items()}
     noise = parts.pop(NOISE)
     by_words = {f"neglected {PLAIN[effect]}": square for effect, square in parts.items()}
     if candidate.equipment.name == "robot":
-        quiet = _expected(replace(question, sigma_angle=1e-12), candidate, {})
-        robot = noise - (0.0 if quiet is None else quiet.squares[NOISE][worse])
+        quiet = _tilt(replace(question, sigma_angle=1e-12), candidate, {})
+        robot = noise - quiet.squares[NOISE][worse]
         by_words["noise of the robot's angles"], noise = robot, noise - robot
     walk = question.sheet.velocity_random_walk
     if walk is not None:
@@ -105,11 +113,10 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
         effects += OF_RIG
     else:
         effects.append("gravity_error")
-    expected = _expected(question, candidate, dict.fromkeys(effects, 1.0))
-    assert expected is not None
+    squares = _tilt(question, candidate, dict.fromkeys(effects, 1.0)).squares
     sizes = []
     for effect in effects:
-        each = float(np.sqrt(expected.squares[effect].max()))
+        each = float(np.sqrt(squares[effect].max()))
         # An effect without influence leaves rounding errors only.
         size = math.inf if each < 1e-6 else question.target / each
         low, high = get_effect(effect).typical
@@ -120,13 +127,13 @@ def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
     return sizes
 
 
-def _expected(
-    question: Question, candidate: Candidate, sizes: Mapping[str, float]
-) -> Expected | None:
-    """Errors in the positions of a candidate beside effects of other sizes."""
-    theory, directions = theory_of(question.tilt_range), candidate.scheme.directions
-    told = information_of(question, candidate.equipment, theory, directions, candidate.sigma)
-    return theory.expected(told, names_of(candidate.model), sizes)
+def _tilt(question: Question, candidate: Candidate, sizes: Mapping[str, float]) -> Tilt:
+    """Tilt error in the positions of a candidate beside effects of other sizes."""
+    at = candidate.scheme.directions, candidate.sigma
+    information = information_of(question, candidate.equipment, *at)
+    tilt = tilt_of(question, information, candidate.model, sizes)
+    assert tilt is not None
+    return tilt
 
 
 def in_use(
@@ -134,14 +141,14 @@ def in_use(
 ) -> InUse:
     """Tilt errors in use that add to that of the calibration."""
     sheet = question.sheet
-    theory = theory_of(question.tilt_range)
+    quadratic, columns = error_up_to(question.tilt_range).quadratic, every_effect()[1]
 
     def tilt(**sigmas: float) -> float:
         """Rms of the worse angle that independent errors of each axis leave; by effect, SI."""
-        variance = np.zeros(len(theory.quadratic[0]))
+        variance = np.zeros(len(quadratic[0]))
         for effect, sigma in sigmas.items():
-            variance[theory.columns[effect]] = sigma**2
-        return float(np.sqrt(np.einsum("auu,u->a", theory.quadratic, variance).max()))
+            variance[columns[effect]] = sigma**2
+        return float(np.sqrt(np.einsum("auu,u->a", quadratic, variance).max()))
 
     drift = warmth = restart = math.nan
     changes = (sheet.bias_instability, sheet.acceleration_random_walk, sheet.bias_rate)

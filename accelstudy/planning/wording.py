@@ -109,7 +109,7 @@ def table_lines(answer: Answer) -> list[str]:
 
 def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
     candidate = ranked.candidate
-    source = ranked.simulated or candidate.expected
+    source = ranked.simulated or candidate.tilt
     about = "" if ranked.simulated else "~"
     ends = (source.rms, source.quantile(0.025), source.quantile(0.975))
     cells = [

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import Observations, whitened_jacobian
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.fit import (
+    CampaignFit,
     angle_errors,
     campaign_estimability,
     campaign_noise,
@@ -25,13 +27,14 @@ from accelstudy.campaign.calibration.fit import (
 from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
+from accelstudy.design.information import Information
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.leveling.angles import angles_of, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.choice import Chooser, typical_sizes
-from accelstudy.sequential.estimate import NOTHING_KNOWN, Estimate, Prior, estimate
-from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known
+from accelstudy.sequential.choice import Chooser, Knowledge, typical_sizes
+from accelstudy.sequential.prior import Prior
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -105,9 +108,7 @@ class Advice:
         return last if last in self.suspects else None
 
 
-def _check(
-    campaign: Campaign, model: SensorModel, approach: Approach, prior: Prior | SensorType
-) -> None:
+def _check(campaign: Campaign, model: SensorModel, approach: Approach, known: bool) -> None:
     """Raise `InputError` where no number of positions would be enough."""
     if campaign.n_positions:
         check_campaign(campaign, model, approach)
@@ -115,8 +116,7 @@ def _check(
         raise InputError(
             f"{campaign.name}: approach {approach.name!r} needs the block `robot` in the header"
         )
-    noise = campaign_noise(campaign)
-    if prior is NOTHING_KNOWN and is_blind(model, approach, noise, campaign.gravity):
+    if not known and is_blind(model, approach, campaign_noise(campaign), campaign.gravity):
         or_robot = "" if approach.uses_angles else ", or a robot"
         raise InputError(
             f"the {approach.name} approach cannot determine the model {model.name!r} in any "
@@ -130,12 +130,13 @@ def advise(
     approach: Approach,
     promise: Promise,
     directions: Array,
-    prior: Prior | SensorType = NOTHING_KNOWN,
+    prior: Prior | SensorType | None = None,
 ) -> Advice:
     """Advise in a session that is being measured.
 
-    The session so far is calibrated and assessed as any campaign, and advice follows that: which
-    positions are odd, how large a tilt error is left, and whether anything is wrong.
+    The session so far is calibrated and assessed as any campaign, and advice follows that: what is
+    determined, which positions are odd, how large a tilt error is left, and whether anything is
+    wrong.
 
     Parameters
     ----------
@@ -151,61 +152,51 @@ def advise(
     InputError
         If no number of positions would be enough.
     """
-    _check(campaign, model, approach, prior)
-    no_prior = prior is NOTHING_KNOWN
-    sensor_type = prior if isinstance(prior, SensorType) else None
-    beforehand = prior if isinstance(prior, Prior) else Prior.of_known(prior.known, model)
-    assessed = _assessed(replace(campaign, of_type=sensor_type), model, approach)
-    initial = None
-    if no_prior and campaign.n_positions:
-        initial = initial_values(model, campaign.forces, campaign.gravity)
-    so_far = estimate(model, approach, campaign_observations(campaign), beforehand, initial)
-    if no_prior and assessed is None:
-        so_far = replace(so_far, solved=np.zeros(1, dtype=bool))
-    solved = bool(so_far.solved[0])
+    _check(campaign, model, approach, prior is not None)
+    earlier = prior if isinstance(prior, Prior) else None
+    campaign = replace(campaign, of_type=prior if isinstance(prior, SensorType) else None)
+    assessed = _assessed(campaign, model, approach)
+    fit = None if assessed is None or earlier is not None else assessed.fit
+    known, at = _knowledge(campaign, model, approach, fit, earlier)
 
-    noise, stated = campaign_noise(campaign), campaign.sigma_force is not None
+    stated = campaign.sigma_force is not None
     trusted = stated if assessed is None else assessed.fit.trusts_sigma
     wrong = assessed is not None and assessed.state in (REJECTED, IMPLAUSIBLE)
+    noise = campaign_noise(campaign)
+    if fit is not None:
+        noise = replace(noise, sigma_force=float(np.mean(np.asarray(fit.observed.sigma_force))))
     hold = campaign.hold if campaign.n_positions else next_holds(campaign, np.eye(3)[2:])
-    at = so_far.parameters[0, : model.n_parameters] if solved else None
     chooser = Chooser(
         directions,
         next_rows(campaign, model, approach, noise, directions),
         promise.tilt_error(model, at, campaign.gravity, hold),
         promise,
-        known if trusted else bound,
-        typical_sizes(model, so_far.information.shape[-1]),
+        known_variance if trusted else bound,
+        typical_sizes(model, known.information.rows.shape[1]),
     )
-    rms = np.full((1, 2), np.inf)
-    if solved and assessed is not None and stated and (no_prior or sensor_type is not None):
-        rms = tilt_left(assessed.fit, promise.tilt_range)[None]
-    elif solved:
-        rms = chooser.rms(so_far.cofactors, so_far.omega, so_far.redundancy)
-    enough = bool(promise.reached(rms)[0]) and not wrong
+    rms = chooser.rms(known) if fit is None or not stated else tilt_left(fit, promise.tilt_range)
+    enough = bool(promise.reached(rms)) and not wrong
 
     last = None
     if campaign.n_positions:
         last = -campaign.forces[-1] / np.linalg.norm(campaign.forces[-1])
     # The conditions of later positions are unknown.
     to_go, varying = None, bool(CONDITIONS & {*model.hold_columns})
-    foreseeable = (trusted or so_far.redundancy >= LEAST_REDUNDANCY) and not varying
+    foreseeable = (trusted or known.redundancy >= LEAST_REDUNDANCY) and not varying
     if foreseeable and not enough and not wrong:
-        variance = 1.0 if trusted else float(so_far.omega[0]) / so_far.redundancy
-        to_go = chooser.positions_to_go(so_far, variance, rms[0], last)
-    before = None if last is None else last[None]
-    choice = chooser.choose(so_far.information, so_far.solved, rms, before)[0]
+        variance = 1.0 if trusted else known.omega / known.redundancy
+        to_go = chooser.positions_to_go(known, variance, rms, last)
     suspects = () if assessed is None else assessed.suspects
     advice = Advice(
         positions=campaign.positions,
         p_last=np.nan if assessed is None else float(assessed.p_adjusted[-1]),
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         state="" if assessed is None else assessed.state,
-        undetermined=() if solved else _undetermined(campaign, model, approach, so_far),
-        vague=_vague(model, so_far) if solved else (),
-        noise=_noise_taken(so_far, campaign, trusted, noise.sigma_force),
-        rms=rms[0] if np.isfinite(rms).all() else None,
-        next=chooser.directions[choice],
+        undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
+        vague=_vague(model, known) if known.determined else (),
+        noise=_noise_taken(known, campaign, trusted, noise.sigma_force),
+        rms=rms if np.isfinite(rms).all() else None,
+        next=directions[chooser.choose(known, rms, last)],
         to_go=to_go,
         foreseeable=foreseeable,
         enough=enough,
@@ -223,14 +214,49 @@ def _assessed(campaign: Campaign, model: SensorModel, approach: Approach) -> Ass
         return None
 
 
+def _knowledge(
+    campaign: Campaign,
+    model: SensorModel,
+    approach: Approach,
+    fit: CampaignFit | None,
+    prior: Prior | None,
+) -> tuple[Knowledge, Array]:
+    """What is known so far, and parameters near it: those of the calibration if there is one."""
+    observed = campaign_observations(campaign)
+    adjustment = None if fit is None else fit.adjustment
+    if prior is not None:
+        adjustment = prior.calibrate(model, approach, observed)
+        start = prior.mean
+    elif campaign.n_positions:
+        start = initial_values(model, campaign.forces, campaign.gravity)
+    else:
+        start = model.vector({name: mean for name, (mean, _) in observed.known.items()})
+    if adjustment is not None and adjustment.converged[0]:
+        information = Information.of_covariance(adjustment.cofactors[0])
+        known = Knowledge(information, True, float(adjustment.omega[0]), adjustment.redundancy)
+        return known, adjustment.parameters[0, : model.n_parameters]
+    # The raw readings at the first values of the parameters, and what is known beforehand.
+    if campaign.n_positions:
+        rows = [whitened_jacobian(model, approach, observed, start)]
+    else:
+        weights = CalibrationProblem.of(model, approach, observed).weights
+        rows = [np.diag(np.sqrt(weights))[weights > 0]]
+    if prior is not None:
+        more = rows[0].shape[1] - model.n_parameters
+        rows.append(np.pad(prior.information.rows, ((0, 0), (0, more))))
+    information = Information.of(*rows)
+    redundancy = information.conditions - rows[0].shape[1]
+    determined = campaign.n_positions == 0 and information.determined
+    return Knowledge(information, determined, 0.0 if determined else np.nan, redundancy), start
+
+
 def _undetermined(
-    campaign: Campaign, model: SensorModel, approach: Approach, so_far: Estimate
+    campaign: Campaign, model: SensorModel, approach: Approach, known: Knowledge
 ) -> tuple[str, ...]:
     """Parameters that the positions do not determine better than their typical size."""
-    names, information = model.parameter_names, so_far.information[0]
-    sizes = typical_sizes(model, len(information))
-    covariance = np.linalg.inv(information + np.diag(sizes**-2.0))
-    sigma = np.sqrt(np.diag(covariance))[: len(names)]
+    names, rows = model.parameter_names, known.information.rows
+    sizes = typical_sizes(model, rows.shape[1])
+    sigma = np.sqrt(np.diag(Information.of(rows, np.diag(1 / sizes)).covariance))
     vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN_RATIO * size]
     if vague or not campaign.n_positions:
         return tuple(vague)
@@ -238,25 +264,24 @@ def _undetermined(
     return tuple(name for name in theory.not_estimable if name in names)
 
 
-def _vague(model: SensorModel, so_far: Estimate) -> tuple[str, ...]:
+def _vague(model: SensorModel, known: Knowledge) -> tuple[str, ...]:
     """Parameters that are known less well than they are of any cheap sensor."""
-    names = model.parameter_names
-    sigma = np.sqrt(np.diag(so_far.cofactors[0]))[: len(names)]
+    names, sigma = model.parameter_names, np.sqrt(np.diag(known.information.covariance))
     sizes = typical_sizes(model, len(names))
-    return tuple(n for n, s, size in zip(names, sigma, sizes, strict=True) if s > size)
+    return tuple(n for n, s, size in zip(names, sigma, sizes, strict=False) if s > size)
 
 
-def _noise_taken(so_far: Estimate, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:
+def _noise_taken(known: Knowledge, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:
     """Noise of a position by which the accuracy is judged."""
-    stated, r = campaign.sigma_force, so_far.redundancy
+    stated, r = campaign.sigma_force, known.redundancy
     seen, taken = None, stated
-    if so_far.solved[0] and r > 0:
-        seen = unit * float(np.sqrt(so_far.omega[0] / r))
+    if known.determined and r > 0:
+        seen = unit * float(np.sqrt(known.omega / r))
     refuted = stated is not None and not trusted
     if refuted:
         taken = seen
     elif stated is None:
-        largest = float(np.sqrt(bound(so_far.omega, r)[0]))
+        largest = float(np.sqrt(bound(known.omega, r)))
         taken = unit * largest if np.isfinite(largest) else None
     return NoiseTaken(stated, seen, taken, refuted, r)
 

@@ -78,26 +78,16 @@ class Promise:
         return np.asarray(np.all(rms <= self.accuracy, axis=-1))
 
     def weight(self, error: TiltError, rms: Array) -> Array:
-        """W of the next choice, (R, u, u): mean variance of the angles that miss the promise.
+        """W of the next choice, (..., u, u): mean variance of the angles that miss the promise.
 
-        rms : (R, 2) array, of roll and pitch so far
+        rms : (..., 2) array, of roll and pitch so far
         """
         missing = (rms > self.accuracy) | self.reached(rms)[..., None]
         share = missing / missing.sum(axis=-1, keepdims=True)
-        return np.einsum("ra,auw->ruw", share, error.quadratic)
+        return np.einsum("...a,auw->...uw", share, error.quadratic)
 
 
-def rms_of(error: TiltError, cofactors: Array, variance: Array | float = 1.0) -> Array:
-    """Rms of roll and of pitch, (R, 2), rad, by cofactors (R, u', u') and variances of unit weight.
-
-    Gravity, where it is estimated, does not count.
-    """
-    u = len(error.reference)
-    covariance = cofactors[:, :u, :u] * np.reshape(variance, (-1, 1, 1))
-    return np.array([error.rms_of_all(each) for each in covariance]).reshape(-1, 2)
-
-
-def known(omega: ArrayLike, redundancy: int) -> Array:
+def known_variance(omega: ArrayLike, redundancy: int) -> Array:
     """Variance of unit weight where the noise is known: 1."""
     return np.ones(np.shape(omega))
 

@@ -165,15 +165,13 @@ def apply(
 
 
 @verb
-def export(calibration: Calibration | str | PathLike[str], *, form: str = "json") -> str:
+def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -> str:
     """Print a calibration in a form that a device takes.
-
-    json and yaml carry every effect: parameters with sigmas and units, and the formulas to
-    implement. matrix holds M in force = M · (x, y, z, 1), if nothing but the force matters, and
-    that linearly.
 
     c is a header in C99 with the function accel_calibrate. It takes the reading and, where effects
     depend on them, temperature, time and vibration. What depends on the position before is refused.
+
+    matrix holds M in force = M · (x, y, z, 1), if nothing but the force matters, and that linearly.
 
     px4 is a parameter file for PX4: an offset, a scale and a polynomial of the temperature for each
     axis, closest to the calibration over all attitudes. What PX4 cannot hold is said, with the
@@ -186,7 +184,7 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "json"
     calibration : Calibration or path
         A calibration.json.
     form : str
-        Form: json, yaml, c, matrix or px4.
+        Form: c, matrix or px4.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import in_si, verb
+from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
     from accelstudy import Calibration, Campaign, Comparison, History, Lot
@@ -47,9 +47,10 @@ def compare(
     InputError
         If they are not of one sensor, or have no effect in common.
     """
+    given = {**locals()}
     from accelstudy.api.epochs import Comparison
 
-    return Comparison.of(first, second, in_si(tilt_range))
+    return Comparison.of(**given)
 
 
 @verb

@@ -18,19 +18,25 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment import Observations
+from accelstudy.adjustment import Adjustment, Observations, calibrate
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
 from accelstudy.basics import units
 from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.design.estimability import estimability
-from accelstudy.design.information import position_rows
+from accelstudy.design.information import Information, position_rows
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import angles_of, tilt_slope
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import NINE, get_model
-from accelstudy.sequential.choice import DEFAULTS, Chooser, candidates, typical_sizes
-from accelstudy.sequential.estimate import Estimate, estimate
-from accelstudy.sequential.promise import Promise, bound, known, rms_of
+from accelstudy.sequential.choice import (
+    DEFAULTS,
+    Chooser,
+    Knowledge,
+    candidates,
+    typical_sizes,
+)
+from accelstudy.sequential.promise import Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
@@ -57,7 +63,7 @@ def plain(omega: ArrayLike, redundancy: int) -> Array:
 
 
 RULES: dict[str, tuple[Any, Any, str]] = {
-    "known": (known, "-", "noise known"),
+    "known": (known_variance, "-", "noise known"),
     "bound": (bound, "--", "upper bound from residuals"),
     "plain": (plain, ":", "as the residuals seem"),
 }
@@ -111,53 +117,72 @@ def simulate(
     truth = np.exp(rng.uniform(low, high, (sessions, len(low))))
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
-    so_far, last = _estimate(approach, forces, angles), None
+    known, _ = _known(approach, forces, angles)
+    last: list[Array | None] = [None] * sessions
     rms, going, ended = np.full((sessions, 2), np.inf), np.ones(sessions, dtype=bool), []
     while going.any():
-        chosen = chooser.choose(so_far.information, so_far.solved, rms, last)
-        last = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
-        last /= np.linalg.norm(last, axis=1, keepdims=True)
-        f_b = -units.STANDARD_GRAVITY * last[:, None]
+        chosen = [chooser.choose(*each) for each in zip(known, rms, last, strict=True)]
+        taken = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
+        taken /= np.linalg.norm(taken, axis=1, keepdims=True)
+        last, f_b = [*taken], -units.STANDARD_GRAVITY * taken[:, None]
         angle = angles_of(f_b)
         force = MODEL.sense(f_b, truth) + NOISE.sigma_force * rng.standard_normal(f_b.shape)
         angle = angle + MODEL.reading_errors(angle, truth)
         angle = angle + NOISE.sigma_angle * rng.standard_normal(angle.shape)
         forces, angles = np.hstack([forces, force]), np.hstack([angles, angle])
-        so_far = _estimate(approach, forces, angles)
-        ok, rms = so_far.solved, np.full((sessions, 2), np.inf)
-        rms[ok] = chooser.rms(so_far.cofactors[ok], so_far.omega[ok], so_far.redundancy)
-        kept = chooser.promise.reached(rms)
-        over = np.flatnonzero(going & (kept | (so_far.n_positions == most_positions)))
+        known, result = _known(approach, forces, angles)
+        rms = np.array([chooser.rms(each) for each in known])
+        kept, n = chooser.promise.reached(rms), forces.shape[1]
+        over = np.flatnonzero(going & (kept | (n == most_positions)))
         going[over] = False
-        outcome = _outcome(chooser, rule, so_far.sessions(over), truth[over])
-        ended.append(outcome.set_index(over).assign(kept=kept[over]))
+        if len(over):
+            assert result is not None  # so many positions determine the model
+            outcome = _outcome(chooser, rule, result, truth, over)
+            ended.append(outcome.set_index(over).assign(kept=kept[over], positions=n))
     table = pd.concat(ended).sort_index()
     table[LABELS] = approach, rule, multiple, promise.accuracy
     return table
 
 
-def _estimate(approach: str, forces: Array, angles: Array) -> Estimate:
+def _known(
+    approach: str, forces: Array, angles: Array
+) -> tuple[list[Knowledge], Adjustment | None]:
+    """What each session tells so far, and the calibrations if there are enough conditions."""
     sigmas = NOISE.sigma_force, NOISE.sigma_angle
     observed = Observations(forces, sigmas[0], angles, sigmas[1], units.STANDARD_GRAVITY)
-    return estimate(MODEL, get_approach(approach), observed)
+    problem = CalibrationProblem.of(MODEL, get_approach(approach), observed)
+    rows = problem.rows(problem.initial)  # of raw readings
+    redundancy, known = rows.shape[1] - MODEL.n_parameters, []
+    result = None if redundancy < 0 else calibrate(MODEL, get_approach(approach), observed)
+    for i, of_readings in enumerate(rows):
+        if result is not None and result.converged[i]:
+            information = Information.of_covariance(result.cofactors[i])
+            known.append(Knowledge(information, True, float(result.omega[i]), redundancy))
+        else:
+            known.append(Knowledge(Information.of(of_readings), False, np.nan, redundancy))
+    return known, result
 
 
-def _outcome(chooser: Chooser, rule: str, at_end: Estimate, truth: Array) -> pd.DataFrame:
+def _outcome(
+    chooser: Chooser, rule: str, result: Adjustment, truth: Array, over: NDArray[np.int_]
+) -> pd.DataFrame:
     """Results of sessions that have ended with as many positions, one row each."""
-    r, cofactors, delta = at_end.redundancy, at_end.cofactors, at_end.parameters - truth
-    width = sigmas_95() * np.ones((len(truth), 1))
+    r, cofactors, omega = result.redundancy, result.cofactors[over], result.omega[over]
+    delta = result.parameters[over] - truth[over]
+    width = sigmas_95() * np.ones((len(over), 1))
     if rule != "known":
-        width = sigmas_95(r) * np.sqrt(at_end.omega[:, None] / r)
+        width = sigmas_95(r) * np.sqrt(omega[:, None] / r)
     # Intervals of angles are checked level, and tilted by the tilt range.
     sin, cos = np.sin(TILT_RANGE), np.cos(TILT_RANGE)
     down = np.array([(0, 0, 1), (sin, 0, cos), (-sin, 0, cos), (0, sin, cos), (0, -sin, cos)])
     f_b, ideal = -units.STANDARD_GRAVITY * down, np.zeros(MODEL.n_parameters)
     slopes = tilt_slope(MODEL, ideal, f_b, f_b, units.STANDARD_GRAVITY).reshape(-1, len(ideal))
-    outcome = pd.DataFrame({"positions": np.full(len(truth), at_end.n_positions)})
+    outcome = pd.DataFrame(index=range(len(over)))
     for what, rows in (("parameters", np.eye(len(ideal))), ("angles", slopes)):
         sigmas = np.sqrt(np.sum(rows @ cofactors * rows, axis=2))
         outcome[f"{what}_inside"] = np.mean(abs(delta @ rows.T) <= width * sigmas, axis=1)
-    outcome[["true_roll", "true_pitch"]] = rms_of(chooser.error, cofactors)
+    true = np.array([chooser.error.rms_of_all(each) for each in cofactors])
+    outcome[["true_roll", "true_pitch"]] = true
     outcome[["actual_roll", "actual_pitch"]] = chooser.error.rms(delta)
     return outcome
 

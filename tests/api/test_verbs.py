@@ -12,6 +12,7 @@ import pytest
 import yaml
 from calling import call, refusal, succeed
 from matplotlib.figure import Figure
+from places import ROOT
 from scipy import stats
 
 import accelstudy as acs
@@ -340,3 +341,18 @@ def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     (tmp_path / "simulated/simulation.json").unlink()
     with pytest.raises(acs.InputError, match="is not empty"):
         result.save(tmp_path / "simulated")
+
+
+def test_files_of_the_first_versions_still_read():
+    """A campaign and its calibration.json as 0.1.0 and 0.2.0 wrote them, byte for byte alike."""
+    folder = ROOT / "tests/campaign/version_0_2"
+    new = acs.calibrate(folder, model="bias-scale", approach="gravity")
+    old = acs.read_calibration(folder)
+    assert {"date", "axes", "sigmas_95"} <= {*new.content} - {*old.content}
+    for table in ("parameters", "covariance", "correlation"):
+        pd.testing.assert_frame_equal(getattr(old, table), getattr(new, table), rtol=1e-9)
+    assert (old.state, acs.compare(old, new).state) == (new.state, "unchanged")
+    log = pd.DataFrame(new.fit.campaign.forces, columns=["fx", "fy", "fz"])
+    how = {"rate": 1, "columns": {axis: axis for axis in log}}
+    pd.testing.assert_frame_equal(acs.apply(old, log, **how), acs.apply(new, log, **how))
+    assert acs.export(old, form="c").startswith("/*")

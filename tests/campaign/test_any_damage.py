@@ -132,7 +132,7 @@ READ_BY = {
     "parquet/positions.parquet": ["effects --campaign FOLDER"],
     "calibration.json": [
         "apply FILE WHOLE/log.csv --out OUT.csv", "compare WHOLE/calibration.json FILE --out OUT",
-        *(f"export FILE --form {form}" for form in ("c", "px4", "json")),
+        *(f"export FILE --form {form}" for form in ("c", "px4")),
     ],
     "settings.yaml": ["import WHOLE/log.csv --out OUT --no-figure --settings FILE"],
     "log.csv": OF_LOG, "log.mat": OF_LOG, "log.parquet": OF_LOG,

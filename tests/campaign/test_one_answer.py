@@ -1,20 +1,26 @@
 """What a campaign determines, and how good it is, is the same in every command."""
 
 import json
+import re
 
 import numpy as np
 import pytest
+import yaml
 from calling import refusal, succeed
 from campaign_helpers import FIVE_AXES
 from page_helpers import text_of
 
 import accelstudy as acs
+from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import assessed_positions
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.session import Campaign
+from accelstudy.data_sheets import of_sigma
+from accelstudy.planning.candidates import of_scheme
+from accelstudy.planning.question import BY_HAND, Question
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
@@ -31,9 +37,14 @@ def written(folder, directions, seed, outside=None):
     return folder
 
 
-def test_nine_positions_of_rank_eight(tmp_path):
+NEARLY = FIVE_AXES + 1e-4 * np.random.default_rng(3).standard_normal((9, 3))
+
+
+@pytest.mark.parametrize("directions", [FIVE_AXES, NEARLY], ids=["rank 8", "nearly"])
+def test_nine_positions_of_rank_eight(tmp_path, directions):
     """Some draws of the noise made them nine, with scales of 100 000 ppm."""
-    campaign = written(tmp_path / "nine", FIVE_AXES, seed=24)
+    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    campaign = written(tmp_path / "nine", directions, seed=24)
     says = "rank 8 of 9: s_x, s_y, s_z"
     assert says in refusal("calibrate", campaign, "--out", tmp_path / "calibrated")
     assert says in refusal("diagnose", campaign, "--out", tmp_path / "diagnosis")
@@ -41,6 +52,20 @@ def test_nine_positions_of_rank_eight(tmp_path):
     said = succeed("advise", campaign, "--tilt-accuracy", "5mgon").output
     assert "not determined yet" in said
     assert "CAN STOP" not in said.upper()
+    # And before anything is measured.
+    scheme, allowed = tmp_path / "nine.yaml", tmp_path / "nine.csv"
+    scheme.write_text(yaml.safe_dump({"scheme": "nine", "directions": directions.tolist()}))
+    assert re.search(r" 8/9 .* s_x, s_y, s_z", succeed("schemes", scheme).output)
+    np.savetxt(allowed, directions, delimiter=",", header="x,y,z", comments="")
+    asked = ("--attitudes", allowed, "--positions", 9, "--approach", "gravity")
+    assert says in refusal("design", *asked, "--out", tmp_path / "design.yaml")
+    scheme.write_text(
+        yaml.safe_dump({"scheme": "nine", "directions": np.tile(directions, (2, 1)).tolist()})
+    )
+    question = Question(10 * MGON, 30 * GON, of_sigma(0.002), (BY_HAND,), schemes=(str(scheme),))
+    models = [get_model("bias-scale-nonorthogonality")]
+    planned = [*of_scheme(question, BY_HAND, get_scheme(str(scheme)), models)]
+    assert all(each.rms > 1 * GON for each in planned)
 
 
 def test_the_approach_follows_the_campaign_and_is_said(tmp_path):

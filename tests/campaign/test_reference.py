@@ -21,7 +21,6 @@ from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import next_rows
-from accelstudy.sequential.estimate import estimate
 from accelstudy.simulation.sessions import Noise
 
 NINE = get_model("bias-scale-nonorthogonality")
@@ -133,14 +132,6 @@ def test_the_part_of_the_reference_is_what_its_errors_add(known):
     part = fit.sigma**2 - np.diag(fit.by_reference)
     assert np.all(fit.sigma > sigma)
     np.testing.assert_allclose(np.sqrt(part), sigma, rtol=0.05)
-
-
-def test_advice_estimates_the_same(campaign):
-    observed = campaign_observations(campaign)
-    together = calibrate(TWELVE, ROBOT, observed)
-    so_far = estimate(TWELVE, ROBOT, observed)
-    np.testing.assert_allclose(so_far.parameters, together.parameters, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(so_far.cofactors, together.cofactors, rtol=1e-6, atol=1e-15)
 
 
 def test_the_next_position_shares_the_errors(campaign):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from accelstudy.design.information import Information, rank_of
+from accelstudy.leveling.error import TiltError
 
 RNG = np.random.default_rng(1)
 UNITS = 10.0 ** RNG.uniform(-4, 4, 8)
@@ -64,3 +65,38 @@ def test_what_is_not_determined_is_told_whatever_the_units(noise):
     assert information.errors([0, 1, 4]) is not None
     assert not information.undetermined([0, 1, 4]).any()
     assert rank_of(rows)[0] == 7
+
+
+def test_what_a_further_position_brings():
+    before, more = ROWS.reshape(-1, 8), MORE
+    covariance = np.linalg.inv(before.T @ before)
+    weight = RNG.standard_normal((3, 5))
+    weight = weight.T @ weight / np.outer(UNITS[:5], UNITS[:5])
+    information = Information.of(before)
+    grown, fallen = information.gain(more), information.gain(more, weight)
+    for rows, log, square in zip(more, grown, fallen, strict=True):
+        after = np.linalg.inv(before.T @ before + rows.T @ rows)
+        logs = [np.linalg.slogdet(each / np.outer(UNITS, UNITS))[1] for each in (covariance, after)]
+        assert log == pytest.approx(logs[0] - logs[1], rel=1e-9)
+        fall = np.sum(weight * (covariance - after)[:5, :5])
+        assert square == pytest.approx(fall, rel=1e-9)
+
+
+def test_the_tilt_error_of_draws():
+    """Noise of unit weight, and neglected parameters of some sizes, by least squares."""
+    estimated, neglected, sizes = [0, 2, 3], [5, 6], 0.4 / UNITS[[5, 6]]
+    root = RNG.standard_normal((2, 4, 8)) / UNITS
+    error = TiltError(np.zeros(8), np.zeros(2), np.zeros((2, 8)), root.swapaxes(1, 2) @ root)
+    left = {"bent": ([5], sizes[0]), "bumped": ([6], sizes[1])}
+    tilt = Information.of(ROWS).tilt(error, estimated, left)
+    design, lacking = ROWS.reshape(-1, 8)[:, estimated], ROWS.reshape(-1, 8)[:, neglected]
+    values = sizes * RNG.standard_normal((100_000, 2))
+    seen = RNG.standard_normal((100_000, len(design))) + values @ lacking.T
+    found = np.zeros((100_000, 8))
+    scale = UNITS[estimated]
+    found[:, estimated] = seen @ np.linalg.pinv(design / scale).T / scale
+    found[:, neglected] = -values
+    squares = error.squares(found)
+    np.testing.assert_allclose(np.sqrt(squares.mean(axis=0)), tilt.rms, rtol=0.01)
+    assert [*tilt.squares] == ["noise", "bent", "bumped"]
+    assert Information.of(ROWS[:, :1, :2].repeat(4, 2)).tilt(error, estimated) is None

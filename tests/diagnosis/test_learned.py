@@ -1,18 +1,11 @@
 """Learned functions: beside plain Gaussian processes, exported, and in campaigns that hide one."""
 
-import json
-
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROBOT, G, least, some_holds
+from diagnosis_helpers import ROBOT, G, least, some_holds
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import read_calibration
-from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.export import export
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.drawing.style import group_of, symbol
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.leveling.angles import specific_force
@@ -121,43 +114,3 @@ def test_its_parameters_have_symbols_in_figures():
     names = get_model(f"bias+{SPEC}, length=0.25, amplitude=0.01)").parameter_names
     assert [symbol(name) for name in names[3:]][:2] == ["$h_{x,1}$", "$h_{x,2}$"]
     assert {group_of(name) for name in names} == {"bias", "learned"}
-
-
-@pytest.fixture(scope="module")
-def calibration(tmp_path_factory):
-    """Of a sensor with a learned function of the temperature."""
-    spec = f"{SPEC}, length=0.6, amplitude=0.01)"
-    settings = CampaignSettings(
-        scheme="fibonacci-30", temperature=(LOW, HIGH), temperature_order="random", effects=(spec,)
-    )
-    model = get_model(f"{NINE.name}+{spec}")
-    fit = fit_campaign(simulate_campaign(settings)[0], model, ROBOT)
-    path = tmp_path_factory.mktemp("learned") / "calibration.json"
-    path.write_text(json.dumps(calibration_document(fit)))
-    return read_calibration(path)
-
-
-@pytest.fixture(scope="module")
-def readings():
-    """Readings, some of them beyond the range of the temperature."""
-    forces = 9 * np.random.default_rng(3).standard_normal((8, 3))
-    return forces, np.linspace(0, 50, 8)
-
-
-def test_exported_formulas_correct_as_the_calibration_does(calibration, readings):
-    """Evaluated by Python alone."""
-    whole = json.loads(export(calibration, "json"))
-    expected = calibration.correct(readings[0], some_holds(8, temperature=readings[1]))
-    values = {p["name"]: p["value"] for e in whole["effects"] for p in e["parameters"]}
-    for reading, warm, one in zip(*readings, expected, strict=True):
-        known = {"sin": np.sin, "Abs": np.abs, "temperature": warm, "g": G, **values}
-
-        def added(part, known=known):
-            texts = [e[part] for e in whole["effects"] if part in e]
-            return sum(np.vectorize(lambda text: eval(text, known), [float])(t) for t in texts)
-
-        f_a = reading
-        for _ in range(50):
-            known |= dict(zip(("f_x", "f_y", "f_z"), f_a, strict=True))
-            f_a = reading - added("output")
-        np.testing.assert_allclose((np.eye(3) + added("axes")) @ f_a, one, atol=1e-10)

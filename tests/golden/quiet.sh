@@ -20,8 +20,8 @@ accelstudy schemes --quiet faces-6
 accelstudy effects --quiet
 accelstudy public --quiet
 accelstudy export calibrated/calibration.json --form json
+accelstudy export calibrated/calibration.json --form c
 accelstudy export calibrated/calibration.json --quiet --form matrix
-accelstudy export calibrated/calibration.json --form yaml
 accelstudy export calibrated/calibration.json --form matrix
 accelstudy calibrate nowhere --out nothing
 accelstudy export nowhere.json

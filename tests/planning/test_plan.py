@@ -26,12 +26,11 @@ from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
-from accelstudy.planning.candidates import NINE, candidates, names_of
+from accelstudy.planning.candidates import NINE, candidates, information_of, tilt_of
 from accelstudy.planning.optimised import Sought
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
-from accelstudy.planning.theory import theory_of
 from accelstudy.planning.wording import (
     answer_lines,
     effort,
@@ -41,11 +40,9 @@ from accelstudy.planning.wording import (
 )
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise
 from accelstudy.study.config import parse_study, read_study
 
 MODEL = get_model(NINE)
-MODELLED = names_of(MODEL)
 MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 SIZES = (9, 12, 20, 30, 40, 80, 120)
@@ -90,25 +87,29 @@ def asked(sheet=None, **options):
 # --- linear theory -------------------------------------------------------------------------------
 
 
+def left(model, sizes, approach="gravity", sigma=SIGMA):
+    """Tilt error that a calibration in McLaren's positions leaves, by linear theory."""
+    question, equipment = asked(), {"gravity": BY_HAND, "robot": ROBOT}[approach]
+    information = information_of(question, equipment, MCLAREN.directions, sigma)
+    return tilt_of(question, information, model, sizes)
+
+
 @pytest.mark.parametrize(("model", "approach"), [
     (NINE, "gravity"), (f"{NINE}-quadratic-cubic", "robot"), ("bias-scale", "robot"),
 ])  # fmt: skip
 def test_columns_of_one_model_are_the_designs_of_all(model, approach):
-    model, theory = get_model(model), theory_of(30 * GON)
-    told = theory.information(MCLAREN.directions, approach, Noise())
+    model = get_model(model)
     zeros = np.zeros(model.n_parameters)
     error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
     own = estimability(MCLAREN, model, get_approach(approach))
-    expected = theory.expected(told, names_of(model), {})
-    np.testing.assert_allclose(expected.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
-    assert expected.redundancy == own.redundancy
+    found = left(model, {}, approach)
+    np.testing.assert_allclose(found.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
 
 
 def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
     # Ten sensors of quadratic scales drawn with the size that is expected, without noise.
-    size, theory = 300e-6, theory_of(30 * GON)
-    told = theory.information(MCLAREN.directions, "gravity", Noise(sigma_force=1e-9))
-    expected = theory.expected(told, MODELLED, {"quadratic_scale": size})
+    size = 300e-6
+    expected = left(MODEL, {"quadratic_scale": size}, sigma=1e-9)
     draws = size * np.random.default_rng(3).standard_normal((10, 3))
     whitened = np.cov(draws.T, bias=True) + np.outer(draws.mean(0), draws.mean(0))
     draws = draws @ np.linalg.inv(np.linalg.cholesky(whitened)).T * size  # of just that size
@@ -133,9 +134,7 @@ def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE):
 
 
 def test_the_quantile_is_that_of_draws():
-    theory = theory_of(30 * GON)
-    told = theory.information(MCLAREN.directions, "robot", Noise())
-    expected = theory.expected(told, MODELLED, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6})
+    expected = left(MODEL, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6}, "robot")
     rng = np.random.default_rng(1)
     draws = rng.standard_normal((200_000, len(expected.causes)))
     squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.form], 1)
@@ -148,11 +147,9 @@ def test_the_quantile_is_that_of_draws():
 
 
 def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
-    theory = theory_of(30 * GON)
     turned = get_model(f"{NINE}-crossaxis")
-    for approach, seen in (("gravity", False), ("robot", True)):
-        told = theory.information(MCLAREN.directions, approach, Noise())
-        assert (theory.expected(told, names_of(turned), {}) is not None) is seen
+    assert left(turned, {}, "gravity") is None
+    assert left(turned, {}, "robot") is not None
 
 
 # --- candidates and their ranking ----------------------------------------------------------------
@@ -177,7 +174,7 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
 def test_simulation_agrees_with_linear_theory(plan):
     for ranked in plan.ranked:
         if ranked.simulated is not None:
-            expected, simulated = ranked.candidate.expected.rms, ranked.simulated
+            expected, simulated = ranked.candidate.tilt.rms, ranked.simulated
             assert simulated.simulated == plan.replicates
             assert np.all(np.abs(simulated.rms - expected) < 4 * simulated.error + 0.01 * expected)
 
@@ -239,11 +236,9 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
     sizes = {s.effect: s for s in spoilers(question, candidate)}
     assert math.isinf(sizes["gravity_error"].size)
     assert sizes["base_tilt"].size < 20 * MGON
-    theory = theory_of(question.tilt_range)
-    told = theory.information(MCLAREN.directions, "robot", Noise(0.002, question.sigma_angle))
     for name, spoiler in sizes.items():
         if math.isfinite(spoiler.size):
-            alone = theory.expected(told, MODELLED, {name: spoiler.size}).squares[name]
+            alone = left(MODEL, {name: spoiler.size}, "robot").squares[name]
             assert np.sqrt(alone.max()) == pytest.approx(question.target, rel=1e-9)
 
 

@@ -14,12 +14,10 @@ from accelstudy.data_sheets import of_sigma
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import cap_forces
 from accelstudy.planning.answer import _beside
-from accelstudy.planning.candidates import information_of, names_of
-from accelstudy.planning.question import Equipment, Question, planned_reference
-from accelstudy.planning.theory import theory_of
+from accelstudy.planning.candidates import information_of, tilt_of
+from accelstudy.planning.question import ROBOT, Equipment, Question, planned_reference
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise
 
 SIGMA, RANGE, SESSIONS = 2e-3, 30 * GON, 250
 NINE = get_model("bias-scale-nonorthogonality")
@@ -36,9 +34,8 @@ def test_what_is_left_is_what_simulated_sessions_leave(beside):
     rng = np.random.default_rng(3)
     scheme, reference = get_scheme("fibonacci-15"), beside.reference
     question = Question(10 * MGON, RANGE, of_sigma(SIGMA), (beside,))
-    theory = theory_of(RANGE)
-    told = information_of(question, beside, theory, scheme.directions, SIGMA)
-    expected = theory.expected(told, names_of(TWELVE), {}).rms
+    information = information_of(question, beside, scheme.directions, SIGMA)
+    expected = tilt_of(question, information, TWELVE, {}).rms
     forces, used = -G * scheme.directions, cap_forces(RANGE, 64)
     root = np.linalg.cholesky(np.array(reference.covariance))
     squares = []
@@ -56,9 +53,9 @@ def test_what_is_left_is_what_simulated_sessions_leave(beside):
     # Mean squares of a few independent errors scatter by about their own size.
     np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected, rtol=0.1)
     # With a robot of the same noise it would be clearly less.
-    noise = Noise(SIGMA, reference.sigma_mps2 / G)
-    told = theory.information(scheme.directions, "robot", noise)
-    robot = theory.expected(told, names_of(TWELVE), {}).rms
+    robot = Question(10 * MGON, RANGE, of_sigma(SIGMA), sigma_angle=reference.sigma_mps2 / G)
+    information = information_of(robot, ROBOT, scheme.directions, SIGMA)
+    robot = tilt_of(robot, information, TWELVE, {}).rms
     assert np.all(robot < 0.85 * expected)
 
 

@@ -24,7 +24,6 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
 from accelstudy.drawing.style import model_title
-from accelstudy.effects import HoldConditions
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
@@ -205,50 +204,12 @@ def test_a_calibration_with_the_noise_that_was_found():
 # --- forms for devices ---------------------------------------------------------------------------
 
 
-def by_the_export(text, raw, **conditions):
-    """Calibrate readings as a stranger would, by nothing but the exported JSON."""
-    given = json.loads(text)
-    readings, effects = given["readings"], [e for e in given["effects"] if e["part"] == "sensor"]
-    names = {p["name"]: p["value"] for e in effects for p in e["parameters"]}
-    to_frd = np.array(readings["to_frd"])
-    forces = (raw - np.array(readings["offset"])) * np.array(readings["scale"])
-    f_s = forces @ (np.array(readings["mending"]) @ to_frd).T
-
-    def evaluated(formula, f):
-        known = {"f_x": f[:, 0], "f_y": f[:, 1], "f_z": f[:, 2], "g": given["gravity_mps2"]}
-        functions = {"exp": np.exp, "sign": np.sign, "Abs": np.abs}
-        return eval(formula, {}, {**functions, **known, **names, **conditions}) + np.zeros(len(f))
-
-    f_a = f_s
-    for _ in range(60):
-        added = [[evaluated(o, f_a) for o in e["output"]] for e in effects if "output" in e]
-        f_a = f_s - np.sum(added, axis=0).T
-    turned = [
-        [[evaluated(part, f_a)[0] for part in row] for row in e["axes"]]
-        for e in effects
-        if "axes" in e
-    ]
-    return f_a @ (np.eye(3) + np.sum(turned, axis=0)).T @ to_frd
-
-
-def test_a_stranger_implements_an_exported_calibration(diagnosed):
+def test_forms_hold_what_they_can(diagnosed):
     path = diagnosed / "calibration.json"
-    raw = np.random.default_rng(1).normal(0, 5, (5, 3))
-    time, temperature = np.linspace(0, 1000, 5), np.linspace(10, 40, 5)
-    expected = read_calibration(path).correct(
-        raw, HoldConditions(time=time, temperature=temperature)
-    )
-    text = run("export", path)
-    found = by_the_export(text, raw, time=time, temperature=temperature)
-    np.testing.assert_allclose(found, expected, atol=1e-9)
-    assert json.loads(text)["matrix_3x4"] is None
-    assert set(json.loads(text)["symbols"]) == {"f_x", "g", "time", "temperature"}
-    assert yaml.safe_load(run("export", path, "--form", "yaml")) == json.loads(text)
     arguments = "accel_real temperature, accel_real time, accel_real force[3])"
-    assert arguments in run("export", path, "--form", "c")
+    assert arguments in run("export", path)
     line = refusal("export", path, "--form", "matrix")
     assert "no matrix can hold thermal_bias and warm_up" in line
-    assert "json and yaml" in line
     assert line.count("\n") == 1
 
 
@@ -269,8 +230,6 @@ def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
     assert result.stderr == "warning: the calibration is of mended data: x is read as −y\n"
     matrix = np.array([row.split() for row in result.stdout.splitlines()], float)
     np.testing.assert_allclose(raw @ matrix[:, :3].T + matrix[:, 3], expected, atol=1e-8)
-    by_json = by_the_export(succeed("export", path).stdout, raw)
-    np.testing.assert_allclose(by_json, expected, atol=1e-8)
     header = " ".join(succeed("export", path, "--form", "c").stdout.replace("\n *", " ").split())
     assert f"in the axes {frame}:" in header
     assert ("x forward, y left, z up." in header) == (frame == "flu")
@@ -309,7 +268,7 @@ def test_apply_mends_readings_as_the_data_were(tmp_path):
 
 
 def test_the_rig_stays_where_it_was(tmp_path):
-    """What belongs to the rig is exported with a note, and is in no matrix."""
+    """What belongs to the rig is in no matrix."""
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", order="random"))
     model = get_model("bias+encoder_scale+scale+nonorthogonality")
     fit = fit_campaign(campaign, model, get_approach("robot"))
@@ -321,8 +280,6 @@ def test_the_rig_stays_where_it_was(tmp_path):
         read_calibration(path).covariance, fit.covariance[np.ix_(sensor, sensor)], rtol=1e-12
     )
     assert content["affine"] is not None
-    effects = json.loads(export(read_calibration(path), "json"))["effects"]
-    assert [effect["spec"] for effect in effects if "note" in effect] == ["encoder_scale"]
     assert len(export(read_calibration(path), "matrix").splitlines()) == 3
 
 
@@ -365,6 +322,4 @@ def test_a_part_of_an_effect_is_calibrated_and_read_again(made, tmp_path):
     path.write_text(json.dumps(calibration_document(fit)), encoding="utf-8")
     calibration = read_calibration(path)
     assert calibration.model.parameter_names[9:] == ("k_sat_z",)
-    effect = json.loads(run("export", path))["effects"][-1]
-    assert effect["spec"] == "saturation(knee=9)[k_sat_z]"
-    assert effect["output"][:2] == ["0", "0"]
+    assert "saturation(knee=9)[k_sat_z]" in run("export", path)

@@ -218,7 +218,7 @@ def test_a_calibration_of_before_saves_positions(begun, sessions, tmp_path):
     earlier = tmp_path / "before/calibration.json"
     text = advise(begun(0, "robot"), "--prior", earlier, "--approach", "gravity")
     assert "not determined" not in text
-    assert "tilt accuracy: roll " in text
+    assert "tilt error left: roll " in text
     message = error(begun(0), *WANTED, "--prior", earlier, "--model", "bias-scale")
     assert "calibration.json: calibrates b_x, " in message
 

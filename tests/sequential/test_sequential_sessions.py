@@ -7,22 +7,16 @@ from scipy import stats
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.design.information import position_rows
+from accelstudy.design.information import Information, position_rows
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.choice import (
-    apart_from,
-    best,
-    candidates,
-    gains,
-    typical_sizes,
-)
+from accelstudy.sequential.choice import Chooser, Knowledge, candidates, typical_sizes
 from accelstudy.sequential.promise import (
     LEAST_REDUNDANCY,
     LEVEL,
     Promise,
     bound,
-    rms_of,
+    known_variance,
 )
 from accelstudy.simulation.sessions import Noise
 
@@ -43,13 +37,13 @@ def test_the_gain_is_what_the_position_brings(approach):
     rows = rows_of(approach, "faces-edges-18")
     promise = Promise(10 * MGON, 30 * GON)
     error = promise.tilt_error(NINE)
-    weight = promise.weight(error, np.full((1, 2), 20 * MGON))
+    weight = promise.weight(error, np.full(2, 20 * MGON))
     so_far = measured.T @ measured
     before = np.linalg.inv(so_far)
-    by_leveling = gains(before[None], rows, weight)[0]
+    by_leveling = Information.of(measured).gain(rows, weight)
     sizes = typical_sizes(NINE, 9)
     information = so_far + np.diag(sizes**-2)
-    by_parameters = gains(np.linalg.inv(information)[None], rows)[0]
+    by_parameters = Information.of(measured, np.diag(1 / sizes)).gain(rows)
     for row, leveling, parameters in zip(rows, by_leveling, by_parameters, strict=True):
         after = np.linalg.inv(so_far + row.T @ row)
         fall = np.mean(error.rms_of_all(before) ** 2 - error.rms_of_all(after) ** 2)
@@ -71,23 +65,53 @@ def test_only_what_is_not_yet_accurate_enough_counts():
     assert promise.reached(rms).tolist() == [False, False, False, True]
 
 
+def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
+    """Chooser of the attitudes of a scheme, and of further ones."""
+    chosen = get_scheme(scheme).directions if directions is None else directions
+    promise = Promise(accuracy, 30 * GON)
+    rows = position_rows(NINE, get_approach(approach), Noise(), chosen)
+    error = promise.tilt_error(NINE)
+    return Chooser(chosen, rows, error, promise, known_variance, typical_sizes(NINE, 9))
+
+
+def known(rows, determined):
+    return Knowledge(Information.of(rows), determined, np.nan, len(rows) - 9)
+
+
 def test_of_positions_that_are_as_good_the_first_is_chosen():
-    assert best(np.array([[1.0, 2.0, 2.0], [5.0, 4.96, 1.0], [4.9, 4.9, 5.0]])).tolist() == [
-        1,
-        0,
-        2,
-    ]
+    """A position and its opposite tell of roll and pitch alike, but for the last attitude."""
+    measured = rows_of("gravity", "mclaren-24").reshape(-1, 9)
+    directions = np.repeat(get_scheme("faces-edges-corners-26").directions[[7, 20]], 2, axis=0)
+    of_four = chooser("gravity", "", directions)
+    rms = np.full(2, 20 * MGON)
+    first = of_four.choose(known(measured, True), rms, None)
+    assert first in (0, 2)
+    assert of_four.choose(known(measured, True), rms, directions[first]) == 2 - first
 
 
 def test_nine_positions_by_determinant_determine_nine_parameters():
-    rows, so_far, chosen = rows_of("gravity", "faces-edges-corners-26"), np.zeros((1, 9, 9)), []
+    of_cube, chosen = chooser("gravity", "faces-edges-corners-26"), []
     for _ in range(9):
-        information = so_far + np.diag(typical_sizes(NINE, 9) ** -2.0)
-        chosen.append(int(best(gains(np.linalg.inv(information), rows))[0]))
-        so_far = so_far + rows[chosen[-1]].T @ rows[chosen[-1]]
+        rows = of_cube.rows[chosen].reshape(-1, 9)
+        chosen.append(of_cube.choose(known(rows, False), np.full(2, np.inf), None))
     assert len({*chosen}) == 9
-    design = rows[chosen].reshape(-1, 9)
+    design = of_cube.rows[chosen].reshape(-1, 9)
     assert np.linalg.cond(design / np.linalg.norm(design, axis=0)) < 20
+
+
+def test_what_is_to_go_is_what_choosing_on_comes_to():
+    of_cube = chooser("gravity", "faces-edges-corners-26", accuracy=12 * MGON)
+    so_far, last = known(np.zeros((0, 9)), False), None
+    to_go = of_cube.positions_to_go(so_far, 1.0, np.full(2, np.inf), None)
+    rows, rms = np.zeros((0, 9)), np.full(2, np.inf)
+    while rms.max() > 12 * MGON:
+        chosen = of_cube.choose(so_far, rms, last)
+        last, rows = of_cube.directions[chosen], np.concatenate([rows, of_cube.rows[chosen]])
+        determined = np.linalg.matrix_rank(rows / np.array([1, 1, 1, *[9.8] * 6])) == 9
+        so_far = known(rows, determined)
+        if determined:
+            rms = of_cube.error.rms_of_all(np.linalg.inv(rows.T @ rows))
+    assert to_go == len(rows)
 
 
 def test_attitudes_to_choose_from(tmp_path):
@@ -105,8 +129,6 @@ def test_attitudes_to_choose_from(tmp_path):
     (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n50,0\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"none of .*mine\.csv is within"):
         candidates(str(tmp_path / "mine.csv"), max_roll=20 * GON)
-    free = apart_from(candidates("cube"), candidates("cube")[[3]])
-    assert np.flatnonzero(~free[0]).tolist() == [3]
 
 
 # --- the rule of stopping ------------------------------------------------------------------------
@@ -117,10 +139,3 @@ def test_bounds_of_the_variance():
     assert np.mean(bound(omega, 12) > 1) == pytest.approx(LEVEL, abs=4 * 0.0011)
     assert np.isinf(bound(omega[:2], LEAST_REDUNDANCY - 1)).all()
     assert np.isfinite(bound(omega[:2], LEAST_REDUNDANCY)).all()
-
-
-def test_rms_of_many_is_that_of_each():
-    error = Promise(1.0, 30 * GON).tilt_error(NINE)
-    cofactors = np.stack([np.eye(9) * 1e-8, np.eye(9) * 2e-8])
-    both = rms_of(error, cofactors, np.array([1.0, 3.0]))
-    np.testing.assert_allclose(both[1], error.rms_of_all(6e-8 * np.eye(9)), rtol=1e-12)

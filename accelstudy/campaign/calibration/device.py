@@ -36,8 +36,7 @@ def must_be_known(needs: Iterable[tuple[str, str]]) -> None:
     for effect, column in unknown(needs):
         what = "position before" if column.startswith("step_") else column
         raise InputError(
-            f"{effect} depends on the {what}, which no device knows; calibrate without it, or "
-            "take the form json, which has its formula"
+            f"{effect} depends on the {what}, which no device knows; calibrate without it"
         )
 
 

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 MIN_DIFFERENCES = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""
+_TOGETHER = 2**14
+"""Samples whose differences are taken together: what a processor keeps at hand is small."""
 
 
 @dataclass(frozen=True)
@@ -61,25 +63,41 @@ def pooled_deviation(
         For each record, to the columns of which its channels are turned.
     """
     arrays = [np.asarray(record, dtype=float).reshape(len(record), -1) for record in records]
-    # The averaging times of a short record are the first ones of a long one.
-    factors = np.array(averaging_factors(max(map(len, arrays)) // 2), dtype=int)
+    lengths = np.array([len(record) for record in arrays])
+    factors = np.array(averaging_factors(lengths.max() // 2), dtype=int)
     squares = np.zeros((len(factors), arrays[0].shape[1]))
-    terms, independent = np.zeros((2, len(factors)), dtype=int)
-    for i, record in enumerate(arrays):
-        centred = record - record.mean(axis=0)
-        centred[:, (record == record[:1]).all(axis=0)] = 0.0  # not what rounding the mean leaves
-        turned = centred if frames is None else centred @ frames[i]
-        sums = np.zeros((turned.shape[1], len(record) + 1))
-        np.cumsum(turned.T, axis=1, out=sums[:, 1:])
-        k = np.searchsorted(factors, len(record) // 2, side="right")
-        for at, m in enumerate(factors[:k]):
-            first = sums[:, m:] - sums[:, :-m]
-            second = first[:, m:] - first[:, :-m]
-            squares[at] += np.einsum("cn,cn->c", second, second) / (2.0 * m**2)
-        terms[:k] += len(record) + 1 - 2 * factors[:k]
-        independent[:k] += len(record) // factors[:k] - 1
-    deviation = np.sqrt(squares / terms[:, None])
-    return AllanDeviation(step * factors.astype(float), deviation, independent)
+    for group in np.split(np.arange(len(arrays)), _starts(lengths)):
+        # Running sums of each record, and how many of its samples follow.
+        sums = np.zeros((arrays[0].shape[1], lengths[group].sum() + len(group)))
+        follow = np.concatenate([np.arange(n, -1, -1) for n in lengths[group]])
+        end = 0
+        for i in group:
+            record, first, end = arrays[i], end + 1, end + 1 + lengths[i]
+            centred = record - record.mean(axis=0)
+            centred[:, (record == record[:1]).all(axis=0)] = (
+                0.0  # not what rounding the mean leaves
+            )
+            turned = centred if frames is None else centred @ frames[i]
+            np.cumsum(turned.T, axis=1, out=sums[:, first:end])
+        for at, m in enumerate(factors[2 * factors <= lengths[group].max()]):
+            within = follow[: -2 * m] >= 2 * m
+            for channel, running in enumerate(sums):
+                first = running[m:] - running[:-m]
+                second = first[m:] - first[:-m]
+                if len(group) > 1:
+                    second *= within
+                squares[at, channel] += second @ second / (2.0 * m**2)
+    fits = lengths[:, None] >= 2 * factors
+    terms = np.sum(fits * (lengths[:, None] + 1 - 2 * factors), axis=0)
+    independent = np.sum(fits * (lengths[:, None] // factors - 1), axis=0)
+    return AllanDeviation(
+        step * factors.astype(float), np.sqrt(squares / terms[:, None]), independent
+    )
+
+
+def _starts(lengths: NDArray[np.int_]) -> NDArray[np.int_]:
+    """First records of groups that have some `_TOGETHER` samples each, but for the first group."""
+    return np.flatnonzero(np.diff(np.cumsum(lengths) // _TOGETHER)) + 1
 
 
 def averaging_factors(largest: int) -> list[int]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from statistics import NormalDist
 from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -289,11 +289,12 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.where(step > 0, step / noise, 0.0)
     steps[noise == 0] = np.inf  # every reading is the same in most holds
-    result = []
+    result, normal = [], NormalDist()  # scipy.special takes long to import
     for each in forces:
         n = len(each)
         end, beside = np.sum(each == extremes, axis=2).transpose(1, 0, 2)
-        share = special.ndtr(steps + special.ndtri(min(MAX_BEYOND / n, 0.5)))
+        middle = normal.inv_cdf(min(MAX_BEYOND / n, 0.5))
+        share = np.array([normal.cdf(middle + step) for step in steps])
         explained = n * share + MIN_WITHIN * np.sqrt(n * share * (1 - share))
         piled = (end > np.maximum(MAX_SATURATED_SHARE * n, explained)) & (end > beside)
         result.append(bool(np.any(piled)))

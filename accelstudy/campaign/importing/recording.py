@@ -306,40 +306,51 @@ class Log:
         return self._numbers[0]
 
     @property
-    def start(self) -> float:
-        """Where the times of `rows` begin in the file, s; NaN without a column of time."""
+    def forces(self) -> Array:
+        """Forces of `rows`, (n, 3), m/s²."""
         return self._numbers[1]
 
+    @property
+    def start(self) -> float:
+        """Where the times of `rows` begin in the file, s; NaN without a column of time."""
+        return self._numbers[2]
+
     @cached_property
-    def _numbers(self) -> tuple[pd.DataFrame, float]:
+    def _numbers(self) -> tuple[pd.DataFrame, Array, float]:
         places = [*self.places.values()]
         cells = [self.table.column(p) for p in places] if "table" in vars(self) else None
         values = dict(zip(self.places, self.source.numbers(places, cells), strict=True))
         columns, start = {}, np.nan
         if "time" in values:
             time, start = counted_from_first(values["time"])
-            time = np.where(_usable(time), time * self.time_factor, np.nan)
+            time[~_within(time)] = np.nan
+            time *= self.time_factor
             if "nanoseconds" in values:
                 rest = values["nanoseconds"]
-                time += np.where(_usable(rest), 1e-9 * rest, np.nan)
+                time += np.where(_within(rest), 1e-9 * rest, np.nan)
             first = next(iter(time[np.isfinite(time)]), 0.0)
             columns["time"], start = time - first, start * self.time_factor + first
         elif self.layout.rate_hz is not None:
             columns["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
         frame, conversion = self.layout.axes, self.conversion
         first_rows = np.column_stack([values[axis][:SAMPLED_ROWS] for axis in AXES])
-        read = _usable(first_rows) & ~np.isin(first_rows, SENTINELS)
-        norms = np.linalg.norm(conversion.to_si(first_rows[read.all(axis=1)]), axis=1)
+        read = _is_reading(first_rows).all(axis=1)
+        norms = np.linalg.norm(conversion.to_si(first_rows[read]), axis=1)
         # The unit may be wrong: it is checked by the means of the holds.
         limit = max([MAX_FORCE, *([1000 * np.median(norms)] if len(norms) else [])])
-        for axis, sign, i in zip(AXES, frame.signs, frame.order, strict=True):
-            raw = values[AXES[i]]
-            force = conversion.of_axis(i).to_si(raw)
-            absurd = ~_usable(raw) | (np.abs(force) > limit) | np.isin(raw, SENTINELS)
-            columns[axis] = np.where(absurd, np.nan, sign * force)
+        forces = np.empty((3, len(values["fx"])))
+        for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
+            raw, own = values.pop(AXES[i]), conversion.of_axis(i)
+            np.subtract(raw, own.offset, out=force)
+            force *= sign * own.scale
+            large = ~_within(raw, 2.0**31 - 2)
+            if large.any():
+                force[large] = np.where(_is_reading(raw[large]), force[large], np.nan)
+            force[~_within(force, limit)] = np.nan
+        columns |= zip(AXES, forces, strict=True)
         for key in self.conditions:
-            columns[key] = np.where(_usable(values[key]), values[key], np.nan)
-        return pd.DataFrame(columns, copy=False), start
+            columns[key] = np.where(_within(values[key]), values[key], np.nan)
+        return pd.DataFrame(columns, copy=False), forces.T, start
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -361,9 +372,14 @@ class Log:
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
 
 
-def _usable(values: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which numbers can be calculated with."""
-    return np.asarray(np.abs(values) <= MAX_VALUE)
+def _within(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
+    """Which numbers are at most ±`largest`; by default, those that can be calculated with."""
+    return np.asarray((values >= -largest) & (values <= largest))
+
+
+def _is_reading(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which numbers of a log can be readings of a sensor."""
+    return _within(values) & ~np.isin(values, SENTINELS)
 
 
 def unique_names(source: Source) -> list[str]:
@@ -395,10 +411,9 @@ class Recording:
     starts : (k,) array, s, time of the first sample of each part as written in its file; NaN
         without any
     timed : bool, whether the times of the parts count from one zero, so that they follow each other
-    samples : DataFrame, of all parts, of rows that lack no reading. Its columns are those of
-        `Log.rows`, with the time since the first sample, and part, the number of the part from 0;
-        its index is the row of the part. If the times of the parts do not tell, each begins where
-        the last one ends
+    samples : DataFrame, of all parts, of rows that lack no reading. Its columns are time, since the
+        first sample, the conditions, and part, the number of the part from 0; its index is the row
+        of the part. If the times of the parts do not tell, each begins where the last one ends
     time : (n,) array, s
     forces : (n, 3) array, m/s², in forward, right, down; each axis in one piece
 
@@ -428,11 +443,15 @@ class Recording:
             start = self.starts[i] - self.starts[0] if i and self.timed else end
             if i and start < end - self.step / 2:  # a clock rounds
                 raise InputError(f"{part.path}: begins before the recording before it ends")
-            whole.append(samples[[*AXES, *self.conditions]].assign(time=time + start, part=i))
+            whole.append(samples[[*self.conditions]].assign(time=time + start, part=i))
             end = whole[-1]["time"].iloc[-1] + self.step
         self.samples = whole[0] if len(whole) == 1 else pd.concat(whole)
         self.time = self.samples["time"].to_numpy()
-        self.forces = np.array([self.samples[axis] for axis in AXES]).T
+        forces = [
+            part.forces[~lost] if lost.any() else part.forces
+            for part, lost in zip(parts, self._lost, strict=True)
+        ]
+        self.forces = np.hstack([each.T for each in forces]).T if forces[1:] else forces[0]
 
     def _samples_of(self, i: int) -> pd.DataFrame:
         """Rows of a part that lack nothing, with their times in the part; they are checked."""

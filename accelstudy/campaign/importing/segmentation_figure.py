@@ -7,7 +7,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -44,7 +43,7 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
     low[:, :3] -= offset
     high[:, :3] -= offset
     used = ~holds.table.index.isin([*holds.left_out])
-    spans = np.column_stack([holds.table["t0"], holds.table["t1"] - holds.table["t0"]])
+    ends = holds.table[["t0", "t1"]].to_numpy()
     middle = (edges[:-1] + edges[1:]) / 2
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
         figure = new_figure(FULL, 90)
@@ -62,7 +61,8 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
             for ax, shown in ((above, label), (below, None)):
                 whole = ax.get_xaxis_transform()
                 common = {"transform": whole, "linewidth": 0, "zorder": 0.5, "label": shown}
-                ax.broken_barh(spans[shaded], (0, 1), **common, **look)
+                between = np.resize([1, 0], max(0, 2 * shaded.sum() - 1))
+                ax.stairs(between, ends[shaded].ravel(), fill=True, **common, **look)
         _number(above, holds)
         above.set_ylabel("specific force / (m/s²)")
         what = "time / s" if holds.size is None else "sample"
@@ -99,13 +99,16 @@ def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
     low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
         NaN in a gap
     """
-    values = np.column_stack([windows.log.time, windows.log.forces, np.sqrt(windows.variance)])
-    time, *channels = values[windows.centred].T
+    centred, log = windows.centred, windows.log
+    time = log.time[centred]
     count = max(1, min(_SPANS, len(time) // 4))
     edges = np.linspace(time[0], time[-1], count + 1)
-    span = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, count - 1)
-    each = pd.DataFrame(np.transpose(channels)).groupby(span)
-    low, high = (of.reindex(range(count)).to_numpy(copy=True) for of in (each.min(), each.max()))
+    firsts = np.searchsorted(time, edges[:-1])
+    filled = np.diff(firsts, append=len(time)) > 0
+    low, high = np.full((2, count, 4), np.nan)
+    for i, values in enumerate([*log.forces.T, np.sqrt(windows.variance)]):
+        for ends, end_of in ((low, np.minimum), (high, np.maximum)):
+            ends[filled, i] = end_of.reduceat(values[centred], firsts[filled])
     return edges, low, high
 
 

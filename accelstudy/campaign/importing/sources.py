@@ -8,7 +8,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
-from itertools import islice, takewhile
+from itertools import islice, pairwise, takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -32,7 +32,7 @@ GZIP = b"\x1f\x8b"
 """First bytes of a gzipped file."""
 
 _PREVIEW = 65536  # characters of a text from which its layout is told
-_BLOCK = 2**23  # bytes that hold any line
+_BLOCK = 2**20  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
 _SEPARATORS = {"tab": "\t", "blank": None}
@@ -147,9 +147,9 @@ class TextSource(Source):
 
     def __init__(self, path: Path, delimiter: str | None = None) -> None:
         self.path, self.repeated = path, 0
-        self._text: str | None = self._read_text()
-        lines = self._text[:_PREVIEW].split("\n")
-        if len(self._text) > _PREVIEW:
+        self._content: bytes | None = self._read_content()
+        lines = self._content[:_PREVIEW].decode(errors="replace").split("\n")
+        if len(self._content) > _PREVIEW:
             if len(lines) == 1:
                 raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
@@ -174,15 +174,14 @@ class TextSource(Source):
         self._notes, self._repeats = table.notes, table.header
         self.layout = layout_by_names(self.names)
         self._comments = _comments(self.delimiter)
-        self._marks = ('"', *self._comments, *self._repeats)
-        if self.delimiter is None:
-            self._marks += ("  ", "\t", "\n ", " \n")
+        blanks = ("  ", "\t", "\n ", " \n") if self.delimiter is None else ()
+        self._marks = [m.encode() for m in ('"', *self._comments, *self._repeats, *blanks)]
         mark = re.escape(self.delimiter or " ")
         # A cell in quotation marks that holds neither another mark nor the delimiter.
         self._quoted = re.compile(f'"[^"\n{mark}]*"')
         # Blanks before a cell in quotation marks or, as a delimiter, between any cells.
-        blanks = rf'(?<={mark})[ ]+(?=")' if self.delimiter else r"\s+"
-        self._blanks = re.compile(blanks + r'(?=(?:[^"]*"[^"]*")*[^"]*$)')
+        between = rf'(?<={mark})[ ]+(?=")' if self.delimiter else r"\s+"
+        self._blanks = re.compile(between + r'(?=(?:[^"]*"[^"]*")*[^"]*$)')
 
     @property
     def notes(self) -> list[str]:
@@ -239,11 +238,11 @@ class TextSource(Source):
 
         kinds = {names[place]: kind for place, kind in types.items()}
         with stage(f"reading {self.path.name}"):
-            content = self._rows_as_text()
-            if not content:
+            content = self._rows()
+            if not content.size:
                 return pa.schema(kinds).empty_table(), ragged
             table = arrow_csv.read_csv(
-                pa.BufferReader(pa.py_buffer(content)),
+                pa.BufferReader(content),
                 # Of several threads none knows the number of its row.
                 arrow_csv.ReadOptions(column_names=names, use_threads=False, block_size=_BLOCK),
                 arrow_csv.ParseOptions(
@@ -288,30 +287,43 @@ class TextSource(Source):
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Lines of data with their numbers, counted from 1."""
-        for number, line in enumerate(self._read_text().split("\n"), 1):
+        for number, line in enumerate(self._read_content().decode().split("\n"), 1):
             if number > self.first and (row := self._row(line)) is not None:
                 yield number, row
 
-    def _rows_as_text(self) -> bytearray:
+    def _rows(self) -> pa.Buffer:
         """Rows of the table, each in a line of its own, in UTF-8."""
-        text, self._text = self._text or self._read_text(), None
-        self.repeated, rows, end = 0, bytearray(), 0
+        content, self._content = self._content or self._read_content(), None
+        self.repeated, start = 0, 0
         for _ in range(self.first):
-            end = text.find("\n", end) + 1
-        while end < len(text):
-            start, end = end, text.find("\n", end + _BLOCK // 8) + 1 or len(text)
-            rows += self._of_table(text[start:end]).encode()
-        return rows
+            start = content.find(b"\n", start) + 1
+        if self._is_plain(content, start):
+            return pa.py_buffer(content).slice(start)
+        ends = [start]
+        while ends[-1] < len(content):
+            ends.append(content.find(b"\n", ends[-1] + _BLOCK) + 1 or len(content))
+        blocks = [self._of_table(content[i:end]) for i, end in pairwise(ends)]
+        return pa.py_buffer(b"".join(blocks))
 
-    def _of_table(self, text: str) -> str:
+    def _is_plain(self, content: bytes, start: int = 0) -> bool:
+        """Whether there are, from a place on, lines of the table only, as Arrow takes them."""
+        # A search for one mark is much faster than for several in a row.
+        found = (
+            content.find(mark[:1], start) >= 0 and content.find(mark, start) >= 0
+            for mark in self._marks
+        )
+        return not content.startswith(b" ", start) and not any(found)
+
+    def _of_table(self, block: bytes) -> bytes:
         """Lines of a text without those that are no rows."""
-        if not any(mark in text for mark in self._marks) and not text.startswith(" "):
-            return text
+        if self._is_plain(block):
+            return block
+        text = block.decode()
         lines = text.split("\n")
         self.repeated += sum(line.strip() in self._repeats for line in lines)
         closed = '"' not in self._quoted.sub("", text)
         rows = (row for line in lines if (row := self._row(line, closed)) is not None)
-        return "".join(f"{row}\n" for row in rows)
+        return "".join(f"{row}\n" for row in rows).encode()
 
     def _row(self, line: str, closed: bool = False) -> str | None:
         """A line of the table, None for any other; a cell of a log has no end of a line.
@@ -336,16 +348,19 @@ class TextSource(Source):
             return self._blanks.sub("" if self.delimiter else " ", row.strip(" "))
         return row if self.delimiter else " ".join(row.split())
 
-    def _read_text(self) -> str:
-        """All of the file, with line ends as in Python."""
+    def _read_content(self) -> bytes:
+        """All of the file in UTF-8, with line ends as in Python."""
         try:
             with readable(self.path):
                 content = self.path.read_bytes()
                 content = gzip.decompress(content) if content.startswith(GZIP) else content
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{self.path}: not a whole gzip file") from None
-        text = content.decode(_encoding_of(content[:4096]), errors="replace")
-        return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+        if not content.isascii() or 0 in content[:4096]:
+            content = content.decode(_encoding_of(content[:4096]), errors="replace").encode()
+        return (
+            content.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in content else content
+        )
 
 
 class _Table:
@@ -364,10 +379,11 @@ class _Table:
 
     def __init__(self, lines: Sequence[str], delimiter: str | None, decimal: str) -> None:
         self.delimiter, self.decimal, self.many = delimiter, decimal, 0
+        comments = _comments(delimiter)
         rows = [
             (i, split_line(line, delimiter))
             for i, line in enumerate(lines)
-            if line.strip() and not line.lstrip().startswith(_comments(delimiter))
+            if line.strip() and not line.lstrip().startswith(comments)
         ]
         numbers = {i: sum(_is_number(cell, decimal) for cell in cells) for i, cells in rows}
         rows = [(i, cells) for i, cells in rows if numbers[i]]
@@ -596,7 +612,7 @@ def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
     zero = next(iter(values[np.isfinite(values)]), np.nan)
     if values.dtype.kind in "iu" and isinstance(zero, np.integer):
         return (values.astype(np.int64) - zero.astype(np.int64)).astype(float), float(zero)
-    return values.astype(float) - float(zero), float(zero)
+    return values - float(zero), float(zero)
 
 
 def is_stamp(text: str) -> bool:

@@ -68,6 +68,7 @@ class Windows:
         sample; NaN about those too near to a gap or an end for a window
     frozen : (n,) bool array, whether an axis does not change in the window
     centred : (n,) bool array, where there is a window
+    counts : (k,) int array, histogram of the variances of windows in which no channel is frozen
 
     Raises
     ------
@@ -83,14 +84,18 @@ class Windows:
         self.gaps = int(jumps.sum())
         self.variance = np.full(len(time), np.nan)
         self.frozen = np.zeros(len(time), dtype=bool)
+        self.counts, of_frozen = np.zeros((2, len(_BINS) - 1), dtype=int)
         half = width // 2
         pieces = [0, *(1 + np.flatnonzero(jumps | another)).tolist(), len(time)]
         for start, end in pairwise(pieces):
             for first in range(start, end - width + 1, _TOGETHER):
                 beyond = min(first + _TOGETHER + width - 1, end)
                 middle = slice(first + half, beyond - half)
-                spread = window_variance(forces[first:beyond], width)
-                self.variance[middle], self.frozen[middle] = spread
+                variance, frozen = window_variance(forces[first:beyond], width)
+                self.variance[middle], self.frozen[middle] = variance, frozen
+                self.counts += _histogram(variance[~frozen])
+                of_frozen += _histogram(variance[frozen])
+        self._all_counts = self.counts + of_frozen
         self.centred = np.isfinite(self.variance)
         if not self.centred.any():
             raise InputError(
@@ -122,12 +127,10 @@ class Windows:
         """Of the lowest and of the highest readings the outermost and the next, (2, 2, 3)."""
         ends = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
         for axis, force in enumerate(self.log.forces.T):
-            centred = force[self.centred]
             for end, pick, rest in ((0, np.min, np.greater), (1, np.max, np.less)):
-                ends[end, 0, axis] = pick(centred)
-                others = centred[rest(centred, ends[end, 0, axis])]
-                if len(others):
-                    ends[end, 1, axis] = pick(others)
+                for k in range(2):
+                    others = self.centred & rest(force, ends[end, 0, axis]) if k else self.centred
+                    ends[end, k, axis] = pick(force, where=others, initial=ends[end, k, axis])
         return ends
 
     @cached_property
@@ -148,15 +151,10 @@ class Windows:
         """
         if not self.rounding > 0:
             return False
-        noise = _noise_floor(_histogram(self.variance))
+        noise = _noise_floor(self._all_counts)
         return bool(
             noise <= MAX_COARSE_RATIO * self.rounding or noise > MAX_REST_NOISE * STANDARD_GRAVITY
         )
-
-    @cached_property
-    def counts(self) -> NDArray[np.int_]:
-        """Histogram of the variances of windows in which no channel is frozen."""
-        return _histogram(self.variance[~self.frozen])
 
     def at_rest(self, sd: float) -> NDArray[np.bool_]:
         """Whether the window about each sample is at rest, (n,), up to a standard deviation."""
@@ -195,7 +193,7 @@ class Windows:
             return Threshold(given, np.nan, "as given")
         counts = self.counts
         if self.coarse:
-            counts = _histogram(self.variance)
+            counts = self._all_counts.copy()
             least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
             counts[least] += counts[:least].sum() + np.sum(self.variance == 0)
             counts[:least] = 0

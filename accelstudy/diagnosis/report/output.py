@@ -126,8 +126,8 @@ def next_steps(
     use = "Level a log with the calibration that is beside this page"
     steps.append((use, suggested.apply(result)))
     on_device = [effect for effect in d.extended.effects if effect.part == "sensor"]
-    form = "json" if unknown(needs_of(on_device)) else "c"
-    steps.append(("Take it to a device", suggested.export(form, result)))
+    if not unknown(needs_of(on_device)):
+        steps.append(("Take it to a device", suggested.export("c", result)))
     if d.extended is not d.model:
         command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))

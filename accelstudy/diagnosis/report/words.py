@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
+from accelstudy.basics.units import GON
 from accelstudy.basics.wording import comma_list, grouped, probability, words
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
@@ -28,10 +29,13 @@ from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
 
 TEMPLATE = "diagnosis/report/words.txt.j2"
+MAX_TILT = MAX_TILT_GON * GON
+"""rad, up to which tilt errors are compared."""
 
 COORDINATES = {
     "dT/dt": "the rate of the temperature",
