@@ -207,44 +207,20 @@ class Simulation(Result):
 
         units = {name: u for cell in self.cells for name, u in cell.parameter_units.items()}
         count = max(cell.replicates for cell in self.cells)
-        estimate = np.full((len(self.cells), count, len(units)), np.nan)
-        sigma, truth = np.full_like(estimate, np.nan), np.full_like(estimate[:, 0], np.nan)
-        tilt = np.full((len(self.cells), count, len(ANGLES)), np.nan)
-        for i, (cell, one) in enumerate(zip(self.cells, self.statistics, strict=True)):
-            at = np.array([list(units).index(name) for name in cell.parameter_units])
-            truth[i, at] = cell.true_values
-            if one.replicates is None:
-                continue
-            block = one.replicates.simulated
-            good = np.flatnonzero(block.converged)
-            numbers = of_cells.calibrations(cell, block, of_cells.cell_tilt_error(cell, LEVELING))
-            estimate[i, good[:, None], at] = block.estimates[good]
-            sigma[i, good[:, None], at] = numbers["sigma_posteriori"]
-            tilt[i, good] = numbers["tilt"][:, : len(ANGLES)]
-        parameters, noted = ("cell", "replicate", "parameter"), {"units": "SI, as `unit` says"}
-        return xr.Dataset(
-            {
-                "estimate": (parameters, estimate, noted),
-                "sigma": (parameters, sigma, noted),
-                "truth": (("cell", "parameter"), truth, noted),
-                "tilt": (("cell", "replicate", "angle"), tilt, {"units": "rad"}),
-            },
+        whole = {"replicate": np.arange(1, count + 1), "parameter": [*units]}
+        parts = [_estimates_of(one).reindex(whole) for one in self.statistics]
+        sigmas = [cell.noise.sigma_force for cell in self.cells]
+        set_up = {
+            key: ("cell", [getattr(cell, key) for cell in self.cells])
+            for key in ("model", "scheme", "approach")
+        }
+        return xr.concat(parts, "cell").assign_coords(
             {
                 "cell": [cell.name for cell in self.cells],
-                "replicate": np.arange(1, count + 1),
-                "parameter": list(units),
-                "angle": list(ANGLES),
-                "unit": ("parameter", list(units.values())),
-                **{
-                    key: ("cell", [getattr(cell, key) for cell in self.cells])
-                    for key in ("model", "scheme", "approach")
-                },
-                "sensor_sigma": (
-                    "cell",
-                    [cell.noise.sigma_force for cell in self.cells],
-                    {"units": "m/s^2"},
-                ),
-            },
+                "unit": ("parameter", [*units.values()]),
+                **set_up,
+                "sensor_sigma": ("cell", sigmas, {"units": "m/s^2"}),
+            }
         )
 
     def _joined(self, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
@@ -254,6 +230,30 @@ class Simulation(Result):
         if len(tables) == 1:
             return tables[0]
         return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
+
+
+def _estimates_of(one: CellStatistics) -> xr.Dataset:
+    """Calibrations of a cell that converged, by the number of the replicate."""
+    import xarray as xr
+
+    cell, names = one.cell, [*one.cell.parameter_units]
+    rows, estimate = np.zeros(0, int), np.zeros((0, len(names)))
+    sigma, tilt = estimate, np.zeros((0, len(ANGLES)))
+    if one.replicates is not None:
+        block = one.replicates.simulated
+        rows = np.flatnonzero(block.converged)
+        numbers = of_cells.calibrations(cell, block, of_cells.cell_tilt_error(cell, LEVELING))
+        estimate, sigma, tilt = block.estimates[rows], numbers["sigma_posteriori"], numbers["tilt"]
+    each, noted = ("replicate", "parameter"), {"units": "SI, as `unit` says"}
+    return xr.Dataset(
+        {
+            "estimate": (each, estimate, noted),
+            "sigma": (each, sigma, noted),
+            "truth": ("parameter", cell.true_values, noted),
+            "tilt": (("replicate", "angle"), tilt[:, : len(ANGLES)], {"units": "rad"}),
+        },
+        {"replicate": rows + 1, "parameter": names, "angle": [*ANGLES]},
+    )
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:
