@@ -38,7 +38,6 @@ class Command(click.Command):
     Parameters
     ----------
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
-    examples : str, for the end of its help: commands that run as they stand
     name : str, of the command; that of the verb if omitted
     writes : Kind of the folder that --out names, if the verb returns a result with files; of a
         result that is a file, a context manager as `accelstudy.files.outputs.new_file`
@@ -58,7 +57,7 @@ class Command(click.Command):
     def __init__(
         self,
         verb: Callable[..., Any],
-        *examples: str,
+        *,
         name: str = "",
         writes: Kind | Place | None = None,
         out: str = "Folder to write to.",
@@ -82,7 +81,7 @@ class Command(click.Command):
             name or str(verb.__name__).replace("_", "-"),
             callback=self._act,
             help="\n\n".join(filter(None, [self._spelled(kinds.summary(verb)), more])),
-            epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in examples)]),
+            epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in kinds.examples(verb))]),
         )
         del self.params  # the list of all commands does without them
         self._options = optional, out, [*options], dict(retired or {}), angles, quiet

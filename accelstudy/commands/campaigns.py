@@ -75,10 +75,6 @@ def show_import(campaign: Campaign, holds: Holds | None, out: Path, figure: bool
 
 IMPORT = Command(
     campaigns.find_holds,
-    "accelstudy import calibration.csv --out my-campaign",
-    "accelstudy import log.csv --out by-number --rate 100 --columns fx=0,fy=1,fz=2",
-    "accelstudy import calibration.csv --out beside "
-    "--reference-log ref.csv --reference calibrated/calibration.json",
     name="import",
     writes=outputs.CAMPAIGN,
     out="Folder of the campaign.",
@@ -130,7 +126,6 @@ def run_simulate_campaign(
 
 SIMULATE_CAMPAIGN = Command(
     campaigns.simulate_campaign,
-    'accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"',
     writes=outputs.CAMPAIGN,
     out="Folder of the campaign.",
     more="The truth goes to --truth and nowhere else.",
@@ -173,21 +168,11 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
 
 
 APPLY = Command(
-    calibrations.apply,
-    "accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv",
-    writes=new_file,
-    out="CSV or Parquet file to write.",
-    run=run_apply,
+    calibrations.apply, writes=new_file, out="CSV or Parquet file to write.", run=run_apply
 )
 
 
-DATA_SHEET = Command(
-    planning.data_sheet,
-    "accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml",
-    writes=new_file,
-    out="YAML file to write.",
-    angles=False,
-)
+DATA_SHEET = Command(planning.data_sheet, writes=new_file, out="YAML file to write.", angles=False)
 
 
 @verb
@@ -210,6 +195,11 @@ def public(
         Folder of the campaign.
     folder : path
         Where the file is, in any subfolder, or is downloaded to.
+
+    Examples
+    --------
+        accelstudy public
+        accelstudy public xsens-mti --out xsens
     """
     from accelstudy.campaign.importing.logs import import_to
     from accelstudy.campaign.importing.public import import_settings, public_data, public_file
@@ -227,7 +217,7 @@ def public(
     show_import(*imported, place)
 
 
-PUBLIC = Command(public, "accelstudy public", "accelstudy public xsens-mti --out xsens")
+PUBLIC = Command(public)
 
 
 def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
@@ -268,7 +258,6 @@ def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
 
 ADVISE = Command(
     planning.advise,
-    "accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon",
     run=run_advise,
     options=(
         click.Option(["--watch"], is_flag=True, help="Wait for further positions until Ctrl-C."),
@@ -291,8 +280,6 @@ def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
 
 DESIGN = Command(
     planning.find_positions,
-    "accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon --out my-scheme.yaml",
-    "accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign",
     name="design",
     writes=new_scheme,
     out="YAML file for the positions.",

@@ -25,6 +25,10 @@ def models() -> None:
 
     Commands take compositions, too: models and effects joined by +, as in
     bias-scale+warm_up(tau=300).
+
+    Examples
+    --------
+        accelstudy models
     """
     from accelstudy.sensors.models import MODELS, PRESETS, get_model
 
@@ -57,6 +61,11 @@ def effects(
         Folder of a campaign.
     scheme : str
         Name of a scheme, instead of a campaign.
+
+    Examples
+    --------
+        accelstudy effects
+        accelstudy effects --campaign my-campaign
     """
     from accelstudy.basics.units import angle_note
 
@@ -146,6 +155,10 @@ def schemes(
     ----------
     names : sequence of str
         A scheme, such as fibonacci-60 or random-20-7. Without them all are listed.
+
+    Examples
+    --------
+        accelstudy schemes --approach robot fibonacci-24 mclaren-24
     """
     import pandas as pd
 
@@ -197,6 +210,10 @@ def scheme(name: kinds.SchemeName) -> None:
     ----------
     name : str
         Name of the scheme, or a file.
+
+    Examples
+    --------
+        accelstudy scheme fibonacci-24
     """
     import numpy as np
     import pandas as pd
@@ -213,7 +230,7 @@ def scheme(name: kinds.SchemeName) -> None:
     click.echo(table.to_csv(index_label="position", float_format="%.6f"), nl=False)
 
 
-MODELS = Command(models, "accelstudy models", angles=False, quiet=False)
-EFFECTS = Command(effects, "accelstudy effects", "accelstudy effects --campaign my-campaign")
-SCHEMES = Command(schemes, "accelstudy schemes --approach robot fibonacci-24 mclaren-24")
-SCHEME = Command(scheme, "accelstudy scheme fibonacci-24", quiet=False)
+MODELS = Command(models, angles=False, quiet=False)
+EFFECTS = Command(effects)
+SCHEMES = Command(schemes)
+SCHEME = Command(scheme, quiet=False)

@@ -47,6 +47,11 @@ def init(
     sensor : str
         Your sensor: a data sheet (a name or a file), or the folder of a campaign. [default: that of
         the paper]
+
+    Examples
+    --------
+        accelstudy init my-study
+        accelstudy init mine --sensor adxl355
     """
     from importlib.util import find_spec
 
@@ -116,6 +121,10 @@ def cells(configs: Sequence[str | PathLike[str]]) -> None:
     ----------
     configs : sequence of path
         YAML files; a later one overlays those before it, as with Snakemake's --configfile.
+
+    Examples
+    --------
+        accelstudy cells config/config.yaml
     """
     from accelstudy.design.estimability import estimability
     from accelstudy.study.config import read_study
@@ -142,6 +151,10 @@ def claims(results: str | PathLike[str]) -> None:
     ----------
     results : path
         Folder of a study, such as results/paper.
+
+    Examples
+    --------
+        accelstudy claims results/paper
     """
     from accelstudy.files.tables import read_table
     from accelstudy.study.claims.page import claims_markdown
@@ -154,19 +167,17 @@ def config_schema() -> None:
     """Print the JSON schema of configurations.
 
     Editors check a configuration against it while you write.
+
+    Examples
+    --------
+        accelstudy config-schema
     """
     from accelstudy.study.config import config_schema as schema
 
     click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-INIT = Command(
-    init,
-    "accelstudy init my-study",
-    "accelstudy init mine --sensor adxl355",
-    angles=False,
-    quiet=False,
-)
-CELLS = Command(cells, "accelstudy cells config/config.yaml", angles=False, quiet=False)
-CLAIMS = Command(claims, "accelstudy claims results/paper", angles=False, quiet=False)
-CONFIG_SCHEMA = Command(config_schema, "accelstudy config-schema", angles=False, quiet=False)
+INIT = Command(init, angles=False, quiet=False)
+CELLS = Command(cells, angles=False, quiet=False)
+CLAIMS = Command(claims, angles=False, quiet=False)
+CONFIG_SCHEMA = Command(config_schema, angles=False, quiet=False)

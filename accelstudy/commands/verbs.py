@@ -42,48 +42,15 @@ def run_export(calibration: Path, form: str) -> None:
     click.echo(text, nl=False)
 
 
-CALIBRATE = Command(
-    calibrations.calibrate,
-    "accelstudy calibrate my-campaign --out calibrated",
-    writes=outputs.CALIBRATION,
-)
-DIAGNOSE = Command(
-    calibrations.diagnose,
-    "accelstudy diagnose my-campaign --out diagnosed",
-    writes=outputs.DIAGNOSIS,
-)
-LOT = Command(
-    sensors.lot,
-    "accelstudy lot sensor-1 sensor-2 sensor-3 --out lot",
-    writes=outputs.LOT,
-    reads=sensors.folders_of,
-)
-CHECK_SIGMAS = Command(
-    calibrations.check_sigmas,
-    "accelstudy check-sigmas my-campaign --replicates 500",
-    show=show_sigmas,
-)
-EXPORT = Command(
-    calibrations.export,
-    "accelstudy export calibrated/calibration.json --form c",
-    run=run_export,
-    retired={"--level!": LEVELED},
-    angles=False,
-)
-COMPARE = Command(
-    sensors.compare,
-    "accelstudy compare spring/calibration.json autumn/calibration.json --out both",
-    writes=outputs.COMPARISON,
-)
-HISTORY = Command(
-    sensors.history,
-    "accelstudy history spring/calibration.json autumn/calibration.json "
-    "winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years",
-    writes=outputs.HISTORY,
-)
+CALIBRATE = Command(calibrations.calibrate, writes=outputs.CALIBRATION)
+DIAGNOSE = Command(calibrations.diagnose, writes=outputs.DIAGNOSIS)
+LOT = Command(sensors.lot, writes=outputs.LOT, reads=sensors.folders_of)
+CHECK_SIGMAS = Command(calibrations.check_sigmas, show=show_sigmas)
+EXPORT = Command(calibrations.export, run=run_export, retired={"--level!": LEVELED}, angles=False)
+COMPARE = Command(sensors.compare, writes=outputs.COMPARISON)
+HISTORY = Command(sensors.history, writes=outputs.HISTORY)
 PLAN = Command(
     planning.plan,
-    "accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2",
     writes=outputs.PLAN,
     out="Folder for the table, the figure and a study.",
     optional=True,

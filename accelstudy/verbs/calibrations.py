@@ -38,6 +38,10 @@ def calibrate(
     ------
     InputError
         If the campaign does not determine the model, or a name is unknown.
+
+    Examples
+    --------
+        accelstudy calibrate my-campaign --out calibrated
     """
     from accelstudy.api.calibrations import Calibration, fit_of, place_of
 
@@ -90,6 +94,10 @@ def check_sigmas(
         A row per parameter, in the units that people read: parameter, unit, estimate, sigma (as the
         adjustment claims it), sd_empirical with its 95 % interval, bias, ratio (sigma over
         sd_empirical) and n_converged. What such a check can find is said in ``attrs["finds"]``.
+
+    Examples
+    --------
+        accelstudy check-sigmas my-campaign --replicates 500
     """
     from accelstudy.api.calibrations import fit_of
     from accelstudy.campaign.calibration import sigma_check
@@ -151,6 +159,10 @@ def apply(
         The columns of the log, the calibrated force in m/s², roll and pitch in the unit that the
         names say, and their sigmas; a DataFrame keeps its index. Warnings stand in
         ``attrs["warnings"]``.
+
+    Examples
+    --------
+        accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv
     """
     given: dict[str, Any] = {**locals()}
     from accelstudy.api.calibrations import as_calibration
@@ -190,6 +202,10 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     -------
     str
         Text of a file.
+
+    Examples
+    --------
+        accelstudy export calibrated/calibration.json --form c
     """
     from accelstudy.api.calibrations import as_calibration
 
@@ -222,6 +238,10 @@ def diagnose(
     ------
     InputError
         If the campaign does not determine the model, or a name is unknown.
+
+    Examples
+    --------
+        accelstudy diagnose my-campaign --out diagnosed
     """
     given = {**locals()}
     from accelstudy.api.diagnoses import Diagnosis

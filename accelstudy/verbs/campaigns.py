@@ -152,6 +152,13 @@ def find_holds(
     ------
     InputError
         If the log cannot be read, has no holds, or a setting is wrong.
+
+    Examples
+    --------
+        accelstudy import calibration.csv --out my-campaign
+        accelstudy import log.csv --out by-number --rate 100 --columns fx=0,fy=1,fz=2
+        accelstudy import calibration.csv --out beside --reference-log ref.csv --reference
+            calibrated/calibration.json
     """
     given = {**locals()}
     from accelstudy.api.campaigns import Import
@@ -285,6 +292,10 @@ def simulate_campaign(
     ------
     InputError
         If a name is unknown or a value is wrong.
+
+    Examples
+    --------
+        accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
     settings = {**locals()}
     from accelstudy.api.campaigns import simulated

@@ -342,6 +342,13 @@ def summary(function: Callable[..., Any]) -> str:
     return _sections(function)[0]
 
 
+def examples(function: Callable[..., Any]) -> list[str]:
+    """Return the commands that a docstring shows, which may go on in a line that is indented."""
+    shown = [one for one in _sections(function)[2] if one.startswith("Examples\n")]
+    lines = re.findall(r"^ {4}\S.*(?:\n {8}.*)*", "".join(shown), re.MULTILINE)
+    return [" ".join(line.split()) for line in lines]
+
+
 @cache
 def meanings(function: Callable[..., Any]) -> dict[str, str]:
     """Meaning of each parameter in a docstring."""

@@ -98,6 +98,10 @@ def plan(
     ------
     InputError
         If a quantity or a name is wrong, or not one of `sigma` and `sensor` is given.
+
+    Examples
+    --------
+        accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2
     """
     given = {**locals()}
     from accelstudy.api.plans import Plan
@@ -181,6 +185,12 @@ def find_positions(
     ------
     InputError
         If a name or a value is wrong, or no such positions determine the model.
+
+    Examples
+    --------
+        accelstudy design --positions 12 --tilt-range 30gon --least-angle 20gon --out
+            my-scheme.yaml
+        accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign
     """
     given = {**locals()}
     from accelstudy.api.designs import Design
@@ -237,6 +247,10 @@ def advise(
     ------
     InputError
         If no positions can determine the model, or a name or a value is wrong.
+
+    Examples
+    --------
+        accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon
     """
     given = {**locals()}
     from accelstudy.api.advice import SessionAdvice
@@ -318,6 +332,10 @@ def data_sheet(
     ------
     InputError
         If the source cannot be read, or tells too little.
+
+    Examples
+    --------
+        accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml
     """
     given = {**locals()}
     from accelstudy.api.campaigns import settings_of

@@ -46,6 +46,10 @@ def compare(
     ------
     InputError
         If they are not of one sensor, or have no effect in common.
+
+    Examples
+    --------
+        accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
     given = {**locals()}
     from accelstudy.api.epochs import Comparison
@@ -91,6 +95,12 @@ def history(
     ------
     InputError
         If they are fewer than three, of one date, or not of one sensor.
+
+    Examples
+    --------
+        accelstudy history spring/calibration.json autumn/calibration.json
+            winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out
+            years
     """
     given = {**locals()}
     from accelstudy.api.epochs import History
@@ -129,6 +139,10 @@ def lot(
     ------
     InputError
         If fewer than two campaigns can be judged, or a name is unknown.
+
+    Examples
+    --------
+        accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
     given = {**locals()}
     from accelstudy.api.lots import Lot
