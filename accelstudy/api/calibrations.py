@@ -19,16 +19,11 @@ from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.units import GON, Given
-from accelstudy.campaign.calibration import applying, export, wording
+from accelstudy.campaign.calibration import applying, export, output, wording
 from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
-from accelstudy.campaign.calibration.output import (
-    calibration_content,
-    draw_residuals,
-    write_calibration,
-)
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.of_type import with_type
 from accelstudy.campaign.session import Campaign
@@ -60,7 +55,7 @@ class Calibration(Result):
         source: Path | None = None,
     ) -> None:
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
-        self._content = calibration_content(self._assessment) if content is None else content
+        self._content = output.calibration_content(self._assessment) if content is None else content
         self.name = str(self._content["campaign"])
 
     @property
@@ -186,7 +181,7 @@ class Calibration(Result):
 
     def draw(self, ax: Axes) -> None:
         """Draw |f| − g of each position, mm/s²."""
-        draw_residuals(ax, self._fitted("plot"), self.residuals)
+        output.draw_residuals(ax, self._fitted("plot"), self.residuals)
 
     def _table(self) -> str:
         """Parameters with sigmas in the units that people read, then what the user should know."""
@@ -196,7 +191,7 @@ class Calibration(Result):
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
         if self.fit is not None:
-            write_calibration(self._assessment, folder, self.source, place)
+            output.write_calibration(self._assessment, folder, self.source, place)
         # That of a diagnosis knows of what was mended.
         write_json(folder / "calibration.json", dict(self.content))
 

@@ -14,18 +14,10 @@ from matplotlib.axes import Axes
 
 from accelstudy.api.given import path_of
 from accelstudy.api.results import Result
-from accelstudy.basics import bounds
+from accelstudy.basics import bounds, units
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import MAX_BYTES
 from accelstudy.basics.progress import say, show, stage
-from accelstudy.basics.units import (
-    MGON,
-    angle_note,
-    attitude_unit,
-    display_unit,
-    to_attitude,
-    to_display,
-)
 from accelstudy.basics.wording import amount
 from accelstudy.design.spaces import attitudes
 from accelstudy.drawing.style import FULL
@@ -53,7 +45,7 @@ class Design(Result):
     def of(cls, *, sigma: float, robot_sigma: float, gravity_sigma: float, **given: Any) -> Design:
         """Search by the keywords of `accelstudy.find_positions`, checked."""
         bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
-        bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
+        bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / units.MGON)
         bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
         request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
         with stage("search"):
@@ -85,14 +77,14 @@ class Design(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Return the positions, with angles in the unit that the names say."""
-        unit, proposal = attitude_unit(), self.proposal
-        roll, pitch = to_attitude(attitudes(proposal.directions)).T
+        unit, proposal = units.attitude_unit(), self.proposal
+        roll, pitch = units.to_attitude(attitudes(proposal.directions)).T
         rows = pd.DataFrame(
             {
                 "position": range(1, len(roll) + 1),
                 f"roll/{unit}": roll.round(2) + 0.0,
                 f"pitch/{unit}": pitch.round(2) + 0.0,
-                f"turn/{unit}": to_attitude(proposal.turns),
+                f"turn/{unit}": units.to_attitude(proposal.turns),
             }
         )
         return rows.assign(**{"turned about": axes}) if (axes := proposal.axes) else rows
@@ -125,13 +117,13 @@ class Design(Result):
 
     def lines(self) -> Iterable[str]:
         """What the design brings, in sentences."""
-        proposal, request, unit = self.proposal, self.proposal.request, display_unit("rad")
+        proposal, request, unit = self.proposal, self.proposal.request, units.display_unit("rad")
         n, m = len(proposal.directions), get_scheme(REFERENCE).n_positions
         noise = request.noise
-        given = f"noise {to_display(noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
+        given = f"noise {units.to_display(noise.sigma_force, 'm/s^2'):.3g} mm/s² per position"
         if request.task.approach.uses_angles:
-            given += f" and robot noise {to_display(noise.sigma_angle, 'rad'):.3g} {unit}"
-        tilt = f"{to_attitude(request.tilt_range):.4g} {attitude_unit()}"
+            given += f" and robot noise {units.to_display(noise.sigma_angle, 'rad'):.3g} {unit}"
+        tilt = f"{units.to_attitude(request.tilt_range):.4g} {units.attitude_unit()}"
         effects = ", the neglected effects included" if request.neglect else ""
         after = f" after {request.after}" if request.after else ""
         yield (
@@ -149,14 +141,14 @@ class Design(Result):
             yield "Size from which a parameter is found, and told from the other effect:"
             for name, (size, of) in sizes.items():
                 here, other = (amount(s, of) for s in (size, there[name][0]))
-                yield f"  {name}: {here} {display_unit(of)} ({REFERENCE}: {other})"
+                yield f"  {name}: {here} {units.display_unit(of)} ({REFERENCE}: {other})"
         share = 100 * proposal.design.efficiency
         if share == share:
             yield (
                 f"Efficiency at least {share:.1f} % of the best that any {n} "
                 f"allowed positions can reach ({request.chosen.text})."
             )
-        yield f"Noise of a leveled reading comes on top. {angle_note()}."
+        yield f"Noise of a leveled reading comes on top. {units.angle_note()}."
 
     def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
         """Write the YAML file of a scheme.
@@ -191,6 +183,6 @@ def new_scheme(out: Path, inputs: Iterable[str | Path], force: bool) -> Iterator
 
 
 def _both(rms: Any) -> str:
-    unit = display_unit("rad")
-    roll, pitch = to_display(rms, "rad")
+    unit = units.display_unit("rad")
+    roll, pitch = units.to_display(rms, "rad")
     return f"roll {roll:.2f} {unit}, pitch {pitch:.2f} {unit}"
