@@ -1,16 +1,25 @@
 """Criteria by which one choice of positions is better than another.
 
 A criterion is the logarithm of a variance, or of a determinant of variances, as a function of the
-scaled normal matrix. It is to be minimised, and its differences are relative. Its derivative by
-that matrix serves to rank and to move positions. All criteria but the one with neglected effects
-are convex, so they have a lower bound (`continuous`); that one takes its bound from another.
+scaled normal matrix N. It is to be minimised, and its differences are relative. Its derivative by
+that matrix serves to rank and to move positions.
+
+A calibration estimates some of the parameters, with the cofactors C = N₁₁⁻¹ (and zeros elsewhere).
+Neglected parameters p of variances P shift these estimates by C N p and are missing themselves, so
+with E = (C N − I) in their columns all errors have the covariance C + E P Eᵀ. For a form W, whose
+mean square is s = tr(W C) + tr(W E P Eᵀ), follow from dC = −C dN C and dE = −C dN E
+
+    ∂s/∂N = −C W C − C W E P Eᵀ − E P Eᵀ W C.
+
+All criteria but the one with neglected effects are convex, so they have a lower bound
+(`continuous`); that one takes its bound from another.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +37,66 @@ MINIMAX, ROBUST, DISCRIMINATE = "minimax", "robust", "discriminate"
 CRITERIA = ("I", "D", "A", MINIMAX)
 
 
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration whose errors count: what it estimates, and what it neglects.
+
+    Attributes
+    ----------
+    estimated : (k,) array of int, places of its parameters in a normal matrix
+    forms : (a, u, u) array, W of each mean square of errors
+    neglected : (q,) array of int, places of the neglected parameters
+    variance : (q,) array, diagonal of P
+    """
+
+    estimated: NDArray[np.int_]
+    forms: Array
+    neglected: NDArray[np.int_] = field(default_factory=lambda: np.zeros(0, dtype=int))
+    variance: Array = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def _ridge(self) -> Array:
+        return RIDGE * np.eye(len(self.estimated))
+
+    @cached_property
+    def _block(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+        return self.estimated[:, None], self.estimated
+
+    def part(self, normal: Array) -> Array:
+        """Normal matrix of the estimated parameters, (..., k, k)."""
+        if len(self.estimated) < normal.shape[-1]:
+            normal = normal[..., *self._block]
+        return normal + self._ridge
+
+    def cofactors(self, normal: Array) -> Array:
+        """C, (..., u, u)."""
+        inverse = np.asarray(np.linalg.inv(self.part(normal)), dtype=float)
+        if inverse.shape == normal.shape:
+            return inverse
+        whole = np.zeros(normal.shape)
+        whole[..., *self._block] = inverse
+        return whole
+
+    def covariances(self, normal: Array) -> tuple[Array, Array]:
+        """C and E P Eᵀ, (..., u, u)."""
+        cofactors = self.cofactors(normal)
+        if not len(self.neglected):
+            return cofactors, np.zeros_like(cofactors)
+        errors = (cofactors @ normal - np.eye(normal.shape[-1]))[..., self.neglected]
+        return cofactors, (errors * self.variance) @ errors.swapaxes(-1, -2)
+
+    def squares(self, cofactors: Array, shifts: Array) -> Array:
+        """Mean squares, (a, ...)."""
+        flat = (cofactors + shifts).reshape(*cofactors.shape[:-2], -1)
+        return np.asarray(self.forms.reshape(len(self.forms), -1) @ flat.T)
+
+    def gradient(self, cofactors: Array, shifts: Array, weights: Array) -> Array:
+        """Derivative of Σ weightₐ squareₐ by a normal matrix (u, u), symmetric."""
+        left = cofactors @ np.tensordot(weights, self.forms, 1)
+        by_shifts = left @ shifts
+        return np.asarray(-left @ cofactors - by_shifts - by_shifts.T)
+
+
 class Criterion(ABC):
     """A criterion.
 
@@ -35,13 +104,13 @@ class Criterion(ABC):
     ----------
     name : str
     text : str, what it minimises, for people
-    wanted : tuple of (k,) int arrays, sets of parameters that positions must determine
+    calibrations : tuple of Calibration, whose parameters the positions must determine
     degree : int, of e^criterion as a function of the variances
     """
 
     name: str
     text: str
-    wanted: tuple[NDArray[np.int_], ...]
+    calibrations: tuple[Calibration, ...]
     degree: int
 
     @abstractmethod
@@ -68,107 +137,30 @@ class Criterion(ABC):
 
 @dataclass(frozen=True)
 class Determinant(Criterion):
-    """D: the volume of the confidence ellipsoid of the estimated parameters.
+    """D: the volume of the confidence ellipsoid of the estimated parameters."""
 
-    Attributes
-    ----------
-    places : (k,) array of int, of the estimated parameters in a normal matrix
-    """
-
-    places: NDArray[np.int_]
+    calibrations: tuple[Calibration, ...]
 
     name: str = "D"
     text: str = "determinant of the covariance matrix of the parameters"
 
     @property
-    def wanted(self) -> tuple[NDArray[np.int_], ...]:  # type: ignore[override]
-        """The estimated parameters."""
-        return (self.places,)
-
-    @property
     def degree(self) -> int:  # type: ignore[override]
         """The determinant has one of each parameter."""
-        return len(self.places)
+        return len(self.calibrations[0].estimated)
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
-        return np.asarray(-np.linalg.slogdet(_part(normal, self.places))[1])
+        return np.asarray(-np.linalg.slogdet(self.calibrations[0].part(normal))[1])
 
     def gradient(self, normal: Array) -> Array:
         """− N⁻¹."""
-        slope = np.zeros_like(normal)
-        slope[np.ix_(self.places, self.places)] = -np.linalg.inv(_part(normal, self.places))
-        return slope
-
-
-@dataclass(frozen=True)
-class Adjusted:
-    """A calibration whose mean squares count: what it estimates, and what it neglects.
-
-    Attributes
-    ----------
-    places : (k,) array of int, of the estimated parameters in a normal matrix
-    forms : (a, u, u) array, W of each mean square
-    left : (q,) array of int, places of the neglected parameters
-    variance : (q,) array, diagonal of P, of their mean squares
-    """
-
-    places: NDArray[np.int_]
-    forms: Array
-    left: NDArray[np.int_] = field(default_factory=lambda: np.zeros(0, dtype=int))
-    variance: Array = field(default_factory=lambda: np.zeros(0))
-
-    @cached_property
-    def w11(self) -> Array:
-        """W₁₁ of each mean square, (a, k, k)."""
-        return self.forms[:, self.places[:, None], self.places]
-
-    @cached_property
-    def w12(self) -> Array:
-        """W₁₂ of each mean square, (a, k, q)."""
-        return self.forms[:, self.places[:, None], self.left]
-
-    def solved(self, normal: Array) -> tuple[Array, Array]:
-        """N₁₁⁻¹, and the shifts N₁₁⁻¹ N₁₂ that neglected parameters cause."""
-        cofactors: Array = np.asarray(np.linalg.inv(_part(normal, self.places)), dtype=float)
-        if not len(self.left):
-            return cofactors, cofactors[..., :0]
-        return cofactors, cofactors @ normal[..., self.places[:, None], self.left]
-
-    def squares(self, cofactors: Array, shift: Array) -> Array:
-        """Mean squares, (a, ...)."""
-        flat = cofactors.reshape(*cofactors.shape[:-2], -1)
-        squares = np.asarray(self.w11.reshape(len(self.w11), -1) @ flat.T)
-        if len(self.left):
-            for i, form in enumerate(self.forms):
-                by_shift = np.einsum("...ik,...ik->...k", shift, self.w11[i] @ shift)
-                cross = np.einsum("...ik,ik->...k", shift, self.w12[i])
-                missing = by_shift - 2 * cross + np.diag(form)[self.left]
-                squares[i] += np.sum(missing * self.variance, axis=-1)
-        return squares
-
-    def gradient(self, cofactors: Array, shift: Array, weights: Array) -> Array:
-        """Derivative of Σ weightₐ squareₐ by the normal matrix; N₂₂ has no influence."""
-        slope = np.zeros(self.forms.shape[1:])
-        w = (weights @ self.w11.reshape(len(weights), -1)).reshape(cofactors.shape)
-        inside = -cofactors @ w @ cofactors
-        if len(self.left):
-            w12 = np.tensordot(weights, self.w12, 1)
-            by_shift = cofactors @ ((w @ shift - w12) * self.variance)
-            inside -= by_shift @ shift.T + shift @ by_shift.T
-            slope[np.ix_(self.places, self.left)] = by_shift
-            slope[np.ix_(self.left, self.places)] = by_shift.T
-        slope[np.ix_(self.places, self.places)] = inside
-        return slope
+        return -self.calibrations[0].cofactors(normal)
 
 
 @dataclass(frozen=True)
 class MeanSquare(Criterion):
     """A mean square of errors, or the power mean of several.
-
-    The positions determine the estimated parameters, of normal matrix N₁₁. Neglected parameters p
-    of variances P shift these by N₁₁⁻¹ N₁₂ p, and are missing themselves. With Z = (N₁₁⁻¹ N₁₂; −I)
-    and a form W the mean square is tr(W₁₁ N₁₁⁻¹) + tr(W Z P Zᵀ).
 
     A high power stands for the larger one. It has a derivative also where two mean squares are
     equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most. A power mean of
@@ -177,60 +169,59 @@ class MeanSquare(Criterion):
 
     Attributes
     ----------
-    name, text : see `Criterion`
-    parts : the calibrations of which the mean squares are
+    name, text, calibrations : see `Criterion`
     power : int, of the power mean
     """
 
     name: str
     text: str
-    parts: tuple[Adjusted, ...]
+    calibrations: tuple[Calibration, ...]
     power: int = 1
 
     degree = 1
 
-    @property
-    def wanted(self) -> tuple[NDArray[np.int_], ...]:  # type: ignore[override]
-        """The parameters of each calibration."""
-        return tuple(part.places for part in self.parts)
-
     def squares(self, normal: Array) -> Array:
         """All mean squares, (a, ...)."""
-        return np.concatenate([part.squares(*part.solved(normal)) for part in self.parts])
+        each = [one.squares(*one.covariances(normal)) for one in self.calibrations]
+        return each[0] if len(each) == 1 else np.concatenate(each)
 
     def value(self, normal: Array) -> Array:
         """Logarithm of the mean square, or of the power mean."""
-        logs = self.power * np.log(self.squares(normal))
+        squares = self.squares(normal)
+        if len(squares) == 1:
+            return np.asarray(np.log(squares[0]))
+        logs = self.power * np.log(squares)
         return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / self.power)
 
     def gradient(self, normal: Array) -> Array:
         """Derivative of the logarithm."""
-        solved = [part.solved(normal) for part in self.parts]
-        squares = [part.squares(*at) for part, at in zip(self.parts, solved, strict=True)]
-        relative = np.concatenate(squares)
-        largest = relative.max()
-        relative = relative / largest
-        weights = relative ** (self.power - 1) / np.sum(relative**self.power) / largest
+        errors = [one.covariances(normal) for one in self.calibrations]
+        squares = [one.squares(*at) for one, at in zip(self.calibrations, errors, strict=True)]
+        whole = np.concatenate(squares)
+        relative = whole / whole.max()
+        weights = relative ** (self.power - 1) / np.sum(relative**self.power) / whole.max()
         slope = np.zeros_like(normal)
-        for part, at in zip(self.parts, solved, strict=True):
-            own, weights = np.split(weights, [len(part.forms)])
-            slope += part.gradient(*at, own)
+        for one, at in zip(self.calibrations, errors, strict=True):
+            own, weights = np.split(weights, [len(one.forms)])
+            slope += one.gradient(*at, own)
         return slope
 
     @property
     def convex(self) -> Criterion:
         """The mean square of the estimated parameters."""
-        return replace(self, parts=tuple(Adjusted(p.places, p.forms) for p in self.parts))
+        alone = (Calibration(each.estimated, each.forms) for each in self.calibrations)
+        return replace(self, calibrations=tuple(alone))
 
     def bound(self, convex: float) -> float:
         """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
-        part = self.parts[0]
-        if not len(part.left):
+        one = self.calibrations[0]
+        if not len(one.neglected):
             return convex
-        (w11,), (w12,), (form,) = part.w11, part.w12, part.forms
-        inverse = np.linalg.pinv(w11, rcond=1e-9, hermitian=True)
-        remains = np.diag(form)[part.left] - np.sum(w12 * (inverse @ w12), axis=0)
-        return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * part.variance)))
+        form, (rows, columns) = one.forms[0], one._block
+        inverse = np.linalg.pinv(form[rows, columns], rcond=1e-9, hermitian=True)
+        across = form[rows, one.neglected]
+        remains = np.diag(form)[one.neglected] - np.sum(across * (inverse @ across), axis=0)
+        return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * one.variance)))
 
 
 def get_criterion(name: str, task: Task) -> Criterion:
@@ -242,50 +233,32 @@ def get_criterion(name: str, task: Task) -> Criterion:
     calibration with both, without the other parameters of its effect.
     """
     places, left = np.flatnonzero(task.estimated), np.flatnonzero(~task.estimated)
-    forms, u = task.tilt_weights, len(task.names)
-    mean = forms.mean(axis=0)[None]
+    unit, angles = np.eye(len(task.names)), task.tilt_weights
+    mean, own = angles.mean(axis=0)[None], np.diag(task.estimated * 1.0)[None]
     use = "roll and pitch over the tilt range"
     if name == "D":
-        return Determinant(places)
+        return Determinant((Calibration(places, own),))
     if name == DISCRIMINATE:
         first, second = (task.places(effect) for effect in task.neglected)
         return MeanSquare(
             name,
             "mean square of the sizes at which the two effects can be told from each other",
             tuple(
-                Adjusted(np.array([*places, *rival, one]), np.diag(np.eye(u)[one])[None])
-                for own, rival in ((first, second), (second, first))
-                for one in own
+                Calibration(np.array([*places, *rival, one]), np.diag(unit[one])[None])
+                for mine, rival in ((first, second), (second, first))
+                for one in mine
             ),
         )
-    criteria: dict[str, tuple[str, Adjusted]] = {
-        "I": (f"mean variance of {use}", Adjusted(places, mean)),
-        "A": (
-            "mean variance of the scaled parameters",
-            Adjusted(places, np.diag(task.estimated * 1.0)[None]),
-        ),
-        MINIMAX: (
-            "variance of roll or of pitch over the tilt range, whichever is larger",
-            Adjusted(places, forms),
-        ),
-        ROBUST: (
-            "mean square of roll and pitch, the neglected effects included",
-            Adjusted(places, mean, left, task.neglected_sigmas**2),
-        ),
+    texts = {
+        "I": f"mean variance of {use}",
+        "A": "mean variance of the scaled parameters",
+        MINIMAX: "variance of roll or of pitch over the tilt range, whichever is larger",
+        ROBUST: "mean square of roll and pitch, the neglected effects included",
     }
-    if name not in criteria:
+    if name not in texts:
         raise UnknownNameError("criterion", name, (*CRITERIA, ROBUST))
-    text, part = criteria[name]
-    return MeanSquare(name, text, (part,), POWER if name == MINIMAX else 1)
-
-
-@cache
-def _ridge(u: int) -> Array:
-    return RIDGE * np.eye(u)
-
-
-def _part(normal: Array, places: NDArray[np.int_]) -> Array:
-    """Normal matrix of some of the parameters."""
-    if len(places) < normal.shape[-1]:
-        normal = normal[..., places[:, None], places]
-    return normal + _ridge(len(places))
+    if name == ROBUST:
+        calibration = Calibration(places, mean, left, task.neglected_sigmas**2)
+    else:
+        calibration = Calibration(places, {"I": mean, "A": own, MINIMAX: angles}[name])
+    return MeanSquare(name, texts[name], (calibration,), POWER if name == MINIMAX else 1)

@@ -266,8 +266,8 @@ def position_rows(
         If the model needs what `hold` does not tell.
     """
     directions = np.asarray(directions, dtype=float)
-    if parameters is None and errors is None and not model.hold_columns:
-        return _ideal_rows(model, approach, noise, directions, gravity)
+    if parameters is None and errors is None:
+        return _ideal_rows(model, approach, noise, directions, gravity, hold)
     at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
     ideal = session(model, at, directions, gravity, hold)
     observed = ideal.observations(noise)
@@ -280,16 +280,24 @@ def position_rows(
 
 
 def _ideal_rows(
-    model: SensorModel, approach: Approach, noise: Noise, directions: Array, gravity: float
+    model: SensorModel,
+    approach: Approach,
+    noise: Noise,
+    directions: Array,
+    gravity: float,
+    hold: HoldConditions | None,
 ) -> Array:
     """Rows of the ideal sensor: its output is the force, so that nothing is iterated.
 
     A search for positions takes most of its time for them.
     """
     force = -gravity * directions
+    angles = angles_of(force)
+    if model.hold_columns:
+        roll, pitch = angles.T
+        hold = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(force)
     observed, variance = force, np.full(force.shape, noise.sigma_force**2)
     if approach.uses_angles:
-        angles = angles_of(force)
         observed = np.concatenate([force, angles], axis=1)
         of_angles = np.full(angles.shape, noise.sigma_angle**2)
         variance = np.concatenate([variance, of_angles], axis=1)
@@ -297,7 +305,7 @@ def _ideal_rows(
     x = np.zeros((equations.n_parameters, 1))
     if equations.estimates_gravity:
         x[-1] = gravity + noise.gravity_error
-    conditions = equations.at(model.settings, gravity + noise.gravity_error, None)
+    conditions = equations.at(model.settings, gravity + noise.gravity_error, hold)
     at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
     rows = whitened_design(at, variance.T)[:, :, 0]
     return np.ascontiguousarray(rows.transpose(2, 0, 1))
