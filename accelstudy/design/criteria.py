@@ -59,6 +59,10 @@ class Calibration:
         return RIDGE * np.eye(len(self.estimated))
 
     @cached_property
+    def _flat(self) -> Array:
+        return self.forms.reshape(len(self.forms), -1)
+
+    @cached_property
     def _block(self) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
         return self.estimated[:, None], self.estimated
 
@@ -77,24 +81,27 @@ class Calibration:
         whole[..., *self._block] = inverse
         return whole
 
-    def covariances(self, normal: Array) -> tuple[Array, Array]:
-        """C and E P Eᵀ, (..., u, u)."""
+    def covariances(self, normal: Array) -> tuple[Array, Array | None]:
+        """C and E P Eᵀ, (..., u, u); None if nothing is neglected."""
         cofactors = self.cofactors(normal)
         if not len(self.neglected):
-            return cofactors, np.zeros_like(cofactors)
+            return cofactors, None
         errors = (cofactors @ normal - np.eye(normal.shape[-1]))[..., self.neglected]
         return cofactors, (errors * self.variance) @ errors.swapaxes(-1, -2)
 
-    def squares(self, cofactors: Array, shifts: Array) -> Array:
+    def squares(self, cofactors: Array, shifts: Array | None) -> Array:
         """Mean squares, (a, ...)."""
-        flat = (cofactors + shifts).reshape(*cofactors.shape[:-2], -1)
-        return np.asarray(self.forms.reshape(len(self.forms), -1) @ flat.T)
+        covariance = cofactors if shifts is None else cofactors + shifts
+        return np.asarray(self._flat @ covariance.reshape(*cofactors.shape[:-2], -1).T)
 
-    def gradient(self, cofactors: Array, shifts: Array, weights: Array) -> Array:
+    def gradient(self, cofactors: Array, shifts: Array | None, weights: Array) -> Array:
         """Derivative of Σ weightₐ squareₐ by a normal matrix (u, u), symmetric."""
-        left = cofactors @ np.tensordot(weights, self.forms, 1)
-        by_shifts = left @ shifts
-        return np.asarray(-left @ cofactors - by_shifts - by_shifts.T)
+        left = cofactors @ (weights @ self._flat).reshape(cofactors.shape)
+        slope = -left @ cofactors
+        if shifts is not None:
+            by_shifts = left @ shifts
+            slope -= by_shifts + by_shifts.T
+        return np.asarray(slope)
 
 
 class Criterion(ABC):

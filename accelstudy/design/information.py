@@ -88,6 +88,10 @@ class Information:
         """Whether all parameters are determined."""
         return rank_of(self.rows)[0] == self.rows.shape[1]
 
+    def condition(self, estimated: Sequence[int] | NDArray[np.int_]) -> float:
+        """Condition of the estimated parameters, in columns of unit length; inf if singular."""
+        return rank_of(self.rows[:, estimated])[1]
+
     def undetermined(self, estimated: Sequence[int] | NDArray[np.int_]) -> NDArray[np.bool_]:
         """Which of the estimated parameters are not determined."""
         return rank_of(self.rows[:, estimated])[2]
@@ -292,12 +296,12 @@ def _ideal_rows(
     A search for positions takes most of its time for them.
     """
     force = -gravity * directions
-    angles = angles_of(force)
     if model.hold_columns:
-        roll, pitch = angles.T
+        roll, pitch = angles_of(force).T
         hold = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(force)
     observed, variance = force, np.full(force.shape, noise.sigma_force**2)
     if approach.uses_angles:
+        angles = angles_of(force)
         observed = np.concatenate([force, angles], axis=1)
         of_angles = np.full(angles.shape, noise.sigma_angle**2)
         variance = np.concatenate([variance, of_angles], axis=1)

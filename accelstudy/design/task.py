@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 
 SPHERE = 300
 """Attitudes that stand for the whole sphere."""
+WELL_ABOVE_NOISE = 50.0
+"""Ratio of gravity to the noise of a reading, over the condition of positions, from which on their
+combinations of parameters show above noise without a closer look."""
 LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 
 
@@ -182,6 +185,9 @@ class Task:
 
     def missing(self, directions: Array) -> str:
         """Why readings in positions do not determine the model; empty if they do."""
+        condition = self.information(directions).condition(np.flatnonzero(self.estimated))
+        if condition * self.noise.sigma_force < self.gravity / WELL_ABOVE_NOISE:
+            return ""
         measured = directions
         if self.measured is not None:
             measured = np.concatenate([self.measured, directions])
