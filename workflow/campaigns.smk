@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from accelstudy.campaign.batch.config import parse_batch
-from accelstudy.campaign.importing.public import next_attempt
+from accelstudy.campaign.importing.public import public_path
 
 
 include: "rules/start.smk"
@@ -19,22 +19,25 @@ OUTPUTS = [
     f"{RESULTS}/parameters.parquet",
     f"{RESULTS}/overview.html",
 ]
-RECORDS = [
-    f"{RESULTS}/public/{task.source}.json" for task in TASKS.values() if task.kind == "public"
-]
+PUBLIC = {
+    task.source: public_path(task.source, BATCH.public_folder)
+    for task in TASKS.values()
+    if task.kind == "public"
+}
 
 TOGETHER = [] if BATCH.lot is None else [f"{RESULTS}/lot"]
 
 
 wildcard_constraints:
     campaign=r"[^/]+",
-    public=r"[^/]+",
+    public=one_of(name for name, path in PUBLIC.items() if not path.exists()),
+    file=r"[^/]+",
 
 
 # Files of campaigns that exist. The job reports those that are missing.
 MEASURED = {
     name: (
-        {"record": f"{RESULTS}/public/{task.source}.json"}
+        {"public": str(PUBLIC[task.source])}
         if task.kind == "public"
         else {"files": [local(path) for path in task.files() if "{" not in path]}
     )
@@ -54,18 +57,16 @@ rule campaigns:
         TOGETHER,
 
 
-# The downloaded file is no output: Snakemake would delete it before a second try.
 rule public:
     output:
-        f"{RESULTS}/public/{{public}}.json",
+        str(Path(BATCH.public_folder, "{public}", "{file}").expanduser()),
     log:
-        f"{RESULTS}/logs/public/{{public}}.log",
+        f"{RESULTS}/logs/public/{{public}}/{{file}}.log",
     localrule: True
     conda:
         "envs/accelstudy.yaml"
     params:
         folder=BATCH.public_folder,
-        attempt=lambda wildcards: next_attempt(f"{RESULTS}/public/{wildcards.public}.json"),
     message:
         "Download the public data {wildcards.public}"
     script:

@@ -292,7 +292,7 @@ def registry(tmp_path, monkeypatch):
     public_data.cache_clear()
 
 
-def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_path):
+def test_what_cannot_be_downloaded_is_tried_again(registry, tmp_path):
     environment = {**ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT": "deg"}
     log = write_log(tmp_path / "source")
     digest = hashlib.sha256(log.read_bytes()).hexdigest()
@@ -302,14 +302,14 @@ def test_what_cannot_be_downloaded_is_reported_and_tried_again(registry, tmp_pat
     entries = [{"public": "bench-log"}]
     config = {"batch": "b", "public_folder": "downloads", "campaigns": entries}
 
-    text = succeed(tmp_path, config, environment=environment)
-    one_line(text, f"not calibrated: bench-log: {url}: cannot be downloaded: ")
-    one_line(text, "0 of 1 campaigns calibrated")
+    failed = run(tmp_path, config, environment=environment)
+    assert failed.returncode != 0
+    assert f"error: {url}: cannot be downloaded: " in failed.stdout
 
     (tmp_path / "downloads" / "bench-log").mkdir(parents=True, exist_ok=True)
     log.rename(tmp_path / "downloads" / "bench-log" / log.name)
     text = succeed(tmp_path, config, environment=environment)
-    assert jobs(text) == {"public": 1, "calibrate": 1, "overview": 1}
+    assert jobs(text) == {"calibrate": 1, "overview": 1}
     one_line(text, "1 of 1 campaigns calibrated")
     for path in ("overview.html", "campaigns/bench-log/report.html"):
         page = (tmp_path / "results/b" / path).read_text(encoding="utf-8")

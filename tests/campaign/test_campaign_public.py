@@ -4,7 +4,6 @@ import gc
 import hashlib
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 
 import pytest
 from calling import refusal, refused, succeed
@@ -14,11 +13,8 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import (
     PublicData,
-    fetch,
-    next_attempt,
     public_data,
-    read_record,
-    record_public,
+    public_file,
 )
 
 CONTENT = bytes(range(256)) * 64
@@ -59,6 +55,17 @@ def server(monkeypatch):
         running.shutdown()
         thread.join()
     gc.collect()  # a connection left open warns here, not in a test that comes later
+
+
+@pytest.fixture
+def fetch(tmp_path, monkeypatch):
+    """Function that gets a file into a folder."""
+
+    def get(known):
+        monkeypatch.setattr(public, "public_data", lambda: {"name": known})
+        return public_file("name", tmp_path)
+
+    return get
 
 
 def left(folder):
@@ -102,21 +109,21 @@ def test_command_refuses(arguments, message):
     assert message in refusal("public", *arguments)
 
 
-def test_a_file_that_is_there_is_not_downloaded(tmp_path):
+def test_a_file_that_is_there_is_not_downloaded(tmp_path, fetch):
     (tmp_path / "a" / "b").mkdir(parents=True)
     (tmp_path / "a" / "file.log").write_bytes(b"another file of that name")
     (tmp_path / "a" / "b" / "file.log").write_bytes(CONTENT)
     missing = data("https://nowhere.invalid/at%20all/file.log")
-    assert fetch(missing, tmp_path, tmp_path / "new") == tmp_path / "a" / "b" / "file.log"
+    assert fetch(missing) == tmp_path / "a" / "b" / "file.log"
 
 
-def test_download_of_a_whole_file(tmp_path, server):
+def test_download_of_a_whole_file(tmp_path, server, fetch):
     known = data(f"{server.url}/a%20folder/file.log")
-    path = fetch(known, tmp_path, tmp_path / "name")
+    path = fetch(known)
     assert path == tmp_path / "name" / "file.log"
     assert path.read_bytes() == CONTENT
     assert left(tmp_path) == ["file.log"]
-    assert fetch(known, tmp_path, tmp_path / "name") == path
+    assert fetch(known) == path
     assert server.asked == 1
 
 
@@ -125,36 +132,13 @@ def test_download_of_a_whole_file(tmp_path, server):
     ("broken", CONTENT, "cannot be downloaded"),
     ("whole", b"other", "has another sha256"),
 ])  # fmt: skip
-def test_of_what_is_not_the_file_nothing_is_left(tmp_path, server, where, content, message):
+def test_of_what_is_not_the_file_nothing_is_left(tmp_path, server, fetch, where, content, message):
     with refused(message, "try again"):
-        fetch(data(f"{server.url}/{where}/file.log", content), tmp_path, tmp_path)
+        fetch(data(f"{server.url}/{where}/file.log", content))
     assert left(tmp_path) == []
 
 
-def test_a_source_that_does_not_answer(tmp_path, server):
+def test_a_source_that_does_not_answer(server, fetch):
     server.server_close()
     with refused("cannot be downloaded", "put the file file.log below"):
-        fetch(data(f"{server.url}/file.log"), tmp_path, tmp_path)
-
-
-def test_a_record_asks_for_another_attempt_until_the_file_is_there(tmp_path, server, monkeypatch):
-    url = f"{server.url}/missing/file.log"
-    monkeypatch.setattr(public, "public_data", lambda: {"file": data(url)})
-    path = tmp_path / "file.json"
-
-    def record():
-        record_public("file", tmp_path / "folder", path, next_attempt(path))
-        return read_record(path)
-
-    assert next_attempt(path) == 1
-    first = record()
-    assert first["file"] is None
-    assert "cannot be downloaded: 404" in first["error"]
-    assert next_attempt(path) == 2
-    url = f"{server.url}/whole/file.log"
-    second = record()
-    assert second["error"] is None
-    assert Path(second["file"]).read_bytes() == CONTENT
-    assert second["attempt"] == next_attempt(path) == 2
-    Path(second["file"]).unlink()
-    assert next_attempt(path) == 3
+        fetch(data(f"{server.url}/file.log"))

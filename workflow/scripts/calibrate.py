@@ -8,7 +8,7 @@ with logged(snakemake):
     error = run_task(
         Task.model_validate(snakemake.params.task),
         snakemake.output[0],
-        snakemake.input.get("record"),
+        snakemake.input.get("public"),
         snakemake.log[0],
     )
     logging.info("%s", error or "calibrated")

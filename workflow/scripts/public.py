@@ -1,10 +1,5 @@
-from accelstudy.campaign.importing.public import record_public
+from accelstudy.campaign.importing.public import public_file
 from accelstudy.jobs import logged
 
 with logged(snakemake):
-    record_public(
-        snakemake.wildcards.public,
-        snakemake.params.folder,
-        snakemake.output[0],
-        snakemake.params.attempt,
-    )
+    public_file(snakemake.wildcards.public, snakemake.params.folder)

@@ -17,7 +17,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.logs import import_to
-from accelstudy.campaign.importing.public import read_record
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import BATCH_JOB, result_folder
 from accelstudy.sensors.models import get_model
@@ -26,7 +25,7 @@ from accelstudy.sensors.models import get_model
 def run_task(
     task: Task,
     folder: str | Path,
-    record: str | Path | None = None,
+    public: str | Path | None = None,
     log: str | Path | None = None,
 ) -> str | None:
     """Import and calibrate a campaign, and write the outcome to status.json.
@@ -36,8 +35,8 @@ def run_task(
     task : Task
     folder : path
         For what `write_calibration` writes; an imported campaign goes to its subfolder campaign.
-    record : path
-        Of public data, written by `accelstudy.campaign.importing.public.record_public`.
+    public : path
+        File of public data.
     log : path
         File with the traceback of an unexpected error.
 
@@ -52,7 +51,7 @@ def run_task(
         If the folder cannot be written.
     """
     with result_folder(folder, BATCH_JOB) as new:
-        error = _calibrate(task, new, record, log)
+        error = _calibrate(task, new, public, log)
         status = {
             **{key: getattr(task, key) for key in ("name", "kind", "source", "model", "approach")},
             "status": "ok" if error is None else "failed",
@@ -64,10 +63,10 @@ def run_task(
 
 
 def _calibrate(
-    task: Task, folder: Path, record: str | Path | None, log: str | Path | None
+    task: Task, folder: Path, public: str | Path | None, log: str | Path | None
 ) -> str | None:
     try:
-        campaign = _measured(task, folder / "campaign", record)
+        campaign = _measured(task, folder / "campaign", public)
         named = None if task.approach is None else get_approach(task.approach)
         fit = fit_campaign(campaign, get_model(task.model), named)
         write_calibration(assess(fit), folder)
@@ -110,13 +109,7 @@ def _read(task: Task) -> Campaign:
     return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
 
 
-def _measured(task: Task, folder: Path, record: str | Path | None) -> Campaign:
+def _measured(task: Task, folder: Path, public: str | Path | None) -> Campaign:
     if task.settings is None:
         return _read(task)
-    path = task.source
-    if record is not None:
-        told = read_record(record)
-        if told["error"] is not None:
-            raise InputError(told["error"])
-        path = told["file"]
-    return import_to(folder, path, task.settings)[0]
+    return import_to(folder, public or task.source, task.settings)[0]
