@@ -60,7 +60,7 @@ class Coordinate:
 
     def at(self, value: float) -> str:
         """Show a value."""
-        return f"{number(value / self.size)} {self.unit}"
+        return f"{number(value / self.size)} {self.unit}".rstrip()
 
     def by(self, value: float) -> str:
         """Show a difference of values."""
@@ -113,6 +113,7 @@ WORDS = {
     "scale": ("scale of {}", "the scale of {}"),
     "square": ("quadratic scale of {}", "the quadratic scale of {}"),
     "nonorthogonality": ("non-orthogonality {}", "the non-orthogonality {}"),
+    "mounting": ("rotation about {}", "the rotation of the sensor on its mounting about {}"),
     "reading": ("reading of {}", "the robot's reading of {}"),
     "tilt": ("tilt {}", "the tilt of the robot's base ({})"),
 }

@@ -13,6 +13,7 @@ from scipy.special import softmax
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.decision.learned import fit_of_place, most_probable_place
+from accelstudy.diagnosis.decision.noise import exceeds_stated
 from accelstudy.diagnosis.decision.posterior import (
     Posterior,
     Weighing,
@@ -128,7 +129,8 @@ def predicted_gap(
     test = replace(test, needed=least)
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
-    if not gap.confirmed or not alone:
+    # Of what leaves more than the noise the name may be that of something that is not listed.
+    if not gap.confirmed or not alone or exceeds_stated(problem, finding.frame):
         return gap
     (choice,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.

@@ -103,7 +103,7 @@ def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
     p = softmax(each, axis=1)
     few = np.sort(p, axis=1)[:, -RULES.many :].sum(axis=1) >= RULES.credible
     top = np.append(classes, np.full(each.shape[1] - len(classes), -1))[np.argmax(p, axis=1)]
-    return np.where((p.max(axis=1) >= RULES.sure) | few, top, -1)
+    return np.where((p.max(axis=1) >= RULES.named) | few, top, -1)
 
 
 def by_name(
@@ -133,9 +133,9 @@ def learned(problem: Problem, seen: Seen, place: Place) -> Ints:
     assert unknown is not None
     densities = field.densities(evidence, seen)
     densities[:, :-1] -= np.log(len(field.candidates))
-    densities[:, -1] += np.log(RULES.prior_unknown)
+    densities[:, -1] += np.log(unknown.weight)
     of_place = unknown.of_place(evidence, seen.parts[-1], seen.squares)[place]
-    share = np.exp(of_place + np.log(RULES.prior_unknown) - log_sum(densities))
+    share = np.exp(of_place + np.log(unknown.weight) - log_sum(densities))
     return np.where(share >= RULES.sure, 0, -1)
 
 

@@ -21,6 +21,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
 from accelstudy.diagnosis.decision.learned import shares_of_places
 from accelstudy.diagnosis.decision.noise import (
+    exceeds_stated,
     sigma_holds,
     tests_of_noise,
     unit_variance,
@@ -329,6 +330,11 @@ class Diagnosis:
     def sigma_holds(self) -> bool:
         """Whether sigma is given, and the final fit does not refute it."""
         return sigma_holds(self.problem, self.final)
+
+    @property
+    def more_than_noise(self) -> bool:
+        """Whether sigma is given, and the residuals of the final fit are larger than it allows."""
+        return exceeds_stated(self.problem, self.final)
 
     @cached_property
     def unit_variance(self) -> float:

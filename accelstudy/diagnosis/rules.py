@@ -77,8 +77,11 @@ class Rules:
 
     # --- posterior probabilities from which on something is said --------------------------------
 
+    named: float = 0.8
+    """One name is given: a wrong name costs four times as much as one that is withheld."""
     sure: float = 0.7
-    """One name is given: a wrong name costs 7, a name that is withheld 3."""
+    """What has no name in the catalogue is given, such as a function, or the noise; and of effects
+    which few it may be."""
     credible: float = 0.9
     """Explanations are a credible set together; what they have in common is certain."""
     many: int = 4

@@ -45,6 +45,7 @@ TARGETS = {
     "scale": (AXES, "1"),
     "square": (AXES, "s^2/m"),
     "nonorthogonality": (("yz", "zy", "zx"), "rad"),
+    "mounting": (AXES, "rad"),
     "reading": (ROBOT, "rad"),
     "tilt": (("a", "b"), "rad"),
 }
@@ -91,7 +92,7 @@ class Learned(Effect):
     def equation(self) -> str:
         """What it adds, for people."""
         of = "h_i(c), c the " + self.coordinate
-        times = {"scale": " f_i", "square": " f_i²", "nonorthogonality": " f_j"}
+        times = {"scale": " f_i", "square": " f_i²", "nonorthogonality": " f_j", "mounting": " × f"}
         return of.replace(",", times.get(self.target, "") + ",", 1)
 
     @property
@@ -157,7 +158,7 @@ class Learned(Effect):
         return [p[i : i + size] for i in range(0, len(p), size)]
 
     def output(self, f, p, g, hold, xp):
-        """Return h, h f or h f², or what a tilt or non-orthogonality of h does."""
+        """Return h, h f or h f², or what a tilt, a rotation or angles between the axes of h do."""
         if self.target == "reading":
             return super().output(f, p, g, hold, xp)
         parts, arguments = self._parts(p), self.arguments(f, (), hold)
@@ -168,6 +169,8 @@ class Learned(Effect):
             h = [xp.sign(step) * h_i for h_i in h]
         if self.target == "tilt":
             return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
+        if self.target == "mounting":
+            return get_effect("mounting_rotation").output(f, tuple(h), g, hold, xp)
         if self.target == "nonorthogonality":
             return multiply(get_effect("nonorthogonality").axes(tuple(h), xp), f)
         power = {"bias": 0, "scale": 1, "square": 2}[self.target]

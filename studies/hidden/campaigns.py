@@ -119,6 +119,7 @@ def outcome(d: Diagnosis) -> Row:
         "place": d.place,
         "fits": [fit_squares(one) for one in fits],
         "confirmed": bool(d.gap.confirmed),
+        "name_confirmed": d.gap.statement == "name",
         "held_out_z": None if held is None else float(held.z),
         "sigma0_before": float(d.gap.before),
         "sigma0_after": None if d.gap.after is None else float(d.gap.after),

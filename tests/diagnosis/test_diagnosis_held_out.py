@@ -111,6 +111,21 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
     assert all(words(name) in line for name in GROUPS[case])
 
 
+def test_no_name_is_confirmed_where_the_fit_leaves_more_than_the_stated_noise():
+    """Sigma is half of the true one: that, or something unlisted, may make the name."""
+    settings = CampaignSettings(
+        scheme="fibonacci-18", repeats=3, order="random", approach="robot", yaw="random",
+        effects=("thermal_bias",), noise_effects=("noise_level(kappa=4)",),
+        temperature=(15.0, 40.0), temperature_order="random", seed=3,
+    )  # fmt: skip
+    found = diagnose(simulate_campaign(settings)[0], NINE)
+    assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
+    assert found.gap.confirmed
+    assert found.gap.statement == "effect"
+    (line,) = said("confirmation", found)
+    assert line.endswith("rather than a rival, since more is left than the stated noise.")
+
+
 def test_an_imitator_leaves_nothing_of_what_it_imitates():
     """By least squares: of the imitators, and of no others, a shape takes up all of an effect."""
     frame_of = design(shuffled("fibonacci-30"), GRAVITY, some_holds(30))

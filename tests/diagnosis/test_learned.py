@@ -110,6 +110,23 @@ def test_a_spec_holds_all_and_is_not_listed():
             get_effect(spec)
 
 
+def test_a_learned_rotation_of_the_mounting_turns_the_force():
+    """By Rodrigues' formula, of small angles."""
+    effect = get_effect(f"{SPEC.replace('bias', 'mounting')}, length=1.5, amplitude=0.001)")
+    h = effect.function(np.array([28.0]), w := np.linspace(-1e-4, 2e-4, len(effect.parameters)),
+                        np.zeros((len(w), len(w))))[0][0]  # fmt: skip
+    force, angle, axis = np.array([1.0, -4.0, 8.8]), np.linalg.norm(h), h / np.linalg.norm(h)
+    turned = (
+        np.cos(angle) * force
+        + np.sin(angle) * np.cross(axis, force)
+        + (1 - np.cos(angle)) * (axis @ force) * axis
+    )
+    added = effect.output(tuple(force), tuple(w), G, some_holds(1, temperature=28.0), np)
+    np.testing.assert_allclose(
+        np.ravel(added), turned - force, atol=angle**2 * np.linalg.norm(force)
+    )
+
+
 def test_its_parameters_have_symbols_in_figures():
     names = get_model(f"bias+{SPEC}, length=0.25, amplitude=0.01)").parameter_names
     assert [symbol(name) for name in names[3:]][:2] == ["$h_{x,1}$", "$h_{x,2}$"]

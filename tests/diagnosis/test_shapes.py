@@ -51,6 +51,23 @@ def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
         assert max(s for place, s in share.items() if place != ("temperature", "bias")) < 0.8
 
 
+def test_a_rotation_of_the_mounting_has_its_place_where_a_robot_sees_it(frame, shapes):
+    """Gravity alone is blind to it."""
+    if not frame.solution.approach.uses_angles:
+        assert not any(target == "mounting" for _, target in shapes.places)
+        return
+    residuals, angle = frame.residuals, (frame.hold.vibration - 1) ** 2
+    change = np.cross(np.outer(angle - angle.mean(), [1.0, -0.4, 0.7]), frame.forces)[..., None]
+    row = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
+    row /= np.linalg.norm(row)
+    of_place = [
+        np.sum((row.T @ vectors) ** 2)
+        for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True)
+        if place == ("vibration", "mounting")
+    ]
+    assert max(of_place) > 0.95
+
+
 def test_what_is_the_same_in_all_positions_is_no_function(frame, shapes):
     """A tilt of the base and offsets of its encoders are effects of the catalogue."""
     if not frame.solution.approach.uses_angles:

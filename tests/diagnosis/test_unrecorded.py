@@ -45,16 +45,26 @@ def wandering(t):
 @pytest.mark.parametrize(("robot", "columns"), [
     (True, {}), (False, {"sigma_force": None}), (True, {"time": None}),
 ])  # fmt: skip
-def test_what_nobody_recorded_is_no_adequate_model(robot, columns):
+def test_what_nobody_recorded_is_a_function_of_time(robot, columns):
+    """Not noise: with the function in the model the sensor levels as the noise allows."""
     found = diagnose(session(wandering, robot=robot, **columns), NINE)
-    assert found.verdict == "noise_model"
-    assert found.found[0].name == "coloured_noise"
+    assert (found.verdict, found.place) == ("learned", ("time", "bias"))
+    assert any("campaign has no temperature" in line for line in verdict_lines(found))
+    before, after = found.leveling
+    assert after < before / 2
+
+
+def test_where_it_may_be_slow_noise_as_well_nothing_is_learned():
+    found = diagnose(session(wandering, seed=2), NINE)
+    assert (found.verdict, found.code) == ("unknown", "unrecorded")
     said = " ".join(verdict_lines(found))
     assert headline(found).lower().startswith(CANNOT)
     assert "adequate" not in said
     assert "temperature at the sensor" in said
-    assert ("time of each hold" in said) == ("time" in columns)
+    assert "time of each hold" not in said
     assert CANNOT in json.dumps(diagnosis_document(found))
+    without_time = diagnose(session(wandering, seed=2, size=2.0, time=None), NINE)
+    assert "time of each hold" in " ".join(verdict_lines(without_time))
 
 
 def test_a_course_that_a_thermometer_shows_is_an_effect():

@@ -205,6 +205,6 @@ def test_a_robot_is_worth_what_a_robotics_engineer_reads():
 
 def test_the_theory_of_evidence_has_the_rules_of_the_code():
     text = (ROOT / "docs/theory/evidence.md").read_text("utf-8")
-    assert f"from **{RULES.sure:g}** on" in text
+    assert f"from **{RULES.named:g}** on" in text
     assert f"hold **{RULES.credible:g}** together" in text
     assert f"with a probability of {1 - RULES.prior_sigma_wrong:g}" in text

@@ -128,6 +128,15 @@ def sigma_holds(problem: Problem, frame: Frame) -> bool:
     return stated and level_test_of(problem, frame).p_value >= REFUTATION_LEVEL
 
 
+def exceeds_stated(problem: Problem, frame: Frame) -> bool:
+    """Whether sigma is given, and the residuals of a fit are larger than it allows."""
+    return (
+        problem.evidence.level.known
+        and not sigma_holds(problem, frame)
+        and frame.residuals.variance > 1
+    )
+
+
 def unit_variance(problem: Problem, frame: Frame) -> float:
     """Variance of unit weight: of the given sigma where that holds, else a posteriori."""
     residuals = frame.residuals

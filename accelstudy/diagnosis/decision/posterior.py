@@ -44,11 +44,7 @@ from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis, cosines
-from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.effects import effect_names
-
-SLOW_PLACES = (("time", "bias"), ("time", "scale"))
-"""Places of what follows something that was not recorded, and that slow noise may be, too."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +213,7 @@ class Weighing:
         if unknown is not None:
             z = self.problem.residuals.z
             density = unknown.log_density(self.problem.evidence, unknown.parts(z), z @ z)
-            log = float(density + np.log(RULES.prior_unknown))
+            log = float(density + np.log(unknown.weight))
             alone.append(Explanation((UNKNOWN,), ((UNKNOWN,),), log))
         return alone
 
@@ -254,7 +250,7 @@ class Weighing:
         least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
         pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
         pairs.sort(key=lambda one: -one.log_weight)
-        prior = float(np.log(RULES.prior_two * RULES.prior_unknown))
+        prior = float(np.log(RULES.prior_two * unknown.weight))
         for one in (*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]):
             basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
             log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
@@ -329,25 +325,13 @@ def _noises(
     if problem.frame.solution is not problem.base.solution:
         unequal = float(by_level[0])
     tails = tail_test(residuals, chance)
-    processes, course = colour_densities(residuals, evidence), -np.inf
-    coloured = np.log(RULES.prior_coloured) + log_mean(processes)
-    if problem.absent:
-        unknown = problem.field.unknown
-        courses = (
-            LearnedShapes.of(problem.frame, SLOW_PLACES)
-            if unknown is None
-            else unknown.at(SLOW_PLACES)
-        )
-        if courses.places:
-            z = residuals.z
-            course = float(courses.log_density(evidence, courses.parts(z), z @ z))
-        coloured = np.logaddexp(coloured, np.log(RULES.prior_unrecorded) + course)
+    processes = colour_densities(residuals, evidence)
     logs = {
-        COLOUR: coloured,
+        COLOUR: np.log(RULES.prior_coloured) + log_mean(processes),
         AXES: unequal,
         TAILS: nothing + np.log(RULES.prior_tails) + most_evidence(tails.p_value),
     }
-    lasting, fast = log_mean(np.array([*processes[1:], course])), processes[0]
+    lasting, fast = log_mean(processes[1:]), processes[0]
     if len(by_level) > 1:
         # More noise than within the holds is an offset from hold to hold.
         name = LEVEL if evidence.level.known else COLOUR

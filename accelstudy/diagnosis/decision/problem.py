@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
+from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
@@ -126,11 +126,6 @@ class Problem:
         """Whether attitudes were measured repeatedly, so that the noise shows by itself."""
         return self.field.attitude is not None
 
-    @property
-    def absent(self) -> tuple[str, ...]:
-        """Columns that would tell what changes slowly, and that the campaign lacks."""
-        return tuple(n for n in ("temperature", "time") if getattr(self.frame.hold, n) is None)
-
 
 def pose(base: BaseFit) -> Problem:
     """Return the problem that a fit poses: its residuals, and all that its model may lack.
@@ -176,10 +171,8 @@ def _best_odds(field: Field, evidence: Evidence, z: NDArray[np.float64]) -> floa
     """Log odds of the most probable single thing that is missing against nothing, at least 0."""
     if not field.names:
         return 0.0
-    prior = [
-        RULES.prior_unknown if name == UNKNOWN else 1 / len(field.candidates)
-        for name in field.names
-    ]
+    unknown = [] if field.unknown is None else [field.unknown.weight]
+    prior = [*np.full(len(field.candidates), 1 / len(field.candidates)), *unknown]
     nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
     return max(
         0.0, float(np.max(field.densities(evidence, field.seen(z)) + np.log(prior)) - nothing)

@@ -149,7 +149,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         found = [Choice(h, m, top.posterior) for h, m in zip(fit[0], top.classes, strict=True)]
         found.sort(key=lambda choice: choice.best.effect is not None)
         credible, verdict = posterior.credible_set, ""
-        if top.posterior >= RULES.sure:
+        if top.posterior >= RULES.named:
             verdict = "gross_error" if found[0].best.effect is None else "named"
         elif len(credible) <= RULES.many and (
             sum(one.posterior for one in credible if one.of_effects) >= RULES.sure
@@ -234,12 +234,12 @@ def coloured(case: Case, finding: Finding) -> float:
     if finding.verdict not in ("noise_model", "unknown") or posterior is None:
         return 0.0
     slow = [one.posterior for one in posterior.all if one.names == (COLOUR,)]
-    return sum(slow) if case.problem.absent else 0.0
+    return sum(slow) if case.problem.frame.absent else 0.0
 
 
 def unrecorded(case: Case, finding: Finding) -> Reason | None:
     """Why noise, or nothing with a name, may be an effect of what was not recorded; else None."""
-    posterior, absent = finding.posterior, case.problem.absent
+    posterior, absent = finding.posterior, case.problem.frame.absent
     if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
         return None
     slow, probability = case.slow, coloured(case, finding)
@@ -338,7 +338,8 @@ def _beside(
     k, weighed = max(count, 1), []
     for name, log in zip(field.names, logs.tolist(), strict=True):
         if name == UNKNOWN:
-            weight = log + float(np.log(RULES.prior_two * RULES.prior_unknown))
+            assert field.unknown is not None
+            weight = log + float(np.log(RULES.prior_two * field.unknown.weight))
             names, classes = (*alone.names, UNKNOWN), (*alone.classes, (UNKNOWN,))
             weighed.append(Explanation(names, classes, weight))
             continue

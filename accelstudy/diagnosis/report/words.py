@@ -51,6 +51,7 @@ TARGETS = {
     "bias": "a bias",
     "scale": "a scale",
     "nonorthogonality": "a non-orthogonality",
+    "mounting": "a rotation of the sensor on its mounting",
     "reading": "an error of the robot's readings",
     "tilt": "a tilt of the base",
 }

@@ -58,6 +58,11 @@ class Frame:
     angles: Array
     hold: HoldConditions
 
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Columns that would tell what changes slowly, and that the campaign lacks."""
+        return tuple(n for n in ("temperature", "time") if getattr(self.hold, n) is None)
+
     @cached_property
     def _columns(self) -> Columns:
         """Columns of the holds beside arrays of settings and parameters."""

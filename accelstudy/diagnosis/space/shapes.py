@@ -51,6 +51,8 @@ Place: TypeAlias = tuple[str, str]
 
 OF_ATTITUDE = ("force", "bias")
 """Place of anything that repeated positions of one attitude have in common."""
+SLOW_PLACES = (("time", "bias"), ("time", "scale"))
+"""Places of what follows something that nobody recorded, such as a temperature."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +64,11 @@ class LearnedShapes(Shapes):
     places : tuple of Place, s
     prior : (s,) array, even over the coordinates, then over their targets, over the kinds of
         functions that are tried of each, and over their smoothness; the attitude counts as one
-        coordinate
+        coordinate. Where a column is absent, slow changes with time have more
     vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
     shares : tuple of arrays (k,), eigenvalues of K of each shape, which sum to 1
     attitude : Spaces or None, everything but the differences of repeated positions, the last place
+    weight : float, prior weight of all of them together
     """
 
     places: tuple[Place, ...]
@@ -73,23 +76,21 @@ class LearnedShapes(Shapes):
     vectors: Array
     shares: tuple[Array, ...]
     attitude: Spaces | None = None
+    weight: float = RULES.prior_unknown
 
     @classmethod
-    def of(
-        cls, frame: Frame, only: Collection[Place] = (), attitude: Spaces | None = None
-    ) -> LearnedShapes:
+    def of(cls, frame: Frame, attitude: Spaces | None = None) -> LearnedShapes:
         """All shapes that the coordinates of a session allow, and that its model leaves.
 
         Parameters
         ----------
         frame : Frame
-        only : places; all by default
         attitude : Spaces or None, what repeated positions of one attitude have in common
         """
         places: list[Place] = []
         kinds: list[int] = []
         covariances: list[Array] = []
-        for kind, (place, rows, priors) in enumerate(_functions(frame, only)):
+        for kind, (place, rows, priors) in enumerate(_functions(frame)):
             projected = frame.residuals.project(rows)
             left, whole = np.sum(projected**2, axis=0), np.sum(rows**2, axis=0)
             for prior in priors[priors @ left > RULES.visible_shape * (priors @ whole)]:
@@ -105,11 +106,19 @@ class LearnedShapes(Shapes):
             for place, kind in zip(places, kinds, strict=True)
         ])  # fmt: skip
         shapes = cls._of(places, weights, covariances, len(frame.residuals.design))
-        if attitude is None:
-            return shapes
-        share = 1 / (len(targets) + 1)
-        prior = np.append(weights * (1 - share), share)
-        return replace(shapes, places=(*places, OF_ATTITUDE), prior=prior, attitude=attitude)
+        if attitude is not None:
+            share = 1 / (len(targets) + 1)
+            prior = np.append(weights * (1 - share), share)
+            shapes = replace(shapes, places=(*places, OF_ATTITUDE), prior=prior, attitude=attitude)
+        return shapes._with_unrecorded() if frame.absent else shapes
+
+    def _with_unrecorded(self) -> LearnedShapes:
+        """The same shapes, where some of what changes slowly follows what nobody recorded."""
+        slow = np.where([place in SLOW_PLACES for place in self.places], self.prior, 0.0)
+        if not slow.any():
+            return self
+        prior = RULES.prior_unknown * self.prior + RULES.prior_unrecorded * slow / slow.sum()
+        return replace(self, prior=prior / prior.sum(), weight=float(prior.sum()))
 
     @classmethod
     def _of(
@@ -137,7 +146,8 @@ class LearnedShapes(Shapes):
         roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
         seen = [i for i, root in enumerate(roots) if np.sum(root**2) > RULES.visible_shape]
         places, weights = [self.places[i] for i in seen], self.prior[seen]
-        return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
+        rest = self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
+        return replace(rest, weight=self.weight)
 
     def at(self, places: Collection[Place]) -> LearnedShapes:
         """Those of some places, whose weights sum to 1."""
@@ -148,6 +158,7 @@ class LearnedShapes(Shapes):
             weights / weights.sum(),
             np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
             tuple(self.shares[i] for i in some),
+            weight=self.weight * float(weights.sum()),
         )
 
     def parts(self, errors: Array) -> Array:
@@ -201,8 +212,10 @@ class _Coordinate:
     priors: Array
 
 
-SLOW_TARGETS = ("bias", "scale", "square", "nonorthogonality", "reading", "tilt")
-"""Targets of anything that changes from hold to hold, whatever the attitude."""
+TARGETS = ("bias", "scale", "square", "nonorthogonality", "mounting", "reading", "tilt")
+"""What may depend on anything that changes from hold to hold, whatever the attitude."""
+TURNING = ("mounting", "reading", "tilt")
+"""Targets that turn the force, to which gravity alone is blind."""
 
 
 def coordinate_in_holds(name: str, frame: Frame) -> Array:
@@ -224,19 +237,18 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
     yield _Coordinate("angle", ("reading",), angles, *_harmonics(angles))
     if hold.yaw is not None and np.ptp(hold.yaw) > 0:
         yaw = hold.yaw[:, None]
-        yield _Coordinate("yaw", ("bias", "reading", "tilt"), yaw, *_harmonics(yaw))
+        yield _Coordinate("yaw", TARGETS, yaw, *_harmonics(yaw))
     if hold.vibration is not None:
-        targets = ("bias", "scale", "reading", "tilt")
-        yield from smooth("vibration", targets, hold.vibration[:, None])
+        yield from smooth("vibration", TARGETS, hold.vibration[:, None])
     if hold.temperature is not None:
-        yield from smooth("temperature", SLOW_TARGETS, hold.temperature[:, None])
+        yield from smooth("temperature", TARGETS, hold.temperature[:, None])
     if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
         return
     when = hold.column(order)
-    yield from smooth("time", SLOW_TARGETS, when[:, None])
+    yield from smooth("time", TARGETS, when[:, None])
     yield _Coordinate("time", ("bias",), when[:, None], *_waves(when))
     before = np.concatenate([f[:1], f[:-1]])
-    yield from smooth("previous", ("bias",), before)
+    yield from smooth("previous", ("bias", "scale"), before)
     yield from smooth("next", ("bias",), np.append(f[1:], f[-1:], 0) - f)
     moved = wrapped(np.diff(angles, axis=0, prepend=angles[:1]))
     yield from smooth("move", ("reading",), moved)
@@ -244,7 +256,7 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
         rates = np.diff(hold.temperature) / np.diff(when)
         last = np.append(rates[:1], rates)
         for rate in (last, (last + np.append(rates, rates[-1:])) / 2):
-            yield from smooth("dT/dt", ("bias", "scale"), rate[:, None])
+            yield from smooth("dT/dt", TARGETS, rate[:, None])
 
 
 def _sines(values: Array) -> tuple[Array, Array]:
@@ -294,7 +306,7 @@ NAMED_TARGETS = {"square": "scale", "bias of the others": "bias"}
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 
-def _functions(frame: Frame, only: Collection[Place]) -> Iterator[tuple[Place, Array, Array]]:
+def _functions(frame: Frame) -> Iterator[tuple[Place, Array, Array]]:
     """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k).
 
     Their means over the holds are zero: what is the same in all of them is no function.
@@ -304,7 +316,7 @@ def _functions(frame: Frame, only: Collection[Place]) -> Iterator[tuple[Place, A
         varying = less_its_mean(one.functions)
         for target in one.targets:
             place = (one.name, NAMED_TARGETS.get(target, target))
-            if (only and place not in only) or (target in ("reading", "tilt") and not robot):
+            if target in TURNING and not robot:
                 continue
             rows = function_rows(frame, target, varying)
             count = rows.shape[1] // one.priors.shape[1]
@@ -344,10 +356,13 @@ def _change(h: Array, target: str, frame: Frame) -> Array:
         for k, (i, j) in enumerate(PAIRS):
             parts[:, i, k] = h[:, j]
         return parts.reshape(len(f), 3, -1)
-    if target == "nonorthogonality":
+    if target in ("nonorthogonality", "mounting"):
         # Each function is that of one of the three angles.
-        axes = np.array([get_effect("nonorthogonality").axes(tuple(e), np) for e in np.eye(3)])
-        turned = np.einsum("aij,nj->nai", axes, f)
+        if target == "mounting":
+            turned = np.cross(np.eye(3), f[:, None])
+        else:
+            axes = np.array([get_effect(target).axes(tuple(e), np) for e in np.eye(3)])
+            turned = np.einsum("aij,nj->nai", axes, f)
         return np.einsum("nai,nk->niak", turned, h[:, 0]).reshape(len(f), 3, -1)
     if target == "scale":
         return _each(h, 3) * f[..., None]

@@ -91,6 +91,7 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "credible_set": explanations,
         "ok": ok,
         "confirmed": ok and row["confirmed"],
+        "name_confirmed": ok and row["name_confirmed"],
         # All effects, and no others; of some effects the names, and no others.
         "right": answered and same_effects(names, true),
         "correct": answered and all_true(names, true),
