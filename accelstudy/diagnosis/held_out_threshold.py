@@ -103,7 +103,7 @@ def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
     p = softmax(each, axis=1)
     few = np.sort(p, axis=1)[:, -RULES.many :].sum(axis=1) >= RULES.credible
     top = np.append(classes, np.full(each.shape[1] - len(classes), -1))[np.argmax(p, axis=1)]
-    return np.where((p.max(axis=1) >= RULES.named) | few, top, -1)
+    return np.where((p.max(axis=1) >= RULES.sure) | few, top, -1)
 
 
 def by_name(

@@ -80,8 +80,7 @@ class Rules:
     named: float = 0.8
     """One name is given: a wrong name costs four times as much as one that is withheld."""
     sure: float = 0.7
-    """What has no name in the catalogue is given, such as a function, or the noise; and of effects
-    which few it may be."""
+    """All else is said, such as that it is the noise, or one of a few effects."""
     credible: float = 0.9
     """Explanations are a credible set together; what they have in common is certain."""
     many: int = 4

@@ -149,11 +149,13 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         found = [Choice(h, m, top.posterior) for h, m in zip(fit[0], top.classes, strict=True)]
         found.sort(key=lambda choice: choice.best.effect is not None)
         credible, verdict = posterior.credible_set, ""
-        if top.posterior >= RULES.named:
-            verdict = "gross_error" if found[0].best.effect is None else "named"
-        elif len(credible) <= RULES.many and (
-            sum(one.posterior for one in credible if one.of_effects) >= RULES.sure
-        ):
+        of_effects = sum(one.posterior for one in credible if one.of_effects)
+        sure = top.posterior >= RULES.sure
+        if sure and found[0].best.effect is None:
+            verdict = "gross_error"
+        elif top.posterior >= RULES.named:
+            verdict = "named"
+        elif (sure or len(credible) <= RULES.many) and of_effects >= RULES.sure:
             verdict = "narrowed"
         if verdict:
             return Finding(verdict, Frame.of(fit[1]), None, tuple(found), posterior)
