@@ -218,7 +218,7 @@ def test_there_is_physics_outside_over_all_coordinates_and_targets_and_over_none
         "time",
     }  # fmt: skip
     assert {kind.place[1] for kind in OUTSIDE.values() if kind.place} == {
-        "bias", "scale", "tilt", "reading"
+        "bias", "scale", "mounting", "tilt", "reading"
     }  # fmt: skip
     for kinds in (OUTSIDE, UNFORESEEN):
         assert sum(kind.place is None for kind in kinds.values()) >= 5

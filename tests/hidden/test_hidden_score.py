@@ -47,7 +47,8 @@ def answer(verdict, *found, among=(), at=None, **more):
     return {
         "verdict": verdict, "found": found, "positions": [at, None, None][: len(found)],
         "credible_set": [{"names": n, "posterior": p} for n, p in explanations],
-        "place": None, "fits": [], "confirmed": False, "sigma0_before": 2.0, "error": "", **more,
+        "place": None, "fits": [], "confirmed": False, "name_confirmed": False,
+        "sigma0_before": 2.0, "error": "", **more,
     }  # fmt: skip
 
 

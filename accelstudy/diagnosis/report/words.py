@@ -252,7 +252,7 @@ def explained(names: Sequence[str]) -> str:
 
 def together(names: Sequence[str]) -> str:
     """List names, equal ones together: warm up and 2 outlier positions."""
-    return comma_list(grouped(names))
+    return comma_list(grouped(names, name_words))
 
 
 def explain(names: Sequence[str]) -> str:
