@@ -110,7 +110,7 @@ class SessionAdvice(Result):
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """Return roll and pitch of the next position, what is left of them so far, and may be."""
+        """Return roll and pitch: those of the next position, their rms error now, and as wanted."""
         rows = {
             "next_rad": angles_of(-self.advice.next),
             "rms_rad": np.nan if self.advice.rms is None else self.advice.rms,

@@ -105,12 +105,14 @@ def test_each_key_and_column_of_a_calibration_is_described():
         schema = Draft202012Validator(strict(yaml.safe_load(path.read_text(encoding="utf-8"))))
         said = [error.message for error in schema.iter_errors(json.loads(json_text(content)))]
         assert said == [], name
+    advice = accelstudy.advise(campaign, tilt_accuracy="1gon", model="bias-scale")
     assert described("file-formats") == {
         "positions.csv": [],
         "positions.parquet": list(assessed_positions(assessment)),
         "calibration.h": ANY,
         "calibration.params": ANY,
         "history.parquet": list(history_table(history)),
+        "advice.json": list(advice.content),
         "campaigns.parquet": list(CAMPAIGN_COLUMNS),
         "parameters.parquet": list(PARAMETER_COLUMNS),
     }
