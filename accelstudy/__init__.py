@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from accelstudy.api.catalogues import catalogue
     from accelstudy.api.designs import Design
     from accelstudy.api.diagnoses import Diagnosis
-    from accelstudy.api.epochs import Comparison, History
     from accelstudy.api.logs import Log
     from accelstudy.api.lots import Lot
     from accelstudy.api.plans import Plan
     from accelstudy.api.simulations import Simulation
     from accelstudy.basics.errors import InputError
     from accelstudy.campaign.session import Campaign
+    from accelstudy.epochs.output import Comparison, History
     from accelstudy.study.run import run_study
     from accelstudy.verbs.calibrations import (
         apply,
@@ -46,13 +46,13 @@ _PLACES = {
     "api.catalogues": ("catalogue",),
     "api.designs": ("Design",),
     "api.diagnoses": ("Diagnosis",),
-    "api.epochs": ("Comparison", "History"),
     "api.logs": ("Log",),
     "api.lots": ("Lot",),
     "api.plans": ("Plan",),
     "api.simulations": ("Simulation",),
     "basics.errors": ("InputError",),
     "campaign.session": ("Campaign",),
+    "epochs.output": ("Comparison", "History"),
     "study.run": ("run_study",),
     "verbs.calibrations": (
         *("apply", "calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),

@@ -11,7 +11,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from accelstudy.api.calibrations import as_calibration, as_campaign, place_of
-from accelstudy.api.results import Result
 from accelstudy.approaches import get_approach
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
@@ -24,6 +23,7 @@ from accelstudy.campaign.of_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import ADVICE
 from accelstudy.leveling.angles import angles_of
+from accelstudy.pages.result import Result
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential import wording

@@ -13,10 +13,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 import accelstudy
-from accelstudy.api.given import of_type, path_of, quantity
-from accelstudy.api.results import Result
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.given import of_type, path_of, quantity
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.units import GON, Given
 from accelstudy.campaign.calibration import applying, export, output, wording
@@ -29,6 +28,7 @@ from accelstudy.campaign.of_type import with_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel

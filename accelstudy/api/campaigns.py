@@ -12,9 +12,9 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.api.given import each, path_of
 from accelstudy.api.logs import Log, keys_of, log_of, names_of
 from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.given import each, path_of
 from accelstudy.basics.names import natural
 from accelstudy.basics.units import UNITS
 from accelstudy.campaign.importing.logs import import_sensors

@@ -12,16 +12,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.given import path_of
-from accelstudy.api.results import Result
 from accelstudy.basics import bounds, units
 from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.given import path_of
 from accelstudy.basics.names import MAX_BYTES
 from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.wording import amount
 from accelstudy.design.spaces import attitudes
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
+from accelstudy.pages.result import Result
 from accelstudy.proposal.proposal import REFERENCE, Proposal, write_design
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import get_scheme, is_scheme_file

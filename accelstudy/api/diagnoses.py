@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
 from accelstudy.api.calibrations import Calibration, place_of, resolve
-from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.diagnosis import pipeline
@@ -23,6 +22,7 @@ from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import Diagnosis as Found
 from accelstudy.drawing.style import COLUMN
 from accelstudy.files.outputs import DIAGNOSIS
+from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import FRD, axes_note
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from accelstudy.api.given import path_of, tidy
 from accelstudy.basics.errors import InputError, key
+from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout

@@ -11,14 +11,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from accelstudy.api.calibrations import Calibration, as_campaign, chosen
-from accelstudy.api.given import check_once
-from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.given import check_once
 from accelstudy.basics.progress import say, show
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.output import draw_sensors, lot_document, write_lot
 from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
+from accelstudy.pages.result import Result
 
 
 class Lot(Result):

@@ -10,7 +10,6 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.results import Result
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.progress import begin, say, show
 from accelstudy.basics.suggested import study_again
@@ -18,6 +17,7 @@ from accelstudy.data_sheets import of_sigma
 from accelstudy.data_sheets.measured import with_history
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
+from accelstudy.pages.result import Result
 from accelstudy.planning import question, wording
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.figure import draw_plan

@@ -13,16 +13,16 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.given import each, of_type, quantity, tidy
-from accelstudy.api.results import Result
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.given import each, of_type, quantity, tidy
 from accelstudy.basics.units import MGON, Given, display_unit, to_display
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import SIMULATION
 from accelstudy.files.tables import write_table
+from accelstudy.pages.result import Result
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study import statistics as of_cells

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
+from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.wording import comma_list
+from accelstudy.basics.wording import comma_list, counted
 from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.device import KNOWN, USUAL
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -152,6 +153,55 @@ def compare(first: SensorCalibration, second: SensorCalibration) -> History:
         As `history_of`.
     """
     return _in_common((first, second))
+
+
+def follow(
+    calibrations: Sequence[SensorCalibration],
+    dates: Sequence[str | datetime],
+    names: Sequence[str],
+) -> History:
+    """Follow a sensor by dates that are given, or by those of the campaigns.
+
+    Parameters
+    ----------
+    calibrations : sequence of SensorCalibration
+    dates : sequence of str or datetime, of each calibration; none for those of the campaigns
+    names : sequence of str, what messages call the calibrations
+
+    Raises
+    ------
+    InputError
+        If a date is missing or wrong, a calibration is given twice, or as by `history_of`.
+    """
+    if dates and len(dates) != len(calibrations):
+        raise InputError(
+            f"{key('dates')}: {counted(len(dates), 'date')} for "
+            f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
+            "2026-03-01"
+        )
+    first: dict[bytes, str] = {}
+    for one, name in zip(calibrations, names, strict=True):
+        # Noise never repeats: the same numbers are one campaign, whatever the file is called.
+        same = first.setdefault(one.parameters.tobytes(), name)
+        if same is not name:
+            raise InputError(f"{name}: has the numbers of {same}; each counts once")
+    where = [key("dates")] * len(dates) or [f"{name}: date" for name in names]
+    stated = dates or [one.content["date"] for one in calibrations]
+    return history_of(calibrations, [_date(*each) for each in zip(stated, where, strict=True)])
+
+
+def _date(given: str | datetime | None, where: str) -> datetime:
+    if given is None:
+        raise InputError(
+            f"{where}: missing; give `dates` for each calibration, or calibrate "
+            "again with `date` in the header of the campaign"
+        )
+    if isinstance(given, datetime):
+        return given
+    try:
+        return read_date(given)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[datetime]) -> History:

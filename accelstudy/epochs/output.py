@@ -1,8 +1,9 @@
-"""What a comparison or a history of calibrations writes: JSON, a table, figures and a page."""
+"""What two or more calibrations say of their sensor: a comparison, or a history."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,14 @@ from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import COLUMN, FULL, INK, group_colour, group_of, new_figure, symbol
 from accelstudy.effects import Parameter
+from accelstudy.epochs import history as epochs
 from accelstudy.epochs.congruence import LEVEL
-from accelstudy.epochs.history import YEAR, History
+from accelstudy.epochs.history import YEAR
 from accelstudy.epochs.interval import MAX_YEARS, SHOWN_YEARS, Interval
+from accelstudy.files.outputs import COMPARISON, HISTORY
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines, write_page
+from accelstudy.pages.result import Result
 
 STATES = {True: "unchanged", False: "changed"}
 """States by whether the calibrations agree, as `pages.BADGES` has them."""
@@ -35,149 +39,262 @@ LINE_POINTS = 50
 """Points of a line."""
 
 
-def comparison_said(history: History, tilt_range: float) -> list[str]:
-    """Say whether the sensor changed, in what, and what it matters; the verdict comes first."""
-    h, change = history, history.change
-    changes = [
-        _change_of(h.parameters[i], float(change.differences[i]), float(change.sigmas[i]))
-        for i in change.changed
-    ]
-    least = _largest(h.parameters, change.detectable())
-    tilts = h.tilt(tilt_range).tolist()
-    return lines("epochs/wording.txt.j2", "comparison", h, changes, least, tilts, tilt_range)
+class Comparison(Result):
+    """Two calibrations of one sensor: whether it changed, in what, and what it matters.
 
-
-def history_said(history: History, interval: Interval | None = None) -> list[str]:
-    """Say what drifts and what scatters; the verdict comes first."""
-    h, level = history, history.level
-    each = list(zip(h.courses, h.parameters, h.found, strict=True))
-    drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
-    rates = [_change_of(parameter, *course.rate) for course, parameter in drifting]
-    unsure = [
-        _change_of(parameter, *course.wandering_rate)
-        for course, parameter in drifting
-        if course.may_wander(level)
-    ]
-    scatters = [
-        f"{parameter.name} by {_size(course.line.scatter, parameter.unit)}"
-        for course, parameter, found in each
-        if "scatters" in found
-    ]
-    others = [parameter.name for _, parameter, found in each if "changed" in found]
-    least = [
-        _largest(h.parameters, [course.detectable_rate(level) for course in h.courses]),
-        _largest(h.parameters, [course.detectable_scatter(level) for course in h.courses]),
-    ]
-    return lines(
-        "epochs/wording.txt.j2", "history", h, rates, unsure, scatters, others, least, interval
-    )
-
-
-def comparison_document(history: History, tilt_range: float) -> dict[str, Any]:
-    """Describe a comparison of two calibrations, in SI but for keys that name another unit.
-
-    Parameters
+    Attributes
     ----------
-    history : History
+    result : accelstudy.epochs.history.History, all of it
     tilt_range : float, rad, over which tilts are compared
     """
-    h, change = history, history.change
-    test, changed, (first, second) = change.test(), change.changed, h.calibrations
-    (roll, pitch), (roll_by_chance, pitch_by_chance) = h.tilt(tilt_range) / MGON
-    return {
-        "schema_version": 1,
-        "first": first.content["campaign"],
-        "second": second.content["campaign"],
-        "state": STATES[test.congruent],
-        "test": {
-            "statistic": test.statistic,
-            "dof": [test.dof[0], json_number(test.dof[1])],
-            "p_value": test.p_value,
+
+    kind = COMPARISON
+
+    def __init__(self, result: epochs.History, tilt_range: float) -> None:
+        self.result, self.tilt_range = result, tilt_range
+        self.name = " and ".join(one.content["campaign"] for one in result.calibrations)
+
+    @cached_property
+    def said(self) -> list[str]:
+        """Whether the sensor changed, in what, and what it matters; the verdict comes first."""
+        h, change, tilt_range = self.result, self.result.change, self.tilt_range
+        changes = [
+            _change_of(h.parameters[i], float(change.differences[i]), float(change.sigmas[i]))
+            for i in change.changed
+        ]
+        least, tilts = _largest(h.parameters, change.detectable()), h.tilt(tilt_range).tolist()
+        return lines("epochs/wording.txt.j2", "comparison", h, changes, least, tilts, tilt_range)
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of comparison.json, in SI but for keys that name another unit."""
+        h, change, tilt_range = self.result, self.result.change, self.tilt_range
+        test, changed, (first, second) = change.test(), change.changed, h.calibrations
+        (roll, pitch), (roll_by_chance, pitch_by_chance) = h.tilt(tilt_range) / MGON
+        return {
+            "schema_version": 1,
+            "first": first.content["campaign"],
+            "second": second.content["campaign"],
+            "state": STATES[test.congruent],
+            "test": {
+                "statistic": test.statistic,
+                "dof": [test.dof[0], json_number(test.dof[1])],
+                "p_value": test.p_value,
+                "level": LEVEL,
+            },
+            "parameters": [
+                {
+                    "name": parameter.name,
+                    "first": float(h.values[0, i]),
+                    "second": float(h.values[1, i]),
+                    "change": float(change.differences[i]),
+                    "sigma": float(change.sigmas[i]),
+                    "detectable": float(detectable),
+                    "unit": parameter.unit,
+                    "changed": i in changed,
+                    "or": h.instead_of(i) if i in changed else [],
+                }
+                for i, (parameter, detectable) in enumerate(
+                    zip(h.parameters, change.detectable(), strict=True)
+                )
+            ],
+            "covariance": change.covariance.tolist(),
+            "only_first": h.left_out(first),
+            "only_second": h.left_out(second),
+            "tilt": {
+                "roll_mgon": roll,
+                "pitch_mgon": pitch,
+                "roll_by_chance_mgon": roll_by_chance,
+                "pitch_by_chance_mgon": pitch_by_chance,
+                "max_tilt_gon": tilt_range / GON,
+            },
+            "verdict": " ".join(self.said),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return both values of each parameter, the change with its sigma, and what was found."""
+        rows = pd.DataFrame(self.content["parameters"]).set_index("name")
+        return rows[["first", "second", "change", "sigma", "detectable", "unit", "changed"]]
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy compare` does."""
+        _write(self, {"changes": lambda: parameters_figure(self.result)}, folder)
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the change of each parameter over its sigma, with the interval that holds 95 %."""
+        change, parameters = self.result.change, self.result.parameters
+        ax.axhline(0, color=INK, linewidth=0.8)
+        for i, parameter in enumerate(parameters):
+            colour = group_colour(group_of(parameter.name))
+            filled = colour if i in change.changed else "white"
+            size = change.differences[i] / change.sigmas[i]
+            ax.errorbar(i, size, 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
+        ax.set_xticks(range(len(parameters)), [symbol(p.name) for p in parameters])
+        ax.set(ylabel="change / sigma")
+
+
+class History(Result):
+    """Calibrations of one sensor over time: what drifts, and what scatters.
+
+    Attributes
+    ----------
+    result : accelstudy.epochs.history.History, all of it
+    interval : accelstudy.epochs.interval.Interval, how long the last calibration stays good enough;
+        None if no accuracy was given
+    sensor : str, what was calibrated; None if no campaign says it
+    """
+
+    kind = HISTORY
+    size = FULL, 70.0
+
+    def __init__(self, result: epochs.History, interval: Interval | None) -> None:
+        self.result, self.interval = result, interval
+        sensors = (one.content["sensor"] for one in result.calibrations)
+        self.sensor: str | None = next(filter(None, sensors), None)
+        self.name = self.sensor or result.calibrations[0].content["campaign"]
+
+    @cached_property
+    def said(self) -> list[str]:
+        """What drifts and what scatters; the verdict comes first."""
+        h, level = self.result, self.result.level
+        each = list(zip(h.courses, h.parameters, h.found, strict=True))
+        drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
+        rates = [_change_of(parameter, *course.rate) for course, parameter in drifting]
+        unsure = [
+            _change_of(parameter, *course.wandering_rate)
+            for course, parameter in drifting
+            if course.may_wander(level)
+        ]
+        scatters = [
+            f"{parameter.name} by {_size(course.line.scatter, parameter.unit)}"
+            for course, parameter, found in each
+            if "scatters" in found
+        ]
+        others = [parameter.name for _, parameter, found in each if "changed" in found]
+        least = [
+            _largest(h.parameters, [course.detectable_rate(level) for course in h.courses]),
+            _largest(h.parameters, [course.detectable_scatter(level) for course in h.courses]),
+        ]
+        kinds = rates, unsure, scatters, others, least
+        return lines("epochs/wording.txt.j2", "history", h, *kinds, self.interval)
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of history.json, in SI but for keys that name another unit; per year."""
+        h, interval = self.result, self.interval
+        return {
+            "schema_version": 1,
+            "sensor": self.sensor,
+            "calibrations": [
+                {
+                    "campaign": one.content["campaign"],
+                    "date": date.isoformat(),
+                    "left_out": h.left_out(one),
+                }
+                for one, date in zip(h.calibrations, h.dates, strict=True)
+            ],
+            "effects": [effect.spec for effect in h.model.effects],
+            "state": STATES[not any(h.found)],
             "level": LEVEL,
-        },
-        "parameters": [
-            {
-                "name": parameter.name,
-                "first": float(h.values[0, i]),
-                "second": float(h.values[1, i]),
-                "change": float(change.differences[i]),
-                "sigma": float(change.sigmas[i]),
-                "detectable": float(detectable),
-                "unit": parameter.unit,
-                "changed": i in changed,
-                "or": h.instead_of(i) if i in changed else [],
-            }
-            for i, (parameter, detectable) in enumerate(
-                zip(h.parameters, change.detectable(), strict=True)
-            )
-        ],
-        "covariance": change.covariance.tolist(),
-        "only_first": h.left_out(first),
-        "only_second": h.left_out(second),
-        "tilt": {
-            "roll_mgon": roll,
-            "pitch_mgon": pitch,
-            "roll_by_chance_mgon": roll_by_chance,
-            "pitch_by_chance_mgon": pitch_by_chance,
-            "max_tilt_gon": tilt_range / GON,
-        },
-        "verdict": " ".join(comparison_said(h, tilt_range)),
-    }
+            "parameters": [
+                {
+                    "name": parameter.name,
+                    "unit": parameter.unit,
+                    "value": float(course.line.estimates[0]),
+                    "sigma": float(np.sqrt(course.line.covariance[0, 0])),
+                    "found": found,
+                    "p_value": course.p_values(h.level)[0],
+                    "rate": {
+                        "per_year": course.rate[0],
+                        "sigma": course.rate[1],
+                        "ci95": course.rate_interval,
+                        "ci95_wandering": course.wandering_interval,
+                        "p_value": course.p_values(h.level)[1],
+                        "detectable": course.detectable_rate(h.level),
+                    },
+                    "scatter": {
+                        "sd": course.line.scatter,
+                        "ci95": course.line.scatter_interval(),
+                        "p_value": course.p_values(h.level)[2],
+                        "detectable": course.detectable_scatter(h.level),
+                    },
+                }
+                for course, parameter, found in zip(h.courses, h.parameters, h.found, strict=True)
+            ],
+            "interval": interval
+            and {
+                "years": interval.years,
+                "until": interval.until.date().isoformat(),
+                "accuracy_mgon": interval.accuracy / MGON,
+                "max_tilt_gon": interval.tilt_range / GON,
+                "confidence": interval.confidence,
+                "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN_YEARS],
+            },
+            "verdict": " ".join(self.said),
+        }
+
+    @cached_property
+    def values(self) -> pd.DataFrame:
+        """Value and sigma of each parameter in each calibration, as history.parquet has them."""
+        h = self.result
+        return pd.DataFrame(
+            [
+                {
+                    "calibration": i + 1,
+                    "campaign": one.content["campaign"],
+                    "date": date.isoformat(),
+                    "parameter": parameter.name,
+                    "value": float(h.values[i, k]),
+                    "sigma": float(h.sigmas[i, k]),
+                    "unit": parameter.unit,
+                }
+                for i, (one, date) in enumerate(zip(h.calibrations, h.dates, strict=True))
+                for k, parameter in enumerate(h.parameters)
+            ]
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return value, rate a year and scatter of each parameter, and what was found."""
+        rows = pd.json_normalize([*self.content["parameters"]]).set_index("name")
+        rows["found"] = rows["found"].str.join(", ")
+        rates = {
+            "rate.per_year": "rate_per_year",
+            "rate.sigma": "sigma_rate",
+            "scatter.sd": "scatter",
+        }
+        return rows[["value", "sigma", *rates, "unit", "found"]].rename(columns=rates)
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the deviation of each parameter from the first calibration, over its sigma."""
+        for name, rows in self.values.groupby("parameter", sort=False):
+            off = (rows["value"] - rows["value"].iloc[0]) / rows["sigma"]
+            ax.plot(pd.to_datetime(rows["date"]), off, "o-", markersize=3, label=name)
+        ax.set(xlabel="date", ylabel="change since the first / sigma")
+        ax.legend(ncols=4)
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy history` does."""
+        figures = {"history": lambda: parameters_figure(self.result)}
+        if (interval := self.interval) is not None:
+            figures["interval"] = lambda: interval_figure(interval)
+        write_frame(folder / "history.parquet", self.values)
+        _write(self, figures, folder)
 
 
-def history_document(history: History, interval: Interval | None = None) -> dict[str, Any]:
-    """Describe a history, in SI but for keys that name another unit; rates are per year."""
-    h = history
-    return {
-        "schema_version": 1,
-        "sensor": next((c.content["sensor"] for c in h.calibrations if c.content["sensor"]), None),
-        "calibrations": [
-            {
-                "campaign": one.content["campaign"],
-                "date": date.isoformat(),
-                "left_out": h.left_out(one),
-            }
-            for one, date in zip(h.calibrations, h.dates, strict=True)
-        ],
-        "effects": [effect.spec for effect in h.model.effects],
-        "state": STATES[not any(h.found)],
-        "level": LEVEL,
-        "parameters": [
-            {
-                "name": parameter.name,
-                "unit": parameter.unit,
-                "value": float(course.line.estimates[0]),
-                "sigma": float(np.sqrt(course.line.covariance[0, 0])),
-                "found": found,
-                "p_value": course.p_values(h.level)[0],
-                "rate": {
-                    "per_year": course.rate[0],
-                    "sigma": course.rate[1],
-                    "ci95": course.rate_interval,
-                    "ci95_wandering": course.wandering_interval,
-                    "p_value": course.p_values(h.level)[1],
-                    "detectable": course.detectable_rate(h.level),
-                },
-                "scatter": {
-                    "sd": course.line.scatter,
-                    "ci95": course.line.scatter_interval(),
-                    "p_value": course.p_values(h.level)[2],
-                    "detectable": course.detectable_scatter(h.level),
-                },
-            }
-            for course, parameter, found in zip(h.courses, h.parameters, h.found, strict=True)
-        ],
-        "interval": interval
-        and {
-            "years": interval.years,
-            "until": interval.until.date().isoformat(),
-            "accuracy_mgon": interval.accuracy / MGON,
-            "max_tilt_gon": interval.tilt_range / GON,
-            "confidence": interval.confidence,
-            "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN_YEARS],
-        },
-        "verdict": " ".join(history_said(h, interval)),
-    }
+def _write(
+    one: Comparison | History, figures: dict[str, Callable[[], Figure]], folder: Path
+) -> None:
+    """Write the page with its figures, and the JSON file."""
+    write_page(
+        folder / "report.html",
+        "epochs/report.html.j2",
+        one.verdict,
+        doc=one.content,
+        h=one.result,
+        lines=one.said,
+        figures=save_all(figures, folder / "figures"),
+    )
+    write_json(folder / one.kind.marker, one.content)
 
 
 def _size(size: float, unit: str) -> str:
@@ -203,74 +320,7 @@ def _largest(
     return [f"{_size(size, unit)} in {name}" for unit, (size, name) in found.items()]
 
 
-def history_table(history: History) -> pd.DataFrame:
-    """Return a row per calibration and parameter, in SI."""
-    h = history
-    return pd.DataFrame(
-        [
-            {
-                "calibration": i + 1,
-                "campaign": one.content["campaign"],
-                "date": date.isoformat(),
-                "parameter": parameter.name,
-                "value": float(h.values[i, k]),
-                "sigma": float(h.sigmas[i, k]),
-                "unit": parameter.unit,
-            }
-            for i, (one, date) in enumerate(zip(h.calibrations, h.dates, strict=True))
-            for k, parameter in enumerate(h.parameters)
-        ]
-    )
-
-
-def write_report(
-    history: History,
-    content: dict[str, Any],
-    said: Sequence[str],
-    folder: Path,
-    interval: Interval | None = None,
-) -> None:
-    """Write what a comparison or a history says into a folder: JSON, a page, figures and a table.
-
-    Parameters
-    ----------
-    history : History
-    content, said : document and sentences of it
-    folder : Path, to write to
-    interval : Interval, of a history, if it was asked for
-    """
-    name, figure = ("history", "history") if history.dates else ("comparison", "changes")
-    figures = {figure: lambda: parameters_figure(history)}
-    if interval is not None:
-        figures["interval"] = lambda: interval_figure(interval)
-    write_page(
-        folder / "report.html",
-        "epochs/report.html.j2",
-        content["verdict"],
-        doc=content,
-        h=history,
-        lines=said,
-        figures=save_all(figures, folder / "figures"),
-    )
-    if history.dates:
-        write_frame(folder / "history.parquet", history_table(history))
-    write_json(folder / f"{name}.json", content)
-
-
-def draw_changes(ax: Axes, history: History) -> None:
-    """Draw the change of each parameter over its sigma, with the interval that holds 95 %."""
-    change = history.change
-    ax.axhline(0, color=INK, linewidth=0.8)
-    for i, parameter in enumerate(history.parameters):
-        colour = group_colour(group_of(parameter.name))
-        filled = colour if i in change.changed else "white"
-        size = change.differences[i] / change.sigmas[i]
-        ax.errorbar(i, size, 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
-    ax.set_xticks(range(len(history.parameters)), [symbol(p.name) for p in history.parameters])
-    ax.set(ylabel="change / sigma")
-
-
-def parameters_figure(history: History) -> Figure:
+def parameters_figure(history: epochs.History) -> Figure:
     """Draw each parameter in all calibrations with 95 % intervals; over time, with its line."""
     h, names = history, history.parameters
     rows = -(-len(names) // COLUMNS)
@@ -300,7 +350,7 @@ def parameters_figure(history: History) -> Figure:
     return figure
 
 
-def _draw_line(ax: Axes, history: History, k: int) -> None:
+def _draw_line(ax: Axes, history: epochs.History, k: int) -> None:
     """Draw the line of a parameter over time, with the band that holds 95 %."""
     parameter, course = history.parameters[k], history.courses[k]
     colour, unit = group_colour(group_of(parameter.name)), parameter.unit

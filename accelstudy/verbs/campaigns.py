@@ -177,7 +177,7 @@ def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Cam
         Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
         wrong with it, too.
     """
-    from accelstudy.api.given import path_of
+    from accelstudy.basics.given import path_of
     from accelstudy.campaign.format import read_campaign as read_folder
 
     return read_folder(path_of("folder", folder), plausible=plausible)
@@ -202,7 +202,7 @@ def write_campaign(
     plausible : bool
         Whether data that cannot be right is refused, as by `read_campaign`.
     """
-    from accelstudy.api.given import path_of
+    from accelstudy.basics.given import path_of
     from accelstudy.campaign.format import write_campaign as write_folder
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 

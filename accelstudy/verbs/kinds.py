@@ -16,10 +16,10 @@ from os import PathLike
 from textwrap import fill
 from typing import Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
 
-from accelstudy.api.given import each, of_type, path_of, quantity, whole
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, key, shown
+from accelstudy.basics.given import each, of_type, path_of, quantity, whole
 from accelstudy.basics.units import Given, unit_label
 
 Arguments = ParamSpec("Arguments")
@@ -390,3 +390,8 @@ def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returne
 
     within.__doc__ = _documented(function)
     return within
+
+
+def in_si(value: Quantity) -> float:
+    """Return a quantity that `verb` has checked, which is in SI."""
+    return float(value)

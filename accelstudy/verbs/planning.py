@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
-from accelstudy.api.given import path_of
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
+from accelstudy.basics.given import path_of
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
 from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
 from accelstudy.verbs import kinds

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.given import check_once
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import verb
+from accelstudy.verbs.kinds import in_si, verb
 
 if TYPE_CHECKING:
     from accelstudy import Calibration, Campaign, Comparison, History, Lot
@@ -51,10 +52,12 @@ def compare(
     --------
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
-    given = {**locals()}
-    from accelstudy.api.epochs import Comparison
+    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.epochs import history
+    from accelstudy.epochs.output import Comparison
 
-    return Comparison.of(**given)
+    pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
+    return Comparison(history.compare(*pair), in_si(tilt_range))
 
 
 @verb
@@ -102,10 +105,22 @@ def history(
             winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out
             years
     """
-    given = {**locals()}
-    from accelstudy.api.epochs import History
+    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.epochs.history import follow
+    from accelstudy.epochs.interval import Interval
+    from accelstudy.epochs.output import History
 
-    return History.of(**given)
+    check_once(calibrations, "calibration")
+    sensors = [as_calibration(one).sensor for one in calibrations]
+    names = [
+        str(one) if isinstance(one, str | PathLike) else f"calibration {i}"
+        for i, one in enumerate(calibrations, start=1)
+    ]
+    course = follow(sensors, dates, names)
+    if tilt_accuracy is None:
+        return History(course, None)
+    wanted = in_si(tilt_accuracy), in_si(tilt_range), in_si(confidence)
+    return History(course, Interval(course, *wanted))
 
 
 @verb

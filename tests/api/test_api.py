@@ -14,7 +14,7 @@ from places import ROOT
 from study_helpers import grid, run_study
 
 import accelstudy as acs
-from accelstudy.api.given import quantity
+from accelstudy.basics.given import quantity
 from accelstudy.basics.units import UNITS, Given
 from accelstudy.drawing.style import STYLE
 from accelstudy.epochs.history import history_of

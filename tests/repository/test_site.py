@@ -32,7 +32,7 @@ from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.history import compare, history_of
-from accelstudy.epochs.output import comparison_document, history_document, history_table
+from accelstudy.epochs.output import Comparison, History
 from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
 from accelstudy.lots.lot import Lot
@@ -93,11 +93,12 @@ def test_each_key_and_column_of_a_calibration_is_described():
     document = calibration_document(assessment.fit)
     document |= {"quality": quality_document(assessment)}
     one = calibration_of(json.loads(json_text(document)))
-    history = history_of([one] * 3, [datetime(2025, month, 1) for month in (1, 2, 3)])
+    dates = [datetime(2025, month, 1) for month in (1, 2, 3)]
+    history = History(history_of([one] * 3, dates), None)
     written = {
         "calibration": document,
-        "comparison": comparison_document(compare(one, one), 1.0),
-        "history": history_document(history),
+        "comparison": Comparison(compare(one, one), 1.0).content,
+        "history": history.content,
         "lot": {**_lot(), "files": []},
     }
     for name, content in written.items():
@@ -111,7 +112,7 @@ def test_each_key_and_column_of_a_calibration_is_described():
         "positions.parquet": list(assessed_positions(assessment)),
         "calibration.h": ANY,
         "calibration.params": ANY,
-        "history.parquet": list(history_table(history)),
+        "history.parquet": list(history.values),
         "advice.json": list(advice.content),
         "campaigns.parquet": list(CAMPAIGN_COLUMNS),
         "parameters.parquet": list(PARAMETER_COLUMNS),

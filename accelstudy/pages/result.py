@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from accelstudy.api.given import path_of
+from accelstudy.basics.given import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL, MM, STYLE
 from accelstudy.files.outputs import Kind, result_folder
