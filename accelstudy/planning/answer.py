@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from accelstudy.basics.progress import track
 from accelstudy.planning.candidates import Candidate, candidates
-from accelstudy.planning.optimised import Sought, by_time, cheapest, effort
+from accelstudy.planning.optimised import Sought, by_time, cheapest
 from accelstudy.planning.question import ROBOT, Question
 from accelstudy.planning.simulated import Simulated, simulate, study_of
 
@@ -48,23 +48,23 @@ class Answer:
     compared : list of Candidate, all that were compared
     ranked : list of Ranked, for each equipment and model the cheapest that reaches the target, by
         the time they take; empty if none does
+    seed, replicates : int, of the simulation
+    beside : Candidate, the cheapest with a calibrated sensor beside it that reaches the target by
+        linear theory, or the most accurate if none does; None if the question has no such sensor
     stricter : Ranked, the cheapest with the same equipment as the first that reaches the target
         by the other measure (95 % of the calibrations, or the rms); None if there is none
     instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
         none reaches the target; None if a robot does not reach it either
-    seed, replicates : int, of the simulation
-    beside : Candidate, the cheapest with a calibrated sensor beside it that reaches the target by
-        linear theory, or the most accurate if none does; None if the question has no such sensor
     """
 
     question: Question
     compared: list[Candidate]
     ranked: list[Ranked]
-    stricter: Ranked | None
-    instead: Candidate | None
     seed: int
     replicates: int
     beside: Candidate | None = None
+    stricter: Ranked | None = None
+    instead: Candidate | None = None
 
     @property
     def first(self) -> Ranked:
@@ -76,8 +76,7 @@ class Answer:
     def best(self, equipment: str = "") -> Candidate | None:
         """The most accurate candidate, of all or with one equipment, however long it takes."""
         chosen = [c for c in self.compared if equipment in ("", c.equipment.name)]
-        confidence = self.question.confidence
-        return min(chosen, key=lambda c: c.accuracy(confidence), default=None)
+        return _most_accurate(self.question, chosen)
 
     @property
     def study(self) -> dict[str, object]:
@@ -88,58 +87,60 @@ class Answer:
 
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
-    confidence = question.confidence
-    compared = _with_most_positions(question, candidates(question), confidence)
+    compared = _with_most_positions(question, candidates(question))
     kinds: dict[tuple[str, str], list[Candidate]] = {}
     for c in compared:
-        kinds.setdefault(c.kind, []).append(c)
-    quickest = (cheapest(question, kind, confidence) for kind in kinds.values())
-    simulation = Simulation(question, confidence, seed, replicates)
-    ranked: list[Ranked] = []
-    in_front = _in_front(by_time(c for c in quickest if c is not None))
-    for candidate in track(in_front, "simulated calibrations"):
-        checked = [r.candidate.equipment.name for r in ranked if r.simulated]
-        if len(checked) >= MAX_SIMULATED and candidate.equipment.name in checked:
+        kinds.setdefault((c.equipment.name, c.model.name), []).append(c)
+    quickest = by_time(filter(None, (cheapest(question, kind) for kind in kinds.values())))
+    # The first of each equipment comes before all others.
+    front = [
+        next(c for c in quickest if c.equipment == e) for e in {c.equipment: c for c in quickest}
+    ]
+    in_order = [*front, *(c for c in quickest if c not in front)]
+    simulation, ranked = (seed, replicates), list[Ranked]()
+    for candidate in track(in_order, "simulated calibrations"):
+        checked = [r.candidate.equipment for r in ranked if r.simulated]
+        new = candidate.equipment not in checked
+        if len(checked) >= MAX_SIMULATED and not new:
             ranked.append(Ranked(candidate))
-        elif good := simulation.confirmed(candidate, candidate.equipment.name not in checked):
+        elif good := _confirmed(question, candidate, *simulation, and_no_fewer=new):
             ranked.append(good)
-    beside = _beside(question)
+    plan = Answer(question, compared, [], *simulation, _beside(question))
     if not any(r.simulated for r in ranked):
-        instead = _with_a_robot(question)
-        return Answer(question, compared, [], None, instead, seed, replicates, beside)
+        return replace(plan, instead=_with_a_robot(question))
     compared += [r.candidate for r in ranked if r.candidate not in compared]
-    plan = Answer(question, compared, _shown(ranked), None, None, seed, replicates, beside)
-    same = replace(question, equipment=(plan.first.candidate.equipment,))
-    other = OTHER_CONFIDENCE if confidence is None else None
-    alike = _with_most_positions(
-        same, [c for c in compared if c.equipment in same.equipment], other
-    )
-    stricter = cheapest(same, alike, other)
+    plan = replace(plan, ranked=_shown(ranked))
+    other = OTHER_CONFIDENCE if question.confidence is None else None
+    same = replace(question, equipment=(plan.first.candidate.equipment,), confidence=other)
+    alike = [c for c in compared if c.equipment in same.equipment]
+    stricter = cheapest(same, _with_most_positions(same, alike))
     if stricter is None:
         return plan
-    return replace(plan, stricter=Simulation(same, other, seed, replicates).confirmed(stricter))
+    return replace(plan, stricter=_confirmed(same, stricter, *simulation))
 
 
-def _with_most_positions(
-    question: Question, compared: Sequence[Candidate], confidence: float | None
-) -> list[Candidate]:
+def _most_accurate(question: Question, chosen: Sequence[Candidate]) -> Candidate | None:
+    return min(chosen, key=lambda c: c.accuracy(question.confidence), default=None)
+
+
+def _with_most_positions(question: Question, compared: Sequence[Candidate]) -> list[Candidate]:
     """Candidates, and calibrations in as many of the best positions as are allowed.
 
     There is one for each equipment with which no candidate reaches the target.
     """
-    more: list[Candidate | None] = []
+    more = list[Candidate | None]()
     for equipment in question.equipment:
         possible = [c for c in compared if c.equipment == equipment]
-        if possible and not any(c.reaches(question.target, confidence) for c in possible):
-            best = min(possible, key=lambda c: c.accuracy(confidence))
-            sought = Sought(question, equipment, best.model.name, best.hold)
+        best = _most_accurate(question, possible)
+        if best is not None and not any(c.reaches(question) for c in possible):
+            sought = Sought.like(question, best)
             more.append(sought.candidate(sought.most))
-    return [*compared, *(c for c in more if c is not None)]
+    return [*compared, *filter(None, more)]
 
 
 def _shown(ranked: list[Ranked]) -> list[Ranked]:
     """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
-    ranked = sorted(ranked, key=lambda r: effort(r.candidate))
+    ranked = sorted(ranked, key=lambda r: r.candidate.effort)
     others = [r for r in ranked if r.simulated is None]
     left_out = others[max(0, MAX_SHOWN - len(ranked) + len(others)) :]
     return [r for r in ranked if r not in left_out]
@@ -150,73 +151,46 @@ def _with_a_robot(question: Question) -> Candidate | None:
     if any(equipment.name != "gravity" for equipment in question.equipment):
         return None
     robot = replace(question, equipment=(ROBOT,))
-    return cheapest(robot, candidates(robot), question.confidence)
+    return cheapest(robot, candidates(robot))
 
 
 def _beside(question: Question) -> Candidate | None:
     """Calibration with a sensor beside it, by linear theory; see `Answer`."""
     if question.beside is None:
         return None
-    alone, confidence = replace(question, equipment=(question.beside,)), question.confidence
-    compared = _with_most_positions(alone, candidates(alone), confidence)
-    most_accurate = min(compared, key=lambda c: c.accuracy(confidence), default=None)
-    return cheapest(alone, compared, confidence) or most_accurate
+    alone = replace(question, equipment=(question.beside,))
+    compared = _with_most_positions(alone, candidates(alone))
+    return cheapest(alone, compared) or _most_accurate(alone, compared)
 
 
-@dataclass(frozen=True)
-class Simulation:
-    """The check of candidates by simulation.
+def _confirmed(
+    question: Question, candidate: Candidate, seed: int, replicates: int, and_no_fewer: bool = True
+) -> Ranked | None:
+    """The candidate, or one with a few more positions, that reaches the target in simulation.
 
-    Attributes
+    Parameters
     ----------
     question : Question
-    confidence : float, optional, the measure by which they must reach the target
-    seed, replicates : int
+    candidate : Candidate, that reaches it by linear theory
+    seed, replicates : int, of the simulation
+    and_no_fewer : bool, whether one position less is simulated, too, until it does not suffice
     """
-
-    question: Question
-    confidence: float | None
-    seed: int
-    replicates: int
-
-    def of(self, candidate: Candidate) -> Simulated:
-        """Simulated calibrations."""
-        study = study_of(self.question, [candidate], self.seed, self.replicates)
-        levels = [] if self.confidence is None else [self.confidence]
-        return simulate(study, levels)[0]
-
-    def confirmed(self, candidate: Candidate, and_no_fewer: bool = True) -> Ranked | None:
-        """The candidate, or one with a few more positions, that reaches the target in simulation.
-
-        Parameters
-        ----------
-        candidate : Candidate, that reaches it by linear theory
-        and_no_fewer : bool, whether one position less is simulated, too, until it does not suffice
-        """
-        n, target = candidate.scheme.n_positions, self.question.target
-        sought = Sought(self.question, candidate.equipment, candidate.model.name, candidate.hold)
-        reached, missed = None, None
-        for _ in range(MAX_TRIES):
-            tried = candidate if n == candidate.scheme.n_positions else sought.candidate(n)
-            if tried is None:
+    n, reached, missed = candidate.scheme.n_positions, None, None
+    for _ in range(MAX_TRIES):
+        tried: Candidate | None = candidate
+        if n != candidate.scheme.n_positions:
+            tried = Sought.like(question, candidate).candidate(n)
+        if tried is None:
+            break
+        simulated = simulate(question, study_of(question, [tried], seed, replicates))[0]
+        if simulated.accuracy(question.confidence) <= question.target:
+            reached = Ranked(tried, simulated)
+            if missed is not None or not and_no_fewer:
                 break
-            simulated = self.of(tried)
-            if simulated.accuracy(self.confidence) <= target:
-                reached = tried, simulated
-                if missed is not None or not and_no_fewer:
-                    break
-                n -= 1
-            else:
-                missed = simulated
-                if reached is not None:
-                    break
-                n += 1
-        return None if reached is None else Ranked(*reached, missed)
-
-
-def _in_front(best: Sequence[Candidate]) -> list[Candidate]:
-    """Reorder candidates: the first of each equipment comes before all others."""
-    first: dict[str, Candidate] = {}
-    for candidate in best:
-        first.setdefault(candidate.equipment.name, candidate)
-    return [*first.values(), *(c for c in best if c not in first.values())]
+            n -= 1
+        else:
+            missed = simulated
+            if reached is not None:
+                break
+            n += 1
+    return None if reached is None else replace(reached, fewer=missed)

@@ -18,6 +18,7 @@ from accelstudy.effects import HoldConditions
 from accelstudy.leveling.distribution import Tilt
 from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.planning.question import Equipment, Question
+from accelstudy.proposal.request import Request
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
 from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -65,6 +66,8 @@ class Candidate:
     sigma : float, m/s², of the mean of a position
     tilt : Tilt, that it leaves by linear theory
     redundancy : int
+    request : Request that finds its positions again, as `accelstudy design` does; None of a scheme
+        that has a name
     """
 
     equipment: Equipment
@@ -74,6 +77,7 @@ class Candidate:
     sigma: float
     tilt: Tilt
     redundancy: int
+    request: Request | None = None
 
     @property
     def seconds(self) -> float:
@@ -81,9 +85,9 @@ class Candidate:
         return self.equipment.seconds(self.scheme.n_positions, self.hold)
 
     @property
-    def kind(self) -> tuple[str, str]:
-        """Equipment and model; the cheapest candidate of each kind is sought."""
-        return self.equipment.name, self.model.name
+    def effort(self) -> tuple[float, float, int]:
+        """What to sort candidates by: the time they take, and what they leave after it."""
+        return self.seconds, self.rms, self.model.n_parameters
 
     @cached_property
     def rms(self) -> float:
@@ -96,12 +100,12 @@ class Candidate:
             return self.rms
         return self.tilt.of_both(confidence)
 
-    def reaches(self, target: float, confidence: float | None) -> bool:
-        """Whether the tilt accuracy is reached."""
+    def reaches(self, question: Question) -> bool:
+        """Whether the tilt accuracy that is asked for is reached."""
         # Such a quantile is not much below the rms, which is faster to compute.
-        if confidence is not None and confidence >= 0.7 and self.rms > target:
+        if (question.confidence or 0.0) >= 0.7 and self.rms > question.target:
             return False
-        return self.accuracy(confidence) <= target
+        return self.accuracy(question.confidence) <= question.target
 
 
 def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
@@ -141,7 +145,11 @@ def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:
 
 
 def of_scheme(
-    question: Question, equipment: Equipment, scheme: Scheme, models: list[SensorModel]
+    question: Question,
+    equipment: Equipment,
+    scheme: Scheme,
+    models: list[SensorModel],
+    request: Request | None = None,
 ) -> Iterator[Candidate]:
     """Candidates in one scheme with one equipment."""
     if equipment.reference is not None:  # the rotation between the sensors is unknown
@@ -168,7 +176,7 @@ def of_scheme(
         for model, tilt, redundancy in tilts(1.0 if single else sigma):
             if tilt is not None:
                 own = tilt.with_noise(sigma) if single else tilt
-                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy)
+                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy, request)
 
 
 @cache

@@ -36,7 +36,7 @@ not tried."""
 
 @dataclass(frozen=True)
 class Sought:
-    """Calibrations of which the fewest positions are sought.
+    """Calibrations in the best positions, of which the fewest are sought.
 
     Attributes
     ----------
@@ -50,6 +50,11 @@ class Sought:
     equipment: Equipment
     model: str
     hold: float
+
+    @classmethod
+    def like(cls, question: Question, candidate: Candidate) -> Sought:
+        """Calibrations of the kind of a candidate."""
+        return cls(question, candidate.equipment, candidate.model.name, candidate.hold)
 
     @property
     def least(self) -> int:
@@ -85,11 +90,11 @@ class Sought:
         """
         if not self.least <= n <= self.most:
             return None
-        alone = replace(self.question, holds=(self.hold,))
-        scheme = best_positions(self.request(n), refined)
-        return next(of_scheme(alone, self.equipment, scheme, [get_model(self.model)]), None)
+        alone, request = replace(self.question, holds=(self.hold,)), self.request(n)
+        scheme, models = best_positions(request, refined), [get_model(self.model)]
+        return next(of_scheme(alone, self.equipment, scheme, models, request), None)
 
-    def fewest(self, confidence: float | None, needed: float) -> Candidate | None:
+    def fewest(self, needed: float) -> Candidate | None:
         """Calibration in the fewest positions that reach the target, by linear theory.
 
         The search begins near a number of positions, and goes on as if each gave the same
@@ -103,7 +108,7 @@ class Sought:
                 candidate = self.candidate(n, refined)
                 share = math.inf
                 if candidate is not None:
-                    share = candidate.accuracy(confidence) / self.question.target
+                    share = candidate.accuracy(self.question.confidence) / self.question.target
                     needed = n * share**2
                 if share > 1:
                     low = n
@@ -117,9 +122,7 @@ class Sought:
         return found
 
 
-def cheapest(
-    question: Question, compared: Iterable[Candidate], confidence: float | None
-) -> Candidate | None:
+def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | None:
     """Cheapest calibration: a known one, or one in the fewest of the best positions.
 
     Parameters
@@ -127,51 +130,34 @@ def cheapest(
     question : Question
     compared : candidates with one equipment; models and holds of those that reach the target by
         linear theory are tried
-    confidence : float, optional, see `Question`
 
     Returns
     -------
     Candidate, or None if none reaches the target
     """
     first: dict[tuple[str, float], Candidate] = {}
-    for c in by_time(c for c in compared if c.reaches(question.target, confidence)):
+    for c in by_time(c for c in compared if c.reaches(question)):
         first.setdefault((c.model.name, c.hold), c)
     best, hopes = next(iter(first.values()), None), []
-    for (model, hold), c in first.items():
-        sought = Sought(question, c.equipment, model, hold)
-        n = c.scheme.n_positions * (c.accuracy(confidence) / question.target) ** 2
+    for c in first.values():
+        sought = Sought.like(question, c)
+        n = c.scheme.n_positions * (c.accuracy(question.confidence) / question.target) ** 2
         likely, least = (
             max(sought.least, math.ceil(part * n)) for part in (USUAL_SHARE, MIN_SHARE)
         )
-        hopes.append((c.equipment.seconds(likely, hold), least, likely, sought))
+        hopes.append((c.equipment.seconds(likely, c.hold), least, likely, sought))
     for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
         assert best is not None
         if sought.equipment.seconds(least, sought.hold) <= best.seconds:
             no_longer = replace(question, most_seconds=best.seconds)  # else it is not the cheapest
-            fewest = replace(sought, question=no_longer).fewest(confidence, likely)
+            fewest = replace(sought, question=no_longer).fewest(likely)
             best = by_time(filter(None, [best, fewest]))[0]
     return best
 
 
 def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
-    """Candidates by the time they take."""
-    return sorted(unsorted, key=effort)
-
-
-def effort(candidate: Candidate) -> tuple[float, float, int]:
-    """What to sort candidates by: the time they take, and what they leave after it."""
-    return candidate.seconds, candidate.rms, candidate.model.n_parameters
-
-
-def is_best(scheme: Scheme) -> bool:
-    """Whether a scheme is one of `best_positions`."""
-    return scheme.name.startswith(f"{MINIMAX}-")
-
-
-def request_of(question: Question, candidate: Candidate) -> Request:
-    """Request that finds the positions of a candidate that are the best."""
-    sought = Sought(question, candidate.equipment, candidate.model.name, candidate.hold)
-    return sought.request(candidate.scheme.n_positions)
+    """Candidates by the time they take, and by what they leave after it."""
+    return sorted(unsorted, key=lambda c: c.effort)
 
 
 @cache

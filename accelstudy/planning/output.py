@@ -17,7 +17,6 @@ from accelstudy.basics.units import MGON
 from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.reasons import limits
 from accelstudy.planning.wording import (
     answer_lines,
@@ -75,8 +74,8 @@ def write_positions(answer: Answer, path: Path, name: str) -> None:
     """Write the recommended positions as a scheme, in the order in which to take them."""
     question, first = answer.question, answer.first.candidate
     directions, command = first.scheme.directions, positions_command(question, first)
-    if is_best(first.scheme):
-        order = field_order(request_of(question, first).task, directions)
+    if first.request is not None:
+        order = field_order(first.request.task, directions)
         directions = directions[order]
     write_design(path, name, f"of {name}", command, directions, {"made_by": "accelstudy plan"})
 
@@ -105,7 +104,7 @@ def plan_table(answer: Answer) -> pd.DataFrame:
     for candidate in answer.compared:
         rank, ranked = ranks.get(id(candidate), (0, None))
         row = _row(candidate)
-        row["reaches"] = candidate.reaches(answer.question.target, answer.question.confidence)
+        row["reaches"] = candidate.reaches(answer.question)
         row["rank"] = rank or None
         row["limited_by"] = limits(answer.question, candidate) if rank else None
         simulated = None if ranked is None else ranked.simulated

@@ -14,7 +14,6 @@ from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, 
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.optimised import is_best
 from accelstudy.planning.question import Question
 from accelstudy.schemes.files import held
 from accelstudy.study.config import parse_study
@@ -92,7 +91,7 @@ def study_of(
     sigma = chosen[0].sigma
     planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
     sensor = {effect: _quantity(question, effect) for effect in (*BASE_EFFECTS, *planned)}
-    names = [candidate.scheme.name for candidate in chosen if is_best(candidate.scheme)]
+    names = [candidate.scheme.name for candidate in chosen if candidate.request]
     of_files = {name: held(name) for name in names}
     has = [effect for effect in planned if any(sensor[effect]["value"])]
     return {
@@ -125,23 +124,20 @@ def study_of(
     }
 
 
-def simulate(config: dict[str, Any], levels: Sequence[float] = ()) -> list[Simulated]:
+def simulate(question: Question, config: dict[str, Any]) -> list[Simulated]:
     """Simulate the cells of a study of `study_of`, in the order of its candidates.
 
     The same cells give the same numbers in the workflow. There are quantiles at some usual shares,
-    and at the `levels`.
+    and at that of the question.
     """
-    study = parse_study(config)
-    leveling, shares = study.leveling.model_dump(), np.unique([*QUOTED_SHARES, *levels])
-    by_cell: dict[str, Simulated] = {}
-    order = []
-    for grid in config["grids"]:
-        (cell,) = parse_study({**config, "grids": [grid]}).cells
-        order.append(cell.name)
-        if cell.name not in by_cell:
-            found = simulated_statistics(cell, study.seed, leveling, shares)
-            by_cell[cell.name] = Simulated(cell.name, found)
-    return [by_cell[name] for name in order]
+    study, shares = parse_study(config), {*QUOTED_SHARES, question.confidence} - {None}
+    leveling, levels = study.leveling.model_dump(), np.sort([*shares])
+    cells = [parse_study({**config, "grids": [grid]}).cells[0] for grid in config["grids"]]
+    by_name = {
+        name: Simulated(name, simulated_statistics(cell, study.seed, leveling, levels))
+        for name, cell in {cell.name: cell for cell in cells}.items()
+    }
+    return [by_name[cell.name] for cell in cells]
 
 
 def _quantity(question: Question, effect: str) -> dict[str, Any]:

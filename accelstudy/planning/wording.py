@@ -12,7 +12,6 @@ from accelstudy.basics.wording import amount, interval, number, quantity_text, w
 from accelstudy.pages import lines
 from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
 from accelstudy.planning.candidates import Candidate, shortest
-from accelstudy.planning.optimised import is_best, request_of
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import PLAIN, in_use, limits, spoilers, unit_of
 from accelstudy.sensors.models import NINE
@@ -142,9 +141,9 @@ def model_words(model: SensorModel) -> str:
 
 def positions_command(question: Question, candidate: Candidate) -> str:
     """The command that shows, or finds again, the positions of a candidate."""
-    if not is_best(candidate.scheme):
+    request = candidate.request
+    if request is None:
         return f"accelstudy scheme {shlex.quote(question.written(candidate.scheme))}"
-    request = request_of(question, candidate)
     options = {
         "positions": str(request.positions),
         "approach": request.approach,
