@@ -16,7 +16,6 @@ from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.answer import Answer
-from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.reasons import limits
 from accelstudy.planning.wording import (
     answer_lines,
@@ -99,45 +98,46 @@ def plan_table(answer: Answer) -> pd.DataFrame:
 
     Angles are in mgon, whatever unit the user chose.
     """
-    ranks = {id(r.candidate): (i, r) for i, r in enumerate(answer.ranked, 1)}
+    question = answer.question
+    ranks = {id(r.candidate): (i, r.simulated) for i, r in enumerate(answer.ranked, 1)}
     rows = []
-    for candidate in answer.compared:
-        rank, ranked = ranks.get(id(candidate), (0, None))
-        row = _row(candidate)
-        row["reaches"] = candidate.reaches(answer.question)
-        row["rank"] = rank or None
-        row["limited_by"] = limits(answer.question, candidate) if rank else None
-        simulated = None if ranked is None else ranked.simulated
-        row["cell"] = None if simulated is None else simulated.cell
-        empty = np.full(2, np.nan)
-        of_cell = {
-            "rms": empty if simulated is None else simulated.rms,
-            "rms_error": empty if simulated is None else simulated.error,
-            "rms_q95": empty if simulated is None else simulated.quantile(0.95),
+    for c in answer.compared:
+        rank, simulated = ranks.get(id(c), (None, None))
+        noise, unknown = np.sqrt(c.tilt.squares[NOISE]), np.full(2, np.nan)
+        of_both = np.nan if simulated is None else simulated.of_both(0.95)
+        before = {"rms": c.tilt.rms, "noise": noise}
+        after = dict.fromkeys(("rms", "rms_error", "rms_q95"), unknown)
+        if simulated is not None:
+            after = {
+                "rms": simulated.rms,
+                "rms_error": simulated.error,
+                "rms_q95": simulated.quantile(0.95),
+            }
+        row = {
+            "equipment": c.equipment.name,
+            "model": c.model.name,
+            "n_parameters": c.model.n_parameters,
+            "scheme": c.scheme.name,
+            "n_positions": c.scheme.n_positions,
+            "hold_s": c.hold,
+            "sensor_sigma_mps2": c.sigma,
+            "minutes": c.seconds / 60,
+            "redundancy": c.redundancy,
+            **{
+                f"{angle}_{what}_mgon": float(values[i]) / MGON
+                for i, angle in enumerate(ANGLES)
+                for what, values in before.items()
+            },
+            "reaches": c.reaches(question),
+            "rank": rank,
+            "limited_by": limits(question, c) if rank else None,
+            "cell": None if simulated is None else simulated.cell,
+            **{
+                f"{angle}_{what}_simulated_mgon": float(values[i]) / MGON
+                for what, values in after.items()
+                for i, angle in enumerate(ANGLES)
+            },
+            "both_rms_q95_simulated_mgon": of_both / MGON,
         }
-        for key, values in of_cell.items():
-            for angle, value in zip(ANGLES, values, strict=True):
-                row[f"{angle}_{key}_simulated_mgon"] = float(value) / MGON
-        both = np.nan if simulated is None else simulated.of_both(0.95)
-        row["both_rms_q95_simulated_mgon"] = both / MGON
         rows.append(row)
-    table = pd.DataFrame(rows)
-    return table.astype({"rank": "Int64"})
-
-
-def _row(candidate: Candidate) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "equipment": candidate.equipment.name,
-        "model": candidate.model.name,
-        "n_parameters": candidate.model.n_parameters,
-        "scheme": candidate.scheme.name,
-        "n_positions": candidate.scheme.n_positions,
-        "hold_s": candidate.hold,
-        "sensor_sigma_mps2": candidate.sigma,
-        "minutes": candidate.seconds / 60,
-        "redundancy": candidate.redundancy,
-    }
-    for i, angle in enumerate(ANGLES):
-        row[f"{angle}_rms_mgon"] = float(candidate.tilt.rms[i]) / MGON
-        row[f"{angle}_noise_mgon"] = float(np.sqrt(candidate.tilt.squares[NOISE][i])) / MGON
-    return row
+    return pd.DataFrame(rows).astype({"rank": "Int64"})

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import shlex
 
+import numpy as np
+
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.pages import lines
@@ -87,18 +89,13 @@ def table_lines(answer: Answer) -> list[str]:
         "", "equipment", "model", "scheme", "positions", "s each", "minutes",
         f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
     ]  # fmt: skip
-    rows = [head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
-    right = {4, 5, 6, 7, 8, 9}
-    lines = [
-        "  ".join(
-            text.rjust(width) if i in right else text.ljust(width)
-            for i, (text, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
+    table = np.array([head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))])
+    aligned = [
+        (np.char.rjust if 4 <= i < 10 else np.char.ljust)(column, max(map(len, column)))
+        for i, column in enumerate(table.T)
     ]
     return [
-        *lines,
+        *("  ".join(cells).rstrip() for cells in zip(*aligned, strict=True)),
         "model: number of parameters, and effects besides bias, scale and angles between axes;",
         "roll, pitch: rms, and interval with 95 of 100 calibrations of each angle by itself, from",
         f"{answer.replicates} simulated ones each; ~ by linear theory;",
