@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment import whitened_jacobian
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.adjustment.gauss_helmert import whitened_design
 from accelstudy.adjustment.observations import AngleErrors
@@ -27,7 +26,7 @@ from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.distribution import NOISE, Tilt
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
@@ -235,15 +234,16 @@ def position_rows(
     approach: Approach,
     noise: Noise,
     directions: ArrayLike,
-    parameters: Array | None = None,
     gravity: float = STANDARD_GRAVITY,
     hold: HoldConditions | None = None,
     errors: AngleErrors | None = None,
 ) -> Array:
     """Rows of the design matrix that each position contributes, at unit weight.
 
-    The normal matrix of any choice of positions is the sum of RᵀR over their rows R. Where
-    effects depend on the position before, the order of the directions is that of the session.
+    They are those of the ideal sensor: its output is the force, so that nothing is iterated. The
+    normal matrix of any choice of positions is the sum of RᵀR over their rows R. Where effects
+    depend on the position before, the order of the directions is that of the session, unless the
+    holds tell their steps.
 
     Parameters
     ----------
@@ -253,7 +253,6 @@ def position_rows(
         With `sigma_gravity` > 0 gravity is the last parameter. Its observation belongs to no
         position, so its weight 1/σ² is not in the rows.
     directions : (k, 3) array of unit vectors, gravity in the body frame
-    parameters : (u,) array, SI, optional; the ideal sensor by default
     gravity : float, m/s²
     hold : HoldConditions, optional
         What else is known of the k positions.
@@ -269,47 +268,25 @@ def position_rows(
     InputError
         If the model needs what `hold` does not tell.
     """
-    directions = np.asarray(directions, dtype=float)
-    if parameters is None and errors is None:
-        return _ideal_rows(model, approach, noise, directions, gravity, hold)
-    at = np.zeros(model.n_parameters) if parameters is None else np.asarray(parameters, float)
-    ideal = session(model, at, directions, gravity, hold)
-    observed = ideal.observations(noise)
-    if errors is not None:
-        sigma_angle, common = errors(ideal.angles)
-        observed = replace(observed, sigma_angle=sigma_angle, common=common)
-    rows = whitened_jacobian(model, approach, observed, at)
-    k, c = len(directions), approach.n_conditions
-    return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))
-
-
-def _ideal_rows(
-    model: SensorModel,
-    approach: Approach,
-    noise: Noise,
-    directions: Array,
-    gravity: float,
-    hold: HoldConditions | None,
-) -> Array:
-    """Rows of the ideal sensor: its output is the force, so that nothing is iterated.
-
-    A search for positions takes most of its time for them.
-    """
-    force = -gravity * directions
+    force = -gravity * np.asarray(directions, dtype=float)
+    observed, variance = force, np.full(force.shape, noise.sigma_force**2)
+    common: Array | None = None
     if model.hold_columns:
         roll, pitch = angles_of(force).T
-        hold = replace(hold or HoldConditions(), roll=roll, pitch=pitch).with_steps(force)
-    observed, variance = force, np.full(force.shape, noise.sigma_force**2)
+        hold = replace(hold or HoldConditions(), roll=roll, pitch=pitch)
+        hold = hold.with_steps(force) if hold.step_x is None else hold
     if approach.uses_angles:
         angles = angles_of(force)
+        sigma, common = (noise.sigma_angle, None) if errors is None else errors(angles)
         observed = np.concatenate([force, angles], axis=1)
-        of_angles = np.full(angles.shape, noise.sigma_angle**2)
+        of_angles = np.broadcast_to(np.square(sigma), angles.shape)
         variance = np.concatenate([variance, of_angles], axis=1)
     equations = equations_of(model.trace, approach, noise.sigma_gravity > 0)
-    x = np.zeros((equations.n_parameters, 1))
+    shared = 0 if common is None else common.shape[-1]
+    x = np.zeros((equations.n_parameters + shared, 1))
     if equations.estimates_gravity:
         x[-1] = gravity + noise.gravity_error
-    conditions = equations.at(model.settings, gravity + noise.gravity_error, hold)
+    conditions = equations.at(model.settings, gravity + noise.gravity_error, hold, common)
     at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
     rows = whitened_design(at, variance.T)[:, :, 0]
     return np.ascontiguousarray(rows.transpose(2, 0, 1))

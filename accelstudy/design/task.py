@@ -110,7 +110,7 @@ class Task:
     def _rows(self, directions: Array) -> Array:
         hold = HoldPlan().hold(len(directions)) if self.extended.hold_columns else None
         return position_rows(
-            self.extended, self.approach, self.noise, directions, None, self.gravity, hold
+            self.extended, self.approach, self.noise, directions, self.gravity, hold
         )
 
     def informations(self, directions: ArrayLike) -> Array:

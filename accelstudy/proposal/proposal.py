@@ -236,7 +236,7 @@ def _drift_shown(task: Task, directions: Array) -> Array:
     hold = replace(hold, time=np.tile(np.linspace(-1.0, 1.0, n), k))
     fixed_gravity = replace(task.noise, sigma_gravity=0.0)
     flat = directions.reshape(-1, 3)
-    rows = position_rows(model, task.approach, fixed_gravity, flat, None, task.gravity, hold)
+    rows = position_rows(model, task.approach, fixed_gravity, flat, task.gravity, hold)
     rows = rows.reshape(k, -1, rows.shape[-1])
     rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     normal = rows.swapaxes(1, 2) @ rows

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import Observations, whitened_jacobian
+from accelstudy.adjustment import whitened_jacobian
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -27,10 +27,9 @@ from accelstudy.campaign.calibration.fit import (
 from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
-from accelstudy.design.information import Information
+from accelstudy.design.information import Information, position_rows
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
-from accelstudy.leveling.angles import angles_of, roll_pitch
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.choice import Chooser, Knowledge, typical_sizes
 from accelstudy.sequential.prior import Prior
@@ -286,6 +285,14 @@ def _noise_taken(known: Knowledge, campaign: Campaign, trusted: bool, unit: floa
     return NoiseTaken(stated, seen, taken, refuted, r)
 
 
+def next_rows(
+    campaign: Campaign, model: SensorModel, approach: Approach, noise: Noise, directions: Array
+) -> Array:
+    """Rows of the design matrix of each of k attitudes as the next position, (k, c, u')."""
+    hold, errors = next_holds(campaign, directions), angle_errors(campaign)
+    return position_rows(model, approach, noise, directions, campaign.gravity, hold, errors)
+
+
 def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
     """Conditions of each of k attitudes as the next position: those of the last, one hold later."""
     k, n = len(directions), campaign.n_positions
@@ -301,13 +308,10 @@ def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
         time += INTERVAL
     f_b = -campaign.gravity * directions
     step = f_b - campaign.forces[-1] if n else np.zeros_like(f_b)
-    roll, pitch = roll_pitch(tuple(f_b.T))
     return HoldConditions(
         temperature=goes_on(last.temperature, REFERENCE_TEMPERATURE),
         time=time,
         vibration=goes_on(last.vibration, 0.0),
-        roll=roll,
-        pitch=pitch,
         yaw=goes_on(last.yaw, 0.0),
         step_x=step[:, 0],
         step_y=step[:, 1],
@@ -316,25 +320,3 @@ def next_holds(campaign: Campaign, directions: Array) -> HoldConditions:
         course=campaign.hold.take(np.arange(n)).course if n else None,
         full_range=campaign.full_range,
     )
-
-
-def next_rows(
-    campaign: Campaign, model: SensorModel, approach: Approach, noise: Noise, directions: Array
-) -> Array:
-    """Rows of the design matrix of each of k attitudes as the next position, (k, c, u')."""
-    f_b, hold = -campaign.gravity * directions, next_holds(campaign, directions)
-    angles, errors = angles_of(f_b), angle_errors(campaign)
-    sigma_angle, common = (noise.sigma_angle, None) if errors is None else errors(angles)
-    observed = Observations(
-        forces=f_b[None],  # of an ideal sensor, all of whose effects are zero
-        sigma_force=noise.sigma_force,
-        angles=angles[None],
-        sigma_angle=sigma_angle,
-        common=common,
-        gravity=campaign.gravity,
-        sigma_gravity=noise.sigma_gravity,
-        hold=hold,
-    )
-    rows = whitened_jacobian(model, approach, observed, np.zeros(model.n_parameters))
-    k, c = len(directions), approach.n_conditions
-    return np.ascontiguousarray(rows[: c * k].reshape(c, k, -1).swapaxes(0, 1))

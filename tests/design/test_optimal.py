@@ -26,6 +26,7 @@ from accelstudy.design.spaces import (
     listed_in,
 )
 from accelstudy.design.task import Task
+from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.schemes import get_scheme
 from accelstudy.schemes.optimal import stored_designs
@@ -54,27 +55,34 @@ def random_directions(n, seed=1):
 @pytest.mark.parametrize("sigma_gravity", [0.0, 1e-5])
 def test_the_rows_of_positions_add_up_to_the_normal_matrix(approach, sigma_gravity):
     noise, directions = Noise(sigma_gravity=sigma_gravity), get_scheme("mclaren-24").directions
-    truth = NINE.vector({"b_x": 0.05, "s_y": 0.004, "gamma_yz": 0.003})
-    rows = position_rows(NINE, get_approach(approach), noise, directions, truth)
+    rows = position_rows(NINE, get_approach(approach), noise, directions)
     assert rows.shape == (24, 1 if approach == "gravity" else 3, 9 + (sigma_gravity > 0))
-    seen = session(NINE, truth, directions).observations(noise)
-    whole = whitened_jacobian(NINE, get_approach(approach), seen, truth)
+    ideal = np.zeros(9)
+    seen = session(NINE, ideal, directions).observations(noise)
+    whole = whitened_jacobian(NINE, get_approach(approach), seen, ideal)
     normal = whole.T @ whole
     if sigma_gravity:
         normal[-1, -1] -= sigma_gravity**-2
     np.testing.assert_allclose(information(rows).sum(axis=0), normal, rtol=1e-9, atol=1e-6)
-    alone = position_rows(NINE, get_approach(approach), noise, directions[5:6], truth)
+    alone = position_rows(NINE, get_approach(approach), noise, directions[5:6])
     np.testing.assert_allclose(alone[0], rows[5], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
 @pytest.mark.parametrize("noise", [Noise(), Noise(0.003, 1e-5, 1e-4, 2e-4)])
-def test_the_rows_of_an_ideal_sensor_are_those_of_a_session_without_errors(approach, noise):
-    effects = "bias-scale-nonorthogonality+cubic_scale+saturation+encoder_eccentricity"
-    model, directions = get_model(effects), random_directions(20)
-    rows = position_rows(model, get_approach(approach), noise, directions)
-    zeros = np.zeros(model.n_parameters)
-    of_session = position_rows(model, get_approach(approach), noise, directions, zeros)
+@pytest.mark.parametrize("effects", ["cubic_scale+saturation+encoder_eccentricity",
+                                     "thermal_bias+base_tilt+hysteresis"])  # fmt: skip
+def test_the_rows_of_an_ideal_sensor_are_those_of_a_session_without_errors(
+    approach, noise, effects
+):
+    model = get_model(f"bias-scale-nonorthogonality+{effects}")
+    directions, by, ideal = random_directions(20), get_approach(approach), np.zeros(40)
+    hold = HoldConditions(temperature=np.linspace(0, 30, 20), yaw=np.linspace(0, 3, 20))
+    rows = position_rows(model, by, noise, directions, hold=hold)
+    ideal = ideal[: model.n_parameters]
+    seen = session(model, ideal, directions, hold=hold).observations(noise)
+    whole = whitened_jacobian(model, by, seen, ideal)[: rows.shape[0] * rows.shape[1]]
+    of_session = whole.reshape(by.n_conditions, 20, -1).swapaxes(0, 1)
     np.testing.assert_allclose(rows, of_session, rtol=1e-12, atol=1e-12 * np.abs(rows).max())
 
 
