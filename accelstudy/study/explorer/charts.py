@@ -31,8 +31,8 @@ def all_charts(approaches: Sequence[str], fields: Sequence[str]) -> dict[str, An
         "roll": tilt_chart("roll", approaches, fields),
         "pitch": tilt_chart("pitch", approaches, fields),
         "sds": sds_chart(approaches),
-        "ratio": interval_chart("ratio", 1, ".3f", approaches),
-        "coverage": interval_chart("coverage", 0.95, ".1%", approaches),
+        "ratio": interval_chart("sd_ratio", 1, ".3f", approaches),
+        "coverage": interval_chart("coverage_95", 0.95, ".1%", approaches),
         "correlations": correlation_chart(),
     }
     look = alt.Config(
@@ -95,12 +95,12 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
 def sds_chart(approaches: Sequence[str]) -> Layers:
     """Standard deviations of the parameters of one unit: a posteriori, empirical, linear theory."""
     rows = _parameters(approaches)
-    x = alt.X("posteriori:Q", title=None, axis=alt.Axis(format="~r", tickCount=5))
+    x = alt.X("sd_posteriori_mean:Q", title=None, axis=alt.Axis(format="~r", tickCount=5))
     return alt.layer(
         rows.mark_bar(opacity=0.4).encode(x=x),
-        rows.mark_rule(size=2).encode(x="posteriori_low:Q", x2="posteriori_high:Q"),
-        rows.mark_tick(thickness=2, size=14).encode(x="linear:Q", color=alt.value(INK)),
-        _points(rows, approaches).encode(x="empirical:Q"),
+        rows.mark_rule(size=2).encode(x="sd_posteriori_mean_low:Q", x2="sd_posteriori_mean_high:Q"),
+        rows.mark_tick(thickness=2, size=14).encode(x="sd_linear:Q", color=alt.value(INK)),
+        _points(rows, approaches).encode(x="sd_empirical:Q"),
     )
 
 
@@ -157,7 +157,9 @@ def _points(rows: alt.Chart, approaches: Sequence[str]) -> alt.Chart:
 
 
 def _parameters(approaches: Sequence[str]) -> alt.Chart:
-    numbers = [f"{name}:Q" for name in ("empirical", "posteriori", "ratio", "coverage")]
+    numbers = [
+        f"{name}:Q" for name in ("sd_empirical", "sd_posteriori_mean", "sd_ratio", "coverage_95")
+    ]
     tooltip = ["parameter:N", "approach:N", "unit:N", *numbers]
     return _rows(approaches, "parameter").encode(tooltip=tooltip)
 

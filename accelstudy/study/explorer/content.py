@@ -10,6 +10,7 @@ import base64
 import gzip
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,22 +21,14 @@ from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
 from accelstudy.study.figures.panels import ANGLES, by_cell
 from accelstudy.study.figures.registry import Tables
+from accelstudy.study.statistics import TILTS
 
-ENDS = {"low": 0.025, "high": 0.975}
-"""Probabilities at the ends of the central 95 %."""
-QUANTITIES = {
-    **{"truth": "truth", "bias": "bias"},
-    **{"bias_ci95_low": "bias_low", "bias_ci95_high": "bias_high"},
-    **{"sd_empirical": "empirical", "sd_posteriori_mean": "posteriori"},
-    **{"sd_linear": "linear", "sd_closed_form": "closed"},
-}
-"""Columns of the summary in the unit of a parameter, and how they are called here."""
-SHARES = {
-    **{"sd_ratio": "ratio", "coverage_95": "coverage"},
-    **{"sd_ratio_ci95_low": "ratio_low", "sd_ratio_ci95_high": "ratio_high"},
-    **{"coverage_95_low": "coverage_low", "coverage_95_high": "coverage_high"},
-}
-"""Columns of the summary without a unit."""
+ENDS = {"low": 0.025, "q95": 0.95, "high": 0.975}
+"""Probabilities at the ends of the central 95 %, and of what 95 % stay below."""
+IN_UNITS = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear", "sd_closed_form")
+SHARES = ("sd_ratio", "coverage_95")
+"""Columns of the summary in the unit of a parameter, and without one. The ends of an interval have
+the name of the number and `_low` and `_high`."""
 
 
 def records(table: pd.DataFrame) -> str:
@@ -101,37 +94,36 @@ def _titles(names: pd.Series, title: Callable[[str], str]) -> list[str]:
 
 def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, np.ndarray]:
     """Tilt error of each cell: rms, central 95 %, and what 95 % stay below, singly and in both."""
-    leveling = tables["leveling"]
-    columns = {"both_q95": by_cell(leveling, "both_rms_q95_mgon")}
+    all_ends = pd.MultiIndex.from_product([ENDS, TILTS])
+    ends = _ends(tables, "tilt", ["cell"], ["end", "name"]).reindex(columns=all_ends)
+    columns: dict[str, Any] = {f"{name}_{end}": ends[end, name] for end, name in all_ends}
     for angle in ANGLES:
-        columns[f"{angle}_rms"] = by_cell(leveling, f"{angle}_rms_mgon")
-        columns[f"{angle}_q95"] = by_cell(leveling, f"{angle}_rms_q95_mgon")
-        for name, probability in ENDS.items():
-            rows = _quantiles(tables, "tilt", probability)
-            columns[f"{angle}_{name}"] = by_cell(rows[rows["name"] == angle], "value")
+        columns[f"{angle}_rms"] = by_cell(tables["leveling"], f"{angle}_rms_mgon")
     return {
         name: shown(cells["cell"].map(column).astype(float), "mgon")[0]
         for name, column in columns.items()
     }
 
 
-def _quantiles(tables: Tables, quantity: str, probability: float) -> pd.DataFrame:
+def _ends(tables: Tables, quantity: str, by: list[str], columns: list[str]) -> pd.DataFrame:
+    """Quantiles of a quantity at `ENDS`, the column `end` of the table before it is pivoted."""
     rows = tables["quantiles"][tables["quantiles"]["quantity"] == quantity]
-    return rows[np.isclose(rows["probability"].astype(float), probability)]
+    end = rows["probability"].astype(float).round(6).map({p: name for name, p in ENDS.items()})
+    return rows.assign(end=end).pivot_table("value", by, columns)
 
 
 def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
     """Parameters of cells, a row each: `i`, the number of its cell, its unit, and its numbers."""
-    summary = _numbered(cells, tables["summary"])
-    values = summary[[*QUANTITIES]].astype(float).rename(columns=QUANTITIES)
-    for name, probability in ENDS.items():
-        ends = _quantiles(tables, "sd_posteriori", probability).set_index(["cell", "name"])["value"]
-        ends = ends.rename_axis(["cell", "parameter"]).rename(f"posteriori_{name}")
-        values = values.join(summary.join(ends, on=["cell", "parameter"])[ends.name])
+    ends = _ends(tables, "sd_posteriori", ["cell", "name"], ["end"])
+    ends = ends.add_prefix("sd_posteriori_mean_")
+    summary = _numbered(cells, tables["summary"]).join(ends, on=["cell", "parameter"])
+    summary.columns = summary.columns.str.replace("_ci95_", "_")
+    stems = summary.columns.str.replace("_(low|high)$", "", regex=True)
+    values = summary.loc[:, stems.isin(IN_UNITS)].astype(float)
     units = summary["unit"].astype(str)
     for unit in units.unique():
         values.loc[units == unit] = shown(values[units == unit], unit)[0]
-    labels = summary[["i", "approach", "parameter", *SHARES]].rename(columns=SHARES)
+    labels = summary.loc[:, stems.isin(["i", "approach", "parameter", *SHARES])]
     return labels.join(values).assign(unit=[shown([], unit)[1] for unit in units])
 
 

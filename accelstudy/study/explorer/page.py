@@ -39,12 +39,12 @@ QUANTITIES = {
     "unit": "unit",
     "truth": "truth",
     "bias": "bias (95 % interval)",
-    "empirical": "empirical sd",
-    "posteriori": "sd a posteriori (central 95 %)",
-    "linear": "linear theory",
-    "closed": "closed form",
-    "ratio": "ratio of the sds (95 % interval)",
-    "coverage": "coverage (95 % interval)",
+    "sd_empirical": "empirical sd",
+    "sd_posteriori_mean": "sd a posteriori (central 95 %)",
+    "sd_linear": "linear theory",
+    "sd_closed_form": "closed form",
+    "sd_ratio": "ratio of the sds (95 % interval)",
+    "coverage_95": "coverage (95 % interval)",
 }
 """Columns of the parameters of a set-up, and their titles."""
 
