@@ -30,15 +30,15 @@ class Kernel:
 
     def __init__(self, equations: CalibrationEquations) -> None:
         self.function = KernelFunction(equations)
-        self._below = np.tril_indices(self.function.unknowns, -1)
+        self._below = np.tril_indices(self.function.u, -1)
         self._compiled = Compiled(text_of(self.function), NAME, len(INTEGERS), len(POINTERS))
 
     def calibrate(self, problem: CalibrationProblem) -> Block:
         """Calibrate the sessions of a problem; result and errors as of `calibrate`."""
         function = self.function
         count, n, _ = problem.observed[0].shape
-        u = function.unknowns
-        redundancy = redundancy_of(function.conditions * n, problem.weights)
+        u = function.u
+        redundancy = redundancy_of(function.c * n, problem.weights)
         padded = -(-count // LANES) * LANES
         results = np.empty((2 * u + 3, padded))
         correlations = np.zeros((u * (u - 1) // 2, LANES))

@@ -242,10 +242,12 @@ class Code:
         for lane, offset in enumerate(offsets):
             value = self.line(f"load double, ptr {self._at(pointer, offset)}, align 8")
             result = self.line(f"insertelement {_VECTOR} {result}, double {value}, i64 {lane}")
-        if len(offsets) == 1:
-            zero = f"<{LANES} x i32> zeroinitializer"
-            result = self.line(f"shufflevector {_VECTOR} {result}, {_VECTOR} poison, {zero}")
-        return Lanes(self, result)
+        return self._alike(result) if len(offsets) == 1 else Lanes(self, result)
+
+    def _alike(self, first: str) -> Lanes:
+        """The number of the first lane in all lanes."""
+        zero = f"<{LANES} x i32> zeroinitializer"
+        return Lanes(self, self.line(f"shufflevector {_VECTOR} {first}, {_VECTOR} poison, {zero}"))
 
     def lane_numbers(self) -> Lanes:
         """0, 1, 2, … in the lanes."""
@@ -254,9 +256,7 @@ class Code:
     def of_integer(self, value: str) -> Lanes:
         """Return an integer as the number of all lanes."""
         one = self.line(f"sitofp i64 {value} to double")
-        result = self.line(f"insertelement {_VECTOR} poison, double {one}, i64 0")
-        zero = f"<{LANES} x i32> zeroinitializer"
-        return Lanes(self, self.line(f"shufflevector {_VECTOR} {result}, {_VECTOR} poison, {zero}"))
+        return self._alike(self.line(f"insertelement {_VECTOR} poison, double {one}, i64 0"))
 
 
 def text(value: Term) -> str:

@@ -50,7 +50,6 @@ POINTERS = (
 """Arguments of the function, in order; `KernelFunction` says what they hold."""
 
 
-@dataclass(frozen=True)
 class KernelFunction:
     """The function that calibrates the replicates of one kind of sensor model with one approach.
 
@@ -73,39 +72,23 @@ class KernelFunction:
     Parameters
     ----------
     equations : CalibrationEquations
+
+    Attributes
+    ----------
+    key : under which the numbers of `known`, and the text of the function, are kept
+    u, o, c : parameters, and observations and conditions per position
     """
 
-    equations: CalibrationEquations
-
-    @property
-    def unknowns(self) -> int:
-        """Parameters u."""
-        return self.equations.n_parameters
-
-    @property
-    def observed(self) -> int:
-        """Observations o per position."""
-        return self.equations.n_observations
-
-    @property
-    def conditions(self) -> int:
-        """Conditions c per position."""
-        return self.equations.linear.shape[0]
-
-    @property
-    def key(self) -> str | None:
-        """Under which the numbers of `known`, and the text of the function, are kept."""
-        return self.equations.key
-
-    @property
-    def n_latent(self) -> int:
-        """Numbers f_a of the iteration before; none where the approach knows the force."""
-        return 0 if self.equations.knows_force else 3
+    def __init__(self, equations: CalibrationEquations) -> None:
+        self.equations = equations
+        self.key = equations.key
+        self.u, self.o = equations.n_parameters, equations.n_observations
+        self.c = equations.linear.shape[0]
 
     @cached_property
     def latent(self) -> tuple[sp.Symbol, ...]:
-        """Their symbols."""
-        return symbols("a_x", "a_y", "a_z")[: self.n_latent]
+        """Symbols of f_a of the iteration before; none where the approach knows the force."""
+        return () if self.equations.knows_force else symbols("a_x", "a_y", "a_z")
 
     @cached_property
     def _same(self) -> frozenset[sp.Symbol]:
@@ -138,13 +121,12 @@ class KernelFunction:
     @property
     def columns(self) -> int:
         """Numbers of `known` per position."""
-        return 2 * self.observed + self.known.shape[0]
+        return 2 * self.o + self.known.shape[0]
 
     @property
     def work(self) -> int:
         """Vectors of `work` per position."""
-        c, u, o = self.conditions, self.unknowns, self.observed
-        return 2 * o + self.n_latent + c * (u + 1 + o)
+        return 2 * self.o + len(self.latent) + self.c * (self.u + 1 + self.o)
 
 
 Rows: TypeAlias = list[list[Term]]
@@ -161,8 +143,7 @@ class _Writer:
 
     def __init__(self, of: KernelFunction) -> None:
         self.of = of
-        self.u, self.o = of.unknowns, of.observed
-        self.c = of.conditions
+        self.u, self.o, self.c = of.u, of.o, of.c
         self.weighted = [*of.equations.trace.informed]
         if of.equations.estimates_gravity:
             self.weighted.append(self.u - 1)
@@ -248,7 +229,7 @@ class _Writer:
             largest.set(size)
             self.write(i, 0, values)
             self.write(i, o, [0.0] * o)
-            if self.of.n_latent:
+            if self.of.latent:
                 self.write(i, 2 * o, values[:3])
         return larger(largest.get() * (ROUNDING * np.finfo(float).eps), STEP_TOLERANCE)
 
@@ -301,11 +282,11 @@ class _Writer:
         l, v = self.read(i, 0, o), self.read(i, o, o)
         table: dict[Any, Term] = dict(zip(eq.parameters, x, strict=True))
         table |= zip(eq.observations, (a + b for a, b in zip(l, v, strict=True)), strict=True)
-        if self.of.n_latent:
+        if self.of.latent:
             table |= zip(self.of.latent, self.read(i, 2 * o, 3), strict=True)
         sensitive, linear = self.of.sensitive, self.of.linear
         f_a = self.evaluate(sensitive, table, i, 2 * o)
-        if self.of.n_latent:
+        if self.of.latent:
             self.write(i, 2 * o, f_a)
         table |= zip(eq.trace.formulas.force, f_a, strict=True)
         values = self.evaluate(linear, table, i, 2 * o + len(sensitive.known))
@@ -349,7 +330,7 @@ class _Writer:
         ]
         for number, value in enumerate(value for row in self.stored for value in row):
             if isinstance(value, Lanes):  # a constant is not stored
-                self.write(i, 2 * o + self.of.n_latent + number, [value])
+                self.write(i, 2 * o + len(self.of.latent) + number, [value])
 
     def evaluate(
         self, formulas: Formulas, table: dict[Any, Term], i: str, column: int
@@ -361,7 +342,7 @@ class _Writer:
     def residuals(self, i: str, dx: list[Term], size_v: Variable, omega: Variable) -> None:
         """Residuals of a position after a step, v = −(B Q)ᵀ L⁻ᵀ (A dx + w)."""
         u, o = self.u, self.o
-        number = 2 * o + self.of.n_latent
+        number = 2 * o + len(self.of.latent)
         v_new: list[Term] = [0.0] * o
         total: Term = omega.get()
         for stored in self.stored:
