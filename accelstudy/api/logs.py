@@ -16,7 +16,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.sources import LogFile, TableSource
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html
 
@@ -67,7 +67,7 @@ def open_log(log: Any, given: Mapping[str, Any]) -> Log:
         raise InputError(
             f"log: the DataFrame cannot be a log, which has numbers: {reason}"
         ) from None
-    return Log(TableSource("DataFrame", typed), layout, table)
+    return Log(Source("DataFrame", typed), layout, table)
 
 
 def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, dict[str, Any]]:

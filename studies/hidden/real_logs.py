@@ -23,7 +23,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
-from accelstudy.campaign.importing.sources import TableSource
+from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
 from accelstudy.sensors.conversion import conversion_of
 from studies.hidden.physics.conditions import Conditions, Shape
@@ -165,9 +165,7 @@ class Donor:
         factor = np.sqrt(size / np.sum((parameters @ left) ** 2))
         return Cause(kind, settings, parameters[None] * factor, size)
 
-    def changed(
-        self, causes: Sequence[Cause], recorded: bool
-    ) -> tuple[TableSource, ImportSettings]:
+    def changed(self, causes: Sequence[Cause], recorded: bool) -> tuple[Source, ImportSettings]:
         """The log with effects in its readings, and how it is imported.
 
         If that is `recorded`, it has columns of the temperature and the time.
@@ -185,7 +183,7 @@ class Donor:
         if given.time is not None or (recorded and not self.timed):
             table["time"], time = self.time, "time"
         layout = {"columns": columns, "time": time, "time_unit": "s", "variable": None}
-        return TableSource(self.name, pa.table(table)), given.model_copy(update=layout)
+        return Source(self.name, pa.table(table)), given.model_copy(update=layout)
 
 
 def means_of(values: Array, spans: Spans) -> Array:

@@ -11,7 +11,6 @@ from accelstudy.campaign.importing.sources import (
     GZIP,
     LogFile,
     Source,
-    TableSource,
     TextSource,
     open_matlab,
     open_parquet,
@@ -45,7 +44,7 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
     variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
     delimiter : str, between the columns of a text, see `LogLayout`
     """
-    if isinstance(path, TableSource):
+    if isinstance(path, Source):
         return path
     path = Path(path)
     with readable(path):

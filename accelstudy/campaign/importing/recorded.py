@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import TableSource, chosen_of, table_of
+from accelstudy.campaign.importing.sources import Source, chosen_of, table_of
 from accelstudy.files.reading import readable
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _LONGEST_GAP = 3600.0  # s
 _FIELDS = {"fx": "x", "fy": "y", "fz": "z", "temperature": "temperature"}
 
 
-def open_bag(path: Path, topic: str | None = None) -> TableSource:
+def open_bag(path: Path, topic: str | None = None) -> Source:
     """Read the forces of a bag; their frame is flu, or frd where its name ends in _ned (REP 103).
 
     Parameters
@@ -89,11 +89,11 @@ def open_bag(path: Path, topic: str | None = None) -> TableSource:
 
 def _source(
     path: Path, rows: Array, columns: Mapping[str, str], frame: str, warnings: Sequence[str]
-) -> TableSource:
+) -> Source:
     """Times, s, forces, m/s², and perhaps temperatures as a table."""
     si = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **si}
-    return TableSource(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
+    return Source(path, table_of(rows, ["time", *columns.values()]), layout, warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:
@@ -133,7 +133,7 @@ def _thermometer(reader: AnyReader, topic: str) -> list[Connection]:
     return next((some for some in (found, beside) if len({c.topic for c in some}) == 1), [])
 
 
-def open_ulog(path: Path, instance: str | None = None) -> TableSource:
+def open_ulog(path: Path, instance: str | None = None) -> Source:
     """Read the forces of a flight log.
 
     Parameters

@@ -7,7 +7,7 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import islice, pairwise, takewhile
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -54,25 +54,43 @@ _AS_ISO = (
 
 
 class Source:
-    """A table of numbers, in a file or in memory.
+    """A table of numbers in memory, as it is in its file.
+
+    Parameters
+    ----------
+    path : its file, or what messages call it
+    table : Table
+    layout : mapping, what the format says of the keys of `LogLayout`; else, what the names say
+    warnings : sequence of str, what of the file could not be read
+    named : bool, whether its columns have names, and not only places
 
     Attributes
     ----------
-    path : Path
     names : list of str, of the columns; their places, counted from 0, where the file has no names
-    named : bool, whether the file has names
     dates : set of int, places of columns of dates with times, of which the numbers are in ns
-    layout : mapping, what the format says of the keys of `LogLayout`; empty for a plain table
-    notes : sequence of str, how the file was read, in lines for people
-    warnings : sequence of str, what of the file could not be read
     """
 
-    path: Path
-    names: list[str]
-    named: bool
-    dates: Set[int] = frozenset()
-    layout: Mapping[str, Any]
     warnings: Sequence[str] = ()
+
+    def __init__(
+        self,
+        path: str | Path,
+        table: pa.Table,
+        layout: Mapping[str, Any] | None = None,
+        warnings: Sequence[str] = (),
+        named: bool = True,
+    ) -> None:
+        self.path, self._table, self.warnings, self.named = Path(path), table, warnings, named
+        self.names = [printable(" ".join(name.split())) for name in table.column_names]
+        self.layout = layout_by_names(self.names) if layout is None else layout
+        self.dates = {
+            i
+            for i, kind in enumerate(table.schema.types)
+            if pa.types.is_timestamp(kind) or (len(table) and is_stamp(str(table.column(i)[0])))
+        }
+
+    def __str__(self) -> str:
+        return str(self.path)
 
     @property
     def notes(self) -> Sequence[str]:
@@ -81,7 +99,7 @@ class Source:
 
     def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
         """Columns as they are in the file: of a text, of text; rows that are none are null."""
-        raise NotImplementedError
+        return [self._table.column(place) for place in places]
 
     def numbers(
         self, places: Sequence[int], columns: Sequence[pa.ChunkedArray] | None = None
@@ -98,7 +116,9 @@ class Source:
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """Describe where a row is in the file, and what its cell in a column says."""
-        raise NotImplementedError
+        (values,) = self.numbers([place])
+        value = values[row] * (1e-9 if place in self.dates else 1)
+        return f"row {row + 1}", f"{value:g}"
 
     def _cells_of_numbers(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
         """Columns of which only the numbers matter."""
@@ -129,7 +149,7 @@ def chosen_of(path: Path, what: str, found: Collection[str], wanted: str | None)
 
 
 class TextSource(Source):
-    """Numbers in lines of text.
+    """Numbers in lines of text, which are read when they are asked for.
 
     Attributes
     ----------
@@ -524,51 +544,17 @@ def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
         return column.cast(pa.float64()).to_numpy()
 
 
-class TableSource(Source):
-    """A table in memory, which messages may call by a name instead of a path; see `Source`."""
-
-    def __init__(
-        self,
-        path: str | Path,
-        table: pa.Table,
-        layout: Mapping[str, Any] | None = None,
-        warnings: Sequence[str] = (),
-        named: bool = True,
-    ) -> None:
-        self.path, self.table, self.warnings, self.named = Path(path), table, warnings, named
-        self.names = [printable(" ".join(name.split())) for name in table.column_names]
-        self.layout = layout_by_names(self.names) if layout is None else layout
-        self.dates = {
-            i
-            for i, kind in enumerate(table.schema.types)
-            if pa.types.is_timestamp(kind) or (len(table) and is_stamp(str(table.column(i)[0])))
-        }
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-    def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
-        """Columns as they are; see `Source`."""
-        return [self.table.column(place) for place in places]
-
-    def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """Where a value stands, and the value; see `Source`."""
-        (values,) = self.numbers([place])
-        value = values[row] * (1e-9 if place in self.dates else 1)
-        return f"row {row + 1}", f"{value:g}"
-
-
 def table_of(values: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
     """Array (n, c) as a table; its columns have their places as names if they have no others."""
     names = names or [str(place) for place in range(values.shape[1])]
     return pa.table([*map(pa.array, values.T)], names=[*names])
 
 
-def open_matlab(path: Path, variable: str | None = None) -> TableSource:
+def open_matlab(path: Path, variable: str | None = None) -> Source:
     """Open a MATLAB file; it is read as a whole, since the format allows 2 GB at most."""
     try:
         with readable(path):
-            return TableSource(path, table_of(_matlab_array(path, variable)), named=False)
+            return Source(path, table_of(_matlab_array(path, variable)), named=False)
     except InputError:
         raise
     except NotImplementedError:
@@ -594,13 +580,13 @@ def _matlab_array(path: Path, variable: str | None) -> NDArray[Any]:
     return array.T if array.shape[0] < array.shape[1] else array
 
 
-def open_parquet(path: Path) -> TableSource:
+def open_parquet(path: Path) -> Source:
     """Open a Parquet file."""
     with whole_parquet(path) as file:
-        return TableSource(path, file.read())
+        return Source(path, file.read())
 
 
-LogFile: TypeAlias = str | Path | TableSource
+LogFile: TypeAlias = str | Path | Source
 """Where a log is: the path of a file, or a table in memory."""
 
 
