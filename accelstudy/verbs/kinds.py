@@ -390,8 +390,3 @@ def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returne
 
     within.__doc__ = _documented(function)
     return within
-
-
-def in_si(value: Quantity) -> float:
-    """Return a quantity that `verb` has checked, which is in SI."""
-    return float(value)

@@ -12,7 +12,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.given import check_once
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import in_si, verb
+from accelstudy.verbs.kinds import verb
 
 if TYPE_CHECKING:
     from accelstudy import Calibration, Campaign, Comparison, History, Lot
@@ -57,7 +57,7 @@ def compare(
     from accelstudy.epochs.output import Comparison
 
     pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
-    return Comparison(history.compare(*pair), in_si(tilt_range))
+    return Comparison(history.compare(*pair), float(tilt_range))  # in SI by `verb`
 
 
 @verb
@@ -119,7 +119,7 @@ def history(
     course = follow(sensors, dates, names)
     if tilt_accuracy is None:
         return History(course, None)
-    wanted = in_si(tilt_accuracy), in_si(tilt_range), in_si(confidence)
+    wanted = map(float, (tilt_accuracy, tilt_range, confidence))  # in SI by `verb`
     return History(course, Interval(course, *wanted))
 
 

@@ -4,9 +4,9 @@ import inspect
 import math
 import re
 
-import numpy as np
 from markdown_text import code, page, plain, table
 
+from accelstudy.api.catalogues import plain as number
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
@@ -18,11 +18,6 @@ from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, compose, get_model
 from accelstudy.simulation.hold_plan import PROVIDES
-
-
-def number(value):
-    """Three digits, and never an exponent."""
-    return np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
 def _unit(unit):
