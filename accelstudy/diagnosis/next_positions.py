@@ -8,8 +8,7 @@ by, d. Its sum of squares grows by
 
 with A its rows of unit weight for the new position and Q its cofactors so far. The noncentrality of
 the test of one against the other grows by as much, so the size from which they can be told apart
-(MIB) falls. Either may be the right one, so the mean of both counts. With the position Q becomes
-Q − Q Aᵀ (I + A Q Aᵀ)⁻¹ A Q.
+(MIB) falls. Either may be the right one, so the mean of both counts.
 
 Of a learned function, where to measure to know it better: where its mean variance falls most.
 """
@@ -18,11 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.design.information import Information
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
@@ -187,16 +188,16 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
     weights = np.zeros_like(solution.cofactors)
     own = [model.parameter_names.index(parameter.name) for parameter in learned.parameters]
     weights[np.ix_(own, own)] = _mean_squares(learned)
-    fit, before, chosen = Fit(solution.parameters, solution.cofactors), frame.forces[-1], []
-    whole = float(np.sum(weights * fit.cofactors))
+    known, before, chosen = Information.of_covariance(solution.cofactors), frame.forces[-1], []
+    whole = float(np.sum(weights * solution.cofactors))
     for _ in range(COUNT):
         forces, hold = _grid(frame, attitudes, needed, before, yaws, TEMPERATURES * by_heat)
         rows = _rows(frame, forces, hold)
-        gains = fit.fall(rows, weights)
+        gains = known.gain(rows, weights)
         i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
         gain, of = np.sqrt(gains[i] / whole), ((learned.name,), ())
         chosen.append(_position(frame, hold, i, needed - {"time"}, gain, False, of))
-        fit, before = fit.after(rows[i], rows[i] @ fit.values), forces[i]
+        known, before = Information.of(known.rows, rows[i]), forces[i]
     return chosen
 
 
@@ -272,38 +273,37 @@ def _grid(
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit to the positions so far.
+    """A fit to the positions so far, m conditions of unit weight by p parameters.
 
     Attributes
     ----------
-    values : (p,) array, its parameters
-    cofactors : (p, p) array, Q
+    design : (m, p) array
+    observed : (m,) array
     """
 
-    values: Array
-    cofactors: Array
+    design: Array
+    observed: Array
+
+    @cached_property
+    def inverse(self) -> Array:
+        """What turns observations into parameters, (p, m); with its transpose Q."""
+        return np.asarray(np.linalg.pinv(self.design, rcond=1e-10), dtype=float)
+
+    @property
+    def values(self) -> Array:
+        """Parameters, (p,)."""
+        return np.asarray(self.inverse @ self.observed)
 
     def growth(self, rows: Array, seen: Array) -> Array:
         """How much the sum of squares grows, (k,), if candidates (k, c, p) show `seen` (k, c)."""
         missed = (seen - rows @ self.values)[..., None]
-        return np.asarray(np.sum(missed * np.linalg.solve(self._noise(rows), missed), axis=(1, 2)))
-
-    def fall(self, rows: Array, weights: Array) -> Array:
-        """How much tr(W Q) falls by candidates (k, c, p), (k,), with weights W (p, p)."""
-        cross = rows @ self.cofactors
-        taken = np.linalg.solve(self._noise(rows), cross)
-        return np.asarray(np.einsum("kcu,uv,kcv->k", taken, weights, cross))
+        shown = rows @ self.inverse
+        noise = np.eye(rows.shape[-2]) + shown @ np.swapaxes(shown, -1, -2)
+        return np.asarray(np.sum(missed * np.linalg.solve(noise, missed), axis=(1, 2)))
 
     def after(self, rows: Array, seen: Array) -> Fit:
         """Fit a position (c, p) that shows `seen` (c,), too."""
-        cross = rows @ self.cofactors
-        gain = np.linalg.solve(self._noise(rows), cross).T
-        values = self.values + gain @ (seen - rows @ self.values)
-        return Fit(values, self.cofactors - gain @ cross)
-
-    def _noise(self, rows: Array) -> Array:
-        """I + A Q Aᵀ of rows A (..., c, p)."""
-        return np.eye(rows.shape[-2]) + rows @ self.cofactors @ np.swapaxes(rows, -1, -2)
+        return Fit(np.concatenate([self.design, rows]), np.append(self.observed, seen))
 
 
 def _fitted(frame: Frame, explanation: Explanation) -> Fit:
@@ -312,8 +312,7 @@ def _fitted(frame: Frame, explanation: Explanation) -> Fit:
     for one in explanation:
         assert one.effect is not None
         columns.append(-residuals.whitened(frame.signature(one.effect)) @ one.directions)
-    inverse = np.linalg.pinv(np.concatenate(columns, axis=1), rcond=1e-10)
-    return Fit(inverse @ residuals.errors, inverse @ inverse.T)
+    return Fit(np.concatenate(columns, axis=1), residuals.errors)
 
 
 def _rows(
