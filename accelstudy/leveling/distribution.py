@@ -192,17 +192,13 @@ class TiltDistribution:
 
     def _share_of_both(self, bounds: Array) -> Array:
         """Share of the larger error that is below bounds (k,)."""
+        near, far = self._ends(bounds)
         if not self._central:
-            near, far = self._ends(bounds)
             both = self._shares(np.stack([near.max(axis=0), far.min(axis=0)]))
             return np.asarray(both.mean(axis=1))
-        constant, _, square = (each[:, None] for each in self._along[:3])
-        room = np.maximum(bounds**2 - constant, 0.0)[..., None]
-        single = self._length(np.sqrt(square * room) / square)
-        both = single.min(axis=0)
-        larger = both.mean(axis=1)
-        exact = [self._exact(angle, bounds) for angle in (0, 1)]
-        mean = single.mean(axis=2)
+        single = self._length(far)
+        both, mean = single.min(axis=0), single.mean(axis=2)
+        larger, exact = both.mean(axis=1), [self._exact(angle, bounds) for angle in (0, 1)]
         for i, each in enumerate(both):
             apart = single[:, i] - mean[:, i, None]
             slope = np.linalg.lstsq(apart @ apart.T, apart @ (each - larger[i]), rcond=1e-9)[0]
