@@ -88,7 +88,7 @@ class Plan(Result):
     @property
     def verdict(self) -> str:
         """What to do, in one line."""
-        return wording.answer_lines(self.answer)[0]
+        return wording.part_lines("answer", self.answer)[0]
 
     @property
     def content(self) -> dict[str, Any]:
@@ -125,10 +125,13 @@ class Plan(Result):
         if not self.answer.ranked:
             show(self.verdict)
             return
-        told = self.answer
-        show("\n".join([*wording.answer_lines(told), "", *wording.how_to(told)]))
-        say("\n".join(["", *wording.table_lines(told), "", *wording.reason_lines(told)]))
-        say("\n".join(["", *wording.assumption_lines(told.question)]))
+        told = {
+            part: "\n".join(wording.part_lines(part, self.answer))
+            for part in ("answer", "how_to", "reasons", "assumptions")
+        }
+        show(f"{told['answer']}\n\n{told['how_to']}")
+        say("\n".join(["", *wording.table_lines(self.answer), "", told["reasons"]]))
+        say(f"\n{told['assumptions']}")
         if place is None:
             say(
                 "\n--out FOLDER keeps the table, the figure, and a study that makes the numbers "

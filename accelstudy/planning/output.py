@@ -17,14 +17,7 @@ from accelstudy.basics.units import MGON
 from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.answer import Answer
 from accelstudy.planning.reasons import limits
-from accelstudy.planning.wording import (
-    answer_lines,
-    assumption_lines,
-    how_to,
-    positions_command,
-    reason_lines,
-    table_lines,
-)
+from accelstudy.planning.wording import part_lines, positions_command, table_lines
 from accelstudy.proposal.proposal import field_order, write_design
 
 STUDY_HEAD = """\
@@ -81,14 +74,15 @@ def write_positions(answer: Answer, path: Path, name: str) -> None:
 
 def plan_page(answer: Answer) -> str:
     """The plan as a page in Markdown."""
+    first, *rest = part_lines("answer", answer)
     parts = [
-        "# " + answer_lines(answer)[0],
-        "\n".join(answer_lines(answer)[1:]),
-        "\n".join(how_to(answer)),
+        f"# {first}",
+        "\n".join(rest),
+        "\n".join(part_lines("how_to", answer)),
         "```\n" + "\n".join(table_lines(answer)) + "\n```",
         "![Tilt accuracy over effort](plan.svg)",
-        "```\n" + "\n".join(reason_lines(answer)) + "\n```",
-        "\n".join(f"* {line}" for line in assumption_lines(answer.question)),
+        "```\n" + "\n".join(part_lines("reasons", answer)) + "\n```",
+        "\n".join(f"* {line}" for line in part_lines("assumptions", answer)),
     ]
     return "\n\n".join(parts) + "\n"
 

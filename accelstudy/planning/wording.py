@@ -1,46 +1,40 @@
 """A plan in words: first the answer in plain sentences, then its table and reasons.
 
-The sentences stand in `wording.txt.j2`.
+The sentences stand in `wording.txt.j2`; here are the phrases of which it makes them, as `w`.
 """
 
 from __future__ import annotations
 
 import shlex
+import sys
 
 import numpy as np
 
-from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display
+from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.pages import lines
 from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
-from accelstudy.planning.candidates import Candidate, shortest
+from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
-from accelstudy.planning.reasons import PLAIN, in_use, limits, spoilers, unit_of
+from accelstudy.planning.reasons import (  # noqa: F401
+    PLAIN,
+    in_use,
+    limits,
+    spoilers,
+    unit_of,
+)
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
 SENTENCES = "planning/wording.txt.j2"
 
 
-def answer_lines(answer: Answer) -> list[str]:
-    """Say what to do, in sentences."""
-    if not answer.ranked:
-        return [unreachable(answer)]
-    question, candidate = answer.question, answer.first.candidate
-    bent = spoilers(question, candidate) if question.is_linear else []
-    quadratic = [s for s in bent if s.effect == "quadratic_scale"]
-    use = in_use(question)
-    return lines(SENTENCES, "answer", answer, use, quadratic, OTHER_CONFIDENCE, unit_of)
+HERE = sys.modules[__name__]
 
 
-def unreachable(answer: Answer) -> str:
-    """Say in one line that nothing reaches the target, and what is reachable."""
-    question, best = answer.question, answer.best()
-    if best is None:
-        (line,) = lines(SENTENCES, "nothing_fits", question, shortest(question))
-    else:
-        (line,) = lines(SENTENCES, "out_of_reach", answer, best, limits(question, best))
-    return line
+def part_lines(part: str, answer: Answer) -> list[str]:
+    """Lines of a part of a plan: what to do (answer), how_to, reasons or assumptions."""
+    return lines(SENTENCES, part, answer, HERE)
 
 
 def effort(candidate: Candidate) -> str:
@@ -49,37 +43,13 @@ def effort(candidate: Candidate) -> str:
     return line
 
 
-def how_to(answer: Answer) -> list[str]:
-    """Say how to get the positions, and how exactly to measure them."""
-    candidate = answer.first.candidate
-    command = positions_command(answer.question, candidate)
-    beside = answer.beside and positions_command(answer.question, answer.beside)
-    return lines(SENTENCES, "how_to", candidate, command, beside)
-
-
-def reason_lines(answer: Answer) -> list[str]:
-    """What would spoil a calibration of the first candidate, and what use adds."""
-    question, candidate = answer.question, answer.first.candidate
-    return lines(
-        SENTENCES,
-        "reasons",
-        answer,
-        angle_note(),
-        spoilers(question, candidate),
-        in_use(question),
-        PLAIN,
-        unit_of,
-    )
-
-
-def assumption_lines(question: Question) -> list[str]:
-    """Assumptions of the plan."""
-    typical = [
+def assumed_sizes(question: Question) -> list[str]:
+    """Effects that are taken to have a usual size, as nothing is known of it, in words."""
+    return [
         f"{PLAIN[effect]} ({quantity_text(size.value, unit_of(effect))})"
         for effect, size in question.sizes.items()
         if size.source == "typical"
     ]
-    return lines(SENTENCES, "assumptions", question, typical)
 
 
 def table_lines(answer: Answer) -> list[str]:

@@ -32,11 +32,10 @@ from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
 from accelstudy.planning.wording import (
-    answer_lines,
     effort,
+    part_lines,
     positions_command,
     table_lines,
-    unreachable,
 )
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -257,7 +256,7 @@ def test_the_answer_that_a_page_quotes_is_the_commands_own(told, page):
 def test_a_plan_has_a_line_of_each_calibration_and_the_unit_of_angles_that_is_asked_for(plan):
     assert len(table_lines(plan)) == len(plan.ranked) + 5
     with angles_in("deg"):
-        assert " mdeg" in answer_lines(plan)[1]
+        assert " mdeg" in part_lines("answer", plan)[1]
         assert "roll/mdeg" in table_lines(plan)[0]
 
 
@@ -280,8 +279,7 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
     question = Question(0.1 * MGON, 30 * GON, of_sigma(0.002), **options)
     result = answer(question, replicates=200)
     assert result.ranked == []
-    (line,) = answer_lines(result)
-    assert line == unreachable(result)
+    (line,) = part_lines("answer", result)
     for part in parts:
         assert part in line
     assert "\n" not in line
@@ -290,7 +288,7 @@ def test_what_cannot_be_reached_is_one_line_with_what_can(options, parts):
 def test_by_hand_alone_it_is_said_that_a_robot_would_do():
     few = {"equipment": (BY_HAND,), "most_positions": 20}
     question = Question(7 * MGON, 30 * GON, of_sigma(0.002), **few)
-    (line,) = answer_lines(answer(question, replicates=200))
+    (line,) = part_lines("answer", answer(question, replicates=200))
     assert re.search(r"A robot reaches it: \d+ positions with a robot, 10 s each", line)
 
 
@@ -300,7 +298,7 @@ def test_the_way_by_hand_stays_in_the_table_however_long_it_takes():
     assert result.first.candidate.equipment == slow
     assert len(result.ranked) <= 8
     assert result.ranked[-1].candidate.equipment == slow
-    assert answer_lines(result)[0].startswith("You need no robot.")
+    assert part_lines("answer", result)[0].startswith("You need no robot.")
 
 
 # --- against simulations that share no code ------------------------------------------------------
@@ -400,7 +398,7 @@ def test_one_position_less_does_not_suffice(plan):
     request = sought.request(n - 1)
     optimum = continuous_optimum(request.task, request.chosen, Sphere(), Constraints(), n - 1)
     assert np.exp(optimum.bound / 2) > 10 * MGON
-    assert f"{n - 1} positions leave" in answer_lines(plan)[2]
+    assert f"{n - 1} positions leave" in part_lines("answer", plan)[2]
 
 
 def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
