@@ -5,7 +5,7 @@ import pytest
 from study_helpers import NINE, grid, make_study, run_study
 
 from accelstudy.basics.errors import InputError
-from accelstudy.study.figures import angle_unit, caption, draw, figure_names
+from accelstudy.study.figures import caption, draw, figure_names
 from accelstudy.study.figures.factors import FACTORS, swept
 from accelstudy.study.figures.sweep import NONE, SOME, sweep_table
 
@@ -97,7 +97,7 @@ def test_the_unit_of_the_user_holds_where_the_study_names_none(monkeypatch):
     assert named.fingerprint == study.fingerprint
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
     with pytest.raises(InputError, match=r"ACCELSTUDY_ANGLE_UNIT: 'grad' .* gon or deg"):
-        angle_unit(study)
+        caption("leveling-overview", study)
 
 
 def test_what_failed_and_what_does_not_vary_is_marked(factorial):

@@ -30,7 +30,6 @@ from accelstudy.study.explorer.content import (
     records,
     setups,
 )
-from accelstudy.study.figures import angle_unit
 from accelstudy.study.tables import TABLES
 
 QUANTITIES = {
@@ -58,7 +57,7 @@ def write_explorer(study: Study, tables: Mapping[str, pd.DataFrame], output: str
     tables : mapping of name to DataFrame, those of `TABLES`
     output : path of the page
     """
-    with angles_in(angle_unit(study)):
+    with angles_in(study.angle_unit):
         page = explorer_page(study, tables)
     with whole_file(output) as path:
         path.write_text(page, encoding="utf-8")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from accelstudy.basics.registry import Registry
-from accelstudy.basics.units import angle_note, angles_in, attitude_unit
+from accelstudy.basics.units import angle_note, angles_in
 from accelstudy.files.outputs import whole_file
 
 if TYPE_CHECKING:
@@ -97,15 +97,10 @@ def figure_names(study: Study | None = None) -> tuple[str, ...]:
     return tuple(sorted(name for name in names if study is None or get_figure(name).when(study)))
 
 
-def angle_unit(study: Study) -> str:
-    """Unit of angles in figures: that of the study or, where it names none, of the user."""
-    return study.angle_unit or attitude_unit()
-
-
 def caption(name: str, study: Study) -> str:
     """Caption of a figure, with the unit of angles in this study."""
     figure = get_figure(name)
-    with angles_in(angle_unit(study)):
+    with angles_in(study.angle_unit):
         return f"{figure.caption}\n{angle_note()}." if figure.angles else figure.caption
 
 
@@ -122,7 +117,7 @@ def draw(name: str, tables: Tables, study: Study) -> Figure:
 
     from accelstudy.drawing.style import STYLE
 
-    with mpl.rc_context(STYLE), angles_in(angle_unit(study)):  # type: ignore[arg-type]
+    with mpl.rc_context(STYLE), angles_in(study.angle_unit):  # type: ignore[arg-type]
         return get_figure(name).draw(tables, study)
 
 
