@@ -70,7 +70,7 @@ def effects(
     from accelstudy.basics.units import angle_note
 
     if campaign is None and scheme is None:
-        click.echo("\n".join(listed()))
+        click.echo(listed())
         say(f"\n{angle_note()}.")
         return
     if campaign is not None and scheme is not None:
@@ -99,23 +99,18 @@ def effects(
     )
 
 
-def listed() -> Iterator[str]:
-    """Lines on effects of the sensor and of the rig, noise effects and gross errors.
+def listed() -> str:
+    """Text on effects of the sensor and of the rig, noise effects and gross errors.
 
     Parameters and typical sizes are in the units shown to people, settings in SI as specs have
     them.
     """
     from accelstudy.api.catalogues import catalogue
 
-    for part in ("sensor", "rig"):
-        yield from (f"Effects of the {part}", "")
-        effects = catalogue("effects")
-        yield from _items(effects[effects["part"] == part])
-        yield ""
-    yield from ("Noise effects", "")
-    yield from _items(catalogue("noise effects"))
-    yield from ("", "Gross errors", "")
-    yield from _items(catalogue("gross errors"))
+    effects = dict(iter(catalogue("effects").groupby("part")))
+    parts = {f"Effects of the {part}": effects[part] for part in ("sensor", "rig")}
+    parts |= {name.capitalize(): catalogue(name) for name in ("noise effects", "gross errors")}
+    return "\n\n".join("\n".join([f"{head}\n", *_items(rows)]) for head, rows in parts.items())
 
 
 def _items(table: pd.DataFrame) -> Iterator[str]:
