@@ -179,8 +179,8 @@ def schemes(
                 "rank": f"{determined.rank}/{len(determined.parameter_names)}",
                 "condition": f"{determined.condition:.1f}" if determined.estimable else "-",
                 "r": determined.redundancy,
-                "m": f"{determined.fourth_moment:.4f}",
-                f"pole/{attitude_unit()}": f"{to_attitude(determined.pole_distance):.1f}",
+                "m": f"{chosen.fourth_moment:.4f}",
+                f"pole/{attitude_unit()}": f"{to_attitude(chosen.pole_distance):.1f}",
                 "not estimable": ", ".join(determined.not_estimable),
             }
         )

@@ -39,8 +39,6 @@ class Estimability:
     rank : int, of the design matrix at the ideal sensor
     condition : float, of the design matrix with columns of unit length; inf if singular
     redundancy : int, r = conditions − unknowns
-    fourth_moment : float, m = ⟨x²y²⟩ of the directions, mean over the three pairs of axes
-    pole_distance : float, rad, smallest angle of a direction to the x axis, where roll is undefined
     not_estimable : tuple of str, parameters that the scheme cannot determine
     reason : str, why; empty if all is estimable
     cofactors : (u, u) array, Q_xx of linear theory at the given parameters; NaN if not estimable
@@ -50,8 +48,6 @@ class Estimability:
     rank: int
     condition: float
     redundancy: int
-    fourth_moment: float
-    pole_distance: float
     not_estimable: tuple[str, ...]
     reason: str
     cofactors: Array
@@ -139,8 +135,6 @@ def estimability(
         rank=rank,
         condition=condition,
         redundancy=len(a) - len(names),
-        fourth_moment=scheme.fourth_moment,
-        pole_distance=scheme.pole_distance,
         not_estimable=not_estimable,
         reason=reason,
         cofactors=cofactors,
