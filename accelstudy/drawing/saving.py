@@ -62,7 +62,9 @@ def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str,
     return text[text.index("<svg") :]
 
 
-def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
+def save_all(
+    figures: Mapping[str, Callable[[], Figure]], folder: Path, dpi: int = PAGE_DPI
+) -> dict[str, str]:
     """Draw the figures of a page and write them under their names; returns elements for the page.
 
     If a figure fails, the others are drawn all the same. A line on the page and a warning on stderr
@@ -72,17 +74,18 @@ def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[
     ----------
     figures : mapping of name to a function that draws the figure
     folder : Path
+    dpi : int, of the PNG
     """
-    return {name: _element(draw, folder, name) for name, draw in figures.items()}
+    return {name: _element(draw, folder, name, dpi) for name, draw in figures.items()}
 
 
-def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
+def _element(draw: Callable[[], Figure], folder: Path, name: str, dpi: int) -> str:
     """Return the element of one figure, or what is said in its place."""
     try:
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = draw()
         _simplify(figure)
-        return save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, PAGE_DPI)
+        return save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, dpi)
     except OSError:  # such as a full disk, which is no failure of the figure
         raise
     except Exception as error:

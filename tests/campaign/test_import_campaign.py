@@ -9,6 +9,7 @@ import yaml
 from calling import succeed
 from log_helpers import G, session, write
 from scipy.io import savemat
+from stand_ins import drawn
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
@@ -108,7 +109,10 @@ def test_settings_are_overlaid(tmp_path):
 
 def test_command(log, tmp_path, monkeypatch):
     out = tmp_path / "campaign"
-    result = succeed("import", log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G)
+    with drawn():
+        result = succeed(
+            "import", log, "--out", out, "--rate", 100, "--name", "mine", "--gravity", G
+        )
     assert "holds: 8, of 2.6 to 2.6 s" in result.stdout
     assert "times the noise floor" in result.stdout
     campaign = read_campaign(out)
@@ -118,11 +122,13 @@ def test_command(log, tmp_path, monkeypatch):
     assert campaign.sigma_force == pytest.approx(expected.sigma_force)
     svg = (out / "segmentation.svg").read_bytes()
     assert (out / "segmentation.png").stat().st_size > 1e4
-    succeed("import", log, "--out", out, "--rate", 100, "--force")
+    with drawn():
+        succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert (out / "segmentation.svg").read_bytes() == svg
     # A figure that fails takes the campaign not with it, and leaves no older one behind.
     monkeypatch.setattr(segmentation_figure, "draw_segmentation", lambda *_: 1 / 0)
-    result = succeed("import", log, "--out", out, "--rate", 100, "--force")
+    with drawn():
+        result = succeed("import", log, "--out", out, "--rate", 100, "--force")
     assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in result.stderr
     assert not list(out.glob("segmentation.*"))
     np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)

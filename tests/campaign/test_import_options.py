@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from calling import call, refusal, succeed
 from log_helpers import RATE, G, open_log, session, shared, write
+from stand_ins import drawn
 
 from accelstudy.api.campaigns import files_of
 from accelstudy.basics.units import GON
@@ -137,12 +138,18 @@ def test_temperature_vibration_and_range(tmp_path, turned):
 
 
 def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, turned, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(segmentation_figure, "save", lambda figure, *_: drawn.append(figure))
+    figures, draw = [], segmentation_figure.draw_segmentation
+
+    def keep(*given):
+        figures.append(draw(*given))
+        return figures[0]
+
+    monkeypatch.setattr(segmentation_figure, "draw_segmentation", keep)
     raw = turned[0] / 0.001 + [33000, 33100, 32900]
     settings = parse_settings({"rate_hz": RATE, "unit": "counts", "scale": 0.001})
-    import_to(tmp_path / "out", write(tmp_path, raw), settings)
-    low, high = drawn[0].axes[0].dataLim.intervaly
+    with drawn():
+        import_to(tmp_path / "out", write(tmp_path, raw), settings)
+    low, high = figures[0].axes[0].dataLim.intervaly
     assert -30 < low < -5
     assert 5 < high < 30
 
@@ -185,12 +192,13 @@ def test_holds_are_left_out_and_joined(tmp_path, turned, by):
     path = write(tmp_path, bumped)
     span = f"{edges[6, 0] / RATE:.2f}s-{edges[6, 1] / RATE:.2f}s:somebody passed"
     both = "4,5" if by == "number" else "{:.2f}s-{:.2f}s".format(*edges[3] / RATE)
-    result = succeed(
-        "import",
-        *(path, "--out", tmp_path / "out", "--rate", 100, "--join", both),
-        *("--exclude", "2:moved", "--exclude", span),
-        *("--settings", settings(tmp_path, "shortest_s: 0.2")),
-    )
+    with drawn():
+        result = succeed(
+            "import",
+            *(path, "--out", tmp_path / "out", "--rate", 100, "--join", both),
+            *("--exclude", "2:moved", "--exclude", span),
+            *("--settings", settings(tmp_path, "shortest_s: 0.2")),
+        )
     assert "left out: 2 holds: 2 (moved), 8 (somebody passed)" in result.stdout
     campaign = read_campaign(tmp_path / "out")
     assert campaign.positions.tolist() == [1, 3, 4, 6, 7, 9]

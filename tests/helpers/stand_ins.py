@@ -10,7 +10,7 @@ ELEMENT, SAVE = saving._element, saving.save
 STAND_IN = "<svg></svg>"
 
 
-def element(_, folder, name):
+def element(_, folder, name, dpi=0):
     """Write files in place of a figure, and return the element that stands for it on the page."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.svg").write_text(STAND_IN, encoding="utf-8")

@@ -119,7 +119,7 @@ def hold_table(log: Recording, parts: Mapping[int, Parts]) -> pd.DataFrame:
         start, end = slices[0].start, slices[-1].stop
         row = {"start": start, "end": end, "t0": log.time[start], "t1": log.time[end - 1]}
         row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
-        row |= dict(zip(SDS, np.sqrt(np.diag(np.cov(forces, rowvar=False))), strict=True))
+        row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
         for name in log.conditions:
             values = np.concatenate([log.samples[name].to_numpy()[part] for part in slices])
             power = 2 if name == "vibration" else 1

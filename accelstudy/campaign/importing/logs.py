@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -140,10 +141,14 @@ def import_each(
     for name, (campaign, holds) in campaigns.items():
         write_campaign(campaign, folders[name])
         if figure and holds is not None:
-            from accelstudy.campaign.importing.segmentation_figure import render_segmentation
+            # Matplotlib takes longer to import than a log of usual length to read.
+            from accelstudy.campaign.importing import segmentation_figure
+            from accelstudy.drawing.saving import save_all
+            from accelstudy.drawing.style import DPI
 
             offset = holds.means[0] - campaign.whole.forces[0]
-            render_segmentation(holds, folders[name], offset)
+            draw = partial(segmentation_figure.draw_segmentation, holds, offset)
+            save_all({"segmentation": draw}, folders[name], DPI)
     return campaigns
 
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import failure
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.windows import Windows
-from accelstudy.drawing.saving import save
-from accelstudy.drawing.style import DPI, FULL, INK, STYLE, new_figure
+from accelstudy.drawing.style import FULL, INK, new_figure
 
 Array = NDArray[np.float64]
 
@@ -27,7 +22,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _THRESHOLD = "#CC79A7"
 _SHADE = "#DCE6F0"
 _LEFT_OUT: dict[str, Any] = {"facecolor": "#F2E4E4", "hatch": "////", "edgecolor": "#B08080"}
-_SPANS = 1200
+_SPANS = 1000
 """Spans of time in which a log is drawn, about as many as a page can show."""
 _DIGITS = 130
 """Digits that fit beside each other; if there are more, only every second, third … number is
@@ -45,49 +40,32 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
     used = ~holds.table.index.isin([*holds.left_out])
     ends = holds.table[["t0", "t1"]].to_numpy()
     middle = (edges[:-1] + edges[1:]) / 2
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        figure = new_figure(FULL, 90)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-        for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
-            _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
-        _band(below, middle, low[:, 3], high[:, 3], INK, None)
-        if holds.size is None:
-            label = f"threshold {holds.threshold.sd:.2g} m/s²"
-            below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
-        kind = "static hold" if holds.size is None else "block"
-        kept, lost = counted(int(used.sum()), kind), f"{len(holds.left_out)} left out"
-        looks = [(used, kept, {"color": _SHADE}), (~used, lost, _LEFT_OUT)]
-        for shaded, label, look in looks[: 2 if holds.left_out else 1]:
-            for ax, shown in ((above, label), (below, None)):
-                whole = ax.get_xaxis_transform()
-                common = {"transform": whole, "linewidth": 0, "zorder": 0.5, "label": shown}
-                between = np.resize([1, 0], max(0, 2 * shaded.sum() - 1))
-                ax.stairs(between, ends[shaded].ravel(), fill=True, **common, **look)
-        _number(above, holds)
-        above.set_ylabel("specific force / (m/s²)")
-        what = "time / s" if holds.size is None else "sample"
-        below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
-        below.set_xlim(0, edges[-1])
-        below.yaxis.set_minor_locator(NullLocator())
-        figure.legend(loc="outside upper center", ncols=6)
-        figure.align_ylabels()
+    figure = new_figure(FULL, 90)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
+        _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
+    _band(below, middle, low[:, 3], high[:, 3], INK, None)
+    if holds.size is None:
+        label = f"threshold {holds.threshold.sd:.2g} m/s²"
+        below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
+    kind = "static hold" if holds.size is None else "block"
+    kept, lost = counted(int(used.sum()), kind), f"{len(holds.left_out)} left out"
+    looks = [(used, kept, {"color": _SHADE}), (~used, lost, _LEFT_OUT)]
+    for shaded, label, look in looks[: 2 if holds.left_out else 1]:
+        for ax, shown in ((above, label), (below, None)):
+            whole = ax.get_xaxis_transform()
+            common = {"transform": whole, "linewidth": 0, "zorder": 0.5, "label": shown}
+            between = np.resize([1, 0], max(0, 2 * shaded.sum() - 1))
+            ax.stairs(between, ends[shaded].ravel(), fill=True, **common, **look)
+    _number(above, holds)
+    above.set_ylabel("specific force / (m/s²)")
+    what = "time / s" if holds.size is None else "sample"
+    below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
+    below.set_xlim(0, edges[-1])
+    below.yaxis.set_minor_locator(NullLocator())
+    figure.legend(loc="outside upper center", ncols=6)
+    figure.align_ylabels()
     return figure
-
-
-def render_segmentation(holds: Holds, folder: Path, offset: Array | float = 0.0) -> None:
-    """Draw the segmentation and write it as segmentation.svg and .png.
-
-    If the figure fails, the import goes on: a warning on stderr says why there is no figure.
-    """
-    svg, png = folder / "segmentation.svg", folder / "segmentation.png"
-    try:
-        save(draw_segmentation(holds, offset), svg, png, "Static holds", DPI)
-    except (OSError, InputError):  # such as a full disk, which is not the figure's fault
-        raise
-    except Exception as error:
-        for path in (svg, png):  # of an import before
-            path.unlink(missing_ok=True)
-        failure("The figure 'segmentation' could not be drawn", error)
 
 
 def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
