@@ -18,9 +18,9 @@ from accelstudy.basics.units import angles_in
 from accelstudy.files.outputs import cannot_write
 from accelstudy.files.reading import config_hash
 
-# A job ends soon and makes few cycles. Python would look for them after 700 new objects, again and
-# again, and already while modules are imported, for a tenth of the time that this takes.
-gc.set_threshold(50_000)
+# A job ends soon and makes few cycles. Python would look for them again and again while modules are
+# imported, which make a quarter of a million objects, and while a figure is drawn.
+gc.set_threshold(500_000)
 
 _NOT_OURS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "free some space"),
