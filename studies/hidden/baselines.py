@@ -23,10 +23,8 @@ from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-LEVEL = 0.05
-"""Level of all tests together, with Bonferroni's correction for the number of shapes."""
-MOST = 2
-"""Effects that a forward selection adds, as many as a diagnosis names."""
+LEVEL = 0.05  # level of all tests together, with Bonferroni's correction for the number of shapes
+MOST = 2  # effects that a forward selection adds, as many as a diagnosis names
 FOLDS = 5
 
 Answer = tuple[bool, list[str]]

@@ -34,8 +34,7 @@ from studies.hidden.physics.kinds import EFFECTS, GROSS_EFFECTS, OUTPUTS, Cause,
 from studies.hidden.physics.measuring import Sensor
 from studies.hidden.physics.oracle import Oracle
 
-Spans = NDArray[np.int_]
-"""First sample of each hold, and the one after its last, (n, 2)."""
+Spans = NDArray[np.int_]  # first sample of each hold, and the one after its last, (n, 2)
 
 (BUMPED,) = GROSS_EFFECTS
 PUT: Mapping[str, Kind] = {
@@ -95,12 +94,6 @@ class Donor:
         """Noise of a position mean, m/s², as the residuals of the log itself have it."""
         left = residuals(self.oracle(self.spans), means_of(self.forces, self.spans))
         return float(np.sqrt(np.sum(left**2) / self.redundancy))
-
-    def at(self, course: Course | None) -> Donor:
-        """The same log at another temperature."""
-        other = copy(self)
-        other.course = course
-        return other
 
     def oracle(self, spans: Spans, sigma: float = 1.0) -> Oracle:
         """All that holds can show; what the log has by itself is absorbed."""
@@ -261,7 +254,8 @@ def changed_log(log: Donor, case: LogCase, seed: np.random.SeedSequence) -> tupl
     """Put effects into a log, and import it."""
     rng = np.random.default_rng(seed)
     if any("temperature" in PUT[name].needs for name in case.effect) or not case.effect:
-        log = log.at(_course(float(log.time[-1]), rng))
+        log = copy(log)
+        log.course = _course(float(log.time[-1]), rng)
     causes = [log.drawn(name, lam, rng) for name, lam in zip(case.effect, case.lam, strict=True)]
     campaign, holds = import_log(*log.changed(causes, bool(case.recorded)))
     truth = Truth(tuple(map(HiddenEffect.of, causes)))

@@ -21,8 +21,7 @@ from studies.hidden.physics.generate import Truth
 from studies.hidden.real_logs import PUT, Donor, LogCase, changed_log
 from studies.hidden.study import Study
 
-FEWEST = 5
-"""Redundancy of a log, below which nothing is put into it."""
+FEWEST = 5  # redundancy of a log, below which nothing is put into it
 
 
 class Log(Block):
@@ -78,12 +77,11 @@ class RealNoiseConfig(Study):
             names = tuple(effects.split("+"))
             if log.own and (len(names) > 1 or names[0] in log.own):
                 continue
+            set_, both = ("one", (True, False)) if len(names) == 1 else ("two", (True,))
             lacking = {need for name in names for need in PUT[name].needs}
             lacking -= {"time"} if log.timed else set()
-            both = (True, False) if len(names) == 1 else (True,)
             for size in self.sizes:
                 for recorded in both if lacking else (None,):
-                    set_ = "one" if len(names) == 1 else "two"
                     lam = (size,) * len(names)
                     yield LogCase(set_, name, effect=names, lam=lam, recorded=recorded), 0
 

@@ -28,13 +28,10 @@ from studies.hidden.physics.kinds import EFFECTS, OUTSIDE, UNFORESEEN
 from studies.hidden.physics.measuring import NOISES
 from studies.hidden.physics.oracle import oracle, visible_outside
 
-Session = tuple[str, str, bool]
-"""Design, approach and whether sigma is given."""
-Numbered = tuple[Case, int]
-"""A case, and the number of the campaign among those of the case."""
+Session = tuple[str, str, bool]  # design, approach and whether sigma is given
+Numbered = tuple[Case, int]  # a case, and the number of the campaign among those of the case
 
-CAMPAIGNS = Range(1, 1_000_000)
-"""Campaigns of a study; the most take days of computing."""
+CAMPAIGNS = Range(1, 1_000_000)  # of a study; the most take days of computing
 JOB = 1600
 """Campaigns in one job: minutes of work, so that it does not matter that each job starts Python and
 looks which session can show what."""
@@ -78,8 +75,7 @@ KINDS: Mapping[str, tuple[Collection[str], Callable[[str, str], Collection[str]]
 }
 """Kinds that each set may have, and those that make sense in a design by an approach."""
 SEVERAL = {"two": distinct_pairs, "three": distinct_triples}
-SETS = ("nothing", *KINDS, *SEVERAL)
-"""Blocks of campaigns."""
+SETS = ("nothing", *KINDS, *SEVERAL)  # blocks of campaigns
 
 
 Row = dict[str, Any]

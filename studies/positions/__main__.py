@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
-import matplotlib as mpl
 import pandas as pd
 
 from accelstudy.basics.progress import track
-from accelstudy.drawing.saving import save
-from accelstudy.drawing.style import DPI, STYLE
+from accelstudy.drawing.saving import save_all
 from studies.positions import efficiency, stopping
 
 
 def main(folder: Path) -> None:
     """Write the tables and figures of both studies to a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
     settings = track(stopping.SETTINGS, "sessions")
     sessions = pd.concat([stopping.simulate(*each) for each in settings], ignore_index=True)
-    sessions.to_parquet(folder / "sessions.parquet")
-    made = {
-        "efficiency": (efficiency.efficiency_table(), efficiency.efficiency_figure),
-        "stopping": (stopping.summary_table(sessions), stopping.stopping_figure),
-    }
-    for name, (rows, draw) in made.items():
+    summary, table = stopping.summary_table(sessions), efficiency.efficiency_table()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, rows in (("sessions", sessions), ("stopping", summary), ("efficiency", table)):
         rows.to_parquet(folder / f"{name}.parquet")
-        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-            figure = draw(rows)
-        save(figure, folder / f"{name}.svg", folder / f"{name}.png", name.capitalize(), DPI)
+    figures = {
+        "stopping": partial(stopping.stopping_figure, summary),
+        "efficiency": partial(efficiency.efficiency_figure, table),
+    }
+    save_all(figures, folder)
 
 
 if __name__ == "__main__":

@@ -25,10 +25,8 @@ CRITERIA = {"D": ("#0072B2", "o"), "A": ("#009E73", "s"), "I": ("#D55E00", "D")}
 """Colour and marker of each criterion."""
 TASKS = [Task(get_model(NINE), get_approach(name)) for name in ("gravity", "robot")]
 SCHEMES = [get_scheme(name) for name in scheme_names()]
-POSITIONS = (9, 12, 18, 24, 36)
-"""Numbers of positions of the I-optimal designs beside the schemes."""
-SEED = 1
-"""Of the search for the designs."""
+POSITIONS = (9, 12, 18, 24, 36)  # of the I-optimal designs beside the schemes
+SEED = 1  # of the search for the designs
 
 
 def efficiency_table(

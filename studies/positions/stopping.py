@@ -29,30 +29,20 @@ from accelstudy.drawing import style
 from accelstudy.leveling.angles import angles_of, tilt_slope
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import NINE, get_model
-from accelstudy.sequential.choice import (
-    DEFAULTS,
-    Chooser,
-    Knowledge,
-    candidates,
-    typical_sizes,
-)
+from accelstudy.sequential import choice
 from accelstudy.sequential.promise import Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
-MODEL = get_model(NINE)
-"""Of the sensor and of the calibration."""
+MODEL = get_model(NINE)  # of the sensor and of the calibration
 FIXED = get_scheme("mclaren-24")
 TILT_RANGE = 30 * units.GON
 NOISE = Noise()
-PLACING = 2 * units.GON
-"""Sd per axis by which positions miss the chosen attitudes."""
-MOST_POSITIONS = 120
-"""With which a session ends in any case."""
+PLACING = 2 * units.GON  # sd per axis by which positions miss the chosen attitudes
+MOST_POSITIONS = 120  # with which a session ends in any case
 SEED = 1
-ROUNDING = 1e-9
-"""Relative excess over the promise that is rounding."""
+ROUNDING = 1e-9  # relative excess over the promise that is rounding
 
 
 def plain(omega: ArrayLike, redundancy: int) -> Array:
@@ -105,10 +95,10 @@ def simulate(
     cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
     error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
     promise = Promise(multiple * float(error.rms_of_all(cofactors).max()), TILT_RANGE)
-    directions = candidates(DEFAULTS[approach])
+    directions = choice.candidates(choice.DEFAULTS[approach])
     rows = position_rows(MODEL, get_approach(approach), NOISE, directions)
-    sizes = typical_sizes(MODEL, MODEL.n_parameters)
-    chooser = Chooser(directions, rows, error, promise, RULES[rule][0], sizes)
+    sizes = choice.typical_sizes(MODEL, MODEL.n_parameters)
+    chooser = choice.Chooser(directions, rows, error, promise, RULES[rule][0], sizes)
     # All rules share the random numbers, to be compared.
     name = hashlib.sha256(f"{MODEL.name} {approach} {multiple}".encode()).digest()
     entropy = [seed, int.from_bytes(name[:8], "big")]
@@ -117,10 +107,20 @@ def simulate(
     truth = np.exp(rng.uniform(low, high, (sessions, len(low))))
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
-    known, _ = _known(approach, forces, angles)
     last: list[Array | None] = [None] * sessions
-    rms, going, ended = np.full((sessions, 2), np.inf), np.ones(sessions, dtype=bool), []
-    while going.any():
+    going, ended = np.ones(sessions, dtype=bool), []
+    while True:
+        known, result = _known(approach, forces, angles)
+        rms, n = np.array([chooser.rms(each) for each in known]), forces.shape[1]
+        kept = chooser.promise.reached(rms)
+        over = np.flatnonzero(going & (kept | (n == most_positions)))
+        going[over] = False
+        if len(over):
+            assert result is not None  # so many positions determine the model
+            outcome = _outcome(chooser, rule, result, truth, over)
+            ended.append(outcome.set_index(over).assign(kept=kept[over], positions=n))
+        if not going.any():
+            break
         chosen = [chooser.choose(*each) for each in zip(known, rms, last, strict=True)]
         taken = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
         taken /= np.linalg.norm(taken, axis=1, keepdims=True)
@@ -130,15 +130,6 @@ def simulate(
         angle = angle + MODEL.reading_errors(angle, truth)
         angle = angle + NOISE.sigma_angle * rng.standard_normal(angle.shape)
         forces, angles = np.hstack([forces, force]), np.hstack([angles, angle])
-        known, result = _known(approach, forces, angles)
-        rms = np.array([chooser.rms(each) for each in known])
-        kept, n = chooser.promise.reached(rms), forces.shape[1]
-        over = np.flatnonzero(going & (kept | (n == most_positions)))
-        going[over] = False
-        if len(over):
-            assert result is not None  # so many positions determine the model
-            outcome = _outcome(chooser, rule, result, truth, over)
-            ended.append(outcome.set_index(over).assign(kept=kept[over], positions=n))
     table = pd.concat(ended).sort_index()
     table[LABELS] = approach, rule, multiple, promise.accuracy
     return table
@@ -146,7 +137,7 @@ def simulate(
 
 def _known(
     approach: str, forces: Array, angles: Array
-) -> tuple[list[Knowledge], Adjustment | None]:
+) -> tuple[list[choice.Knowledge], Adjustment | None]:
     """What each session tells so far, and the calibrations if there are enough conditions."""
     sigmas = NOISE.sigma_force, NOISE.sigma_angle
     observed = Observations(forces, sigmas[0], angles, sigmas[1], units.STANDARD_GRAVITY)
@@ -157,14 +148,14 @@ def _known(
     for i, of_readings in enumerate(rows):
         if result is not None and result.converged[i]:
             information = Information.of_covariance(result.cofactors[i])
-            known.append(Knowledge(information, True, float(result.omega[i]), redundancy))
+            known.append(choice.Knowledge(information, True, float(result.omega[i]), redundancy))
         else:
-            known.append(Knowledge(Information.of(of_readings), False, np.nan, redundancy))
+            known.append(choice.Knowledge(Information.of(of_readings), False, np.nan, redundancy))
     return known, result
 
 
 def _outcome(
-    chooser: Chooser, rule: str, result: Adjustment, truth: Array, over: NDArray[np.int_]
+    chooser: choice.Chooser, rule: str, result: Adjustment, truth: Array, over: NDArray[np.int_]
 ) -> pd.DataFrame:
     """Results of sessions that have ended with as many positions, one row each."""
     r, cofactors, omega = result.redundancy, result.cofactors[over], result.omega[over]
@@ -181,8 +172,7 @@ def _outcome(
     for what, rows in (("parameters", np.eye(len(ideal))), ("angles", slopes)):
         sigmas = np.sqrt(np.sum(rows @ cofactors * rows, axis=2))
         outcome[f"{what}_inside"] = np.mean(abs(delta @ rows.T) <= width * sigmas, axis=1)
-    true = np.array([chooser.error.rms_of_all(each) for each in cofactors])
-    outcome[["true_roll", "true_pitch"]] = true
+    outcome[["true_roll", "true_pitch"]] = np.array([*map(chooser.error.rms_of_all, cofactors)])
     outcome[["actual_roll", "actual_pitch"]] = chooser.error.rms(delta)
     return outcome
 

@@ -11,8 +11,7 @@ from studies.hidden.physics.geometry import GRAVITY, Array, level_force
 from studies.hidden.physics.kinds import Kind
 from studies.hidden.physics.measuring import Sensor, observe
 
-STEP = 1e-5
-"""rad, of numerical derivatives by the angles."""
+STEP = 1e-5  # rad, of numerical derivatives by the angles
 
 
 class Conditions:
@@ -80,8 +79,7 @@ class Conditions:
         return np.asarray(white.reshape(len(forces), -1))
 
 
-VISIBLE = 3e-3
-"""Share of an effect that must be left, or it cannot be seen."""
+VISIBLE = 3e-3  # share of an effect that must be left, or it cannot be seen
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ import numpy as np
 from accelstudy.basics.units import MGON
 from studies.hidden.physics.geometry import GRAVITY, Array, joints_of, level_force, rotated
 
-REFERENCE = 20.0
-"""°C, at which bias and scale have their stated values."""
+REFERENCE = 20.0  # °C, at which bias and scale have their stated values
 
 
 @dataclass(frozen=True)
@@ -239,7 +238,6 @@ _DESIGNS: dict[str, Callable[[np.random.Generator], Session]] = {
 }  # fmt: skip
 
 DESIGNS = tuple(_DESIGNS)
-"""Names of the designs."""
 APPROACHES = ("gravity", "robot")
 
 

@@ -121,8 +121,7 @@ class Truth:
     p_known: float = nan
 
 
-ARRIVAL = 5e-4
-"""rad, sd of the joints about the attitudes of the design."""
+ARRIVAL = 5e-4  # rad, sd of the joints about the attitudes of the design
 
 
 def generate(
@@ -199,8 +198,7 @@ def left_of(knowing: Oracle, sensor: Sensor, output: Array, reading: Array) -> A
     return knowing.conditions.seen(corrected[None], reading[None])[0]
 
 
-DRAWS = 200
-"""Draws of an effect until one is as it should be."""
+DRAWS = 200  # draws of an effect until one is as it should be
 
 
 def drawn(

@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665
-"""m/s², at the place of all sessions."""
+GRAVITY = 9.80665  # m/s², at the place of all sessions
 
 
 def in_turned_frame(vectors: Array, axis: int, angle: ArrayLike) -> Array:

@@ -16,10 +16,8 @@ from studies.hidden.physics.geometry import GRAVITY, Array
 Random = np.random.Generator
 Changed = tuple[Campaign, dict[str, float]]
 
-LEAST = 100.0
-"""Noncentrality of a bumped hold, at least."""
-FAR = 0.3 * GRAVITY
-"""m/s², least difference of the forces of exchanged rows, or nothing would show."""
+LEAST = 100.0  # noncentrality of a bumped hold, at least
+FAR = 0.3 * GRAVITY  # m/s², least difference of the forces of exchanged rows, or nothing would show
 
 # What a number in the file would be for one in its header's unit.
 FORCE_UNITS = (1 / STANDARD_GRAVITY, 1e3 / STANDARD_GRAVITY, STANDARD_GRAVITY)

@@ -22,28 +22,14 @@ import yaml
 from studies.hidden.physics.designs import REFERENCE, Session
 from studies.hidden.physics.geometry import GRAVITY, Array, flange_force
 
-Place = tuple[str, str]
-"""Coordinate and target of a function."""
+Place = tuple[str, str]  # coordinate and target of a function
 
-OUTPUTS = ("bias", "scale", "output", "clipping")
-"""Targets of the sensor: what its output gains, by the force along its axes or, in the end, by the
-output itself."""
-RIG: Mapping[str, Array | float] = {
-    "gravity": 0.0,
-    "tilt": np.zeros(2),
-    "skew": 0.0,
-    "deflection": 0.0,
-    "mounting": np.zeros(3),
-    "reading": 0.0,
-}
-"""Targets of the rig, as in an ideal one: gravity less the stated one, m/s²; tilt of the base, by
-which it sees g (a, b, −1) for g (0, 0, −1), (B, n, 2); turn of the roll axis against the pitch axis
-(B, n); attitude of the flange less that of the joints (B, n, 2); rotation of the sensor on it
-(B, n, 3); errors of the encoders (B, n, 2)."""
+_TABLE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text("utf-8"))
+OUTPUTS = tuple(_TABLE["sensor"])  # targets of the sensor
+RIG = {target: np.zeros(of["k"]) for target, of in _TABLE["rig"].items()}  # ideal
 OF_ROBOT = ("angle", "yaw", "move")
 """Coordinates that a campaign without the robot's angles does not have."""
-STILL = 0.02
-"""m/s², a step between holds that is too small for any effect."""
+STILL = 0.02  # m/s², a step between holds that is too small for any effect
 
 # --- formulas -------------------------------------------------------------------------------------
 
@@ -148,8 +134,7 @@ class Setting(NamedTuple):
     grid: Callable[[Session], Sequence[float]] = lambda x: ()
 
 
-FEWEST = 3
-"""Least number of holds on either side of a sudden change."""
+FEWEST = 3  # least number of holds on either side of a sudden change
 
 
 def _between_holds(x: Session, i: int, part: float) -> float:
@@ -278,21 +263,14 @@ class Cause:
         return np.asarray(eval(self.kind.code, VOCABULARY, names))
 
 
-_TABLE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text("utf-8"))
-
-
 def _kinds(group: str) -> dict[str, Kind]:
-    kinds = {}
+    kinds, targets = {}, _TABLE["sensor"] | _TABLE["rig"]
     for name, entry in _TABLE[group].items():
         settings = {key: setting(said) for key, said in entry.get("settings", {}).items()}
-        kinds[name] = Kind(
-            name, **_TABLE["targets"][entry["target"]] | entry | {"settings": settings}
-        )
+        kinds[name] = Kind(name, **targets[entry["target"]] | entry | {"settings": settings})
     return kinds
 
 
-EFFECTS, GROSS_EFFECTS = _kinds("catalogue"), _kinds("gross")
-"""What the catalogue knows, by name."""
+EFFECTS, GROSS_EFFECTS = _kinds("catalogue"), _kinds("gross")  # what the catalogue knows
 OUTSIDE, UNFORESEEN = _kinds("outside"), _kinds("unforeseen")
-NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}
-"""Effects that are not in the catalogue, by name."""
+NOWHERE: Mapping[str, Kind] = {**OUTSIDE, **UNFORESEEN}  # not in the catalogue

@@ -15,8 +15,7 @@ from studies.hidden.physics.kinds import Cause
 from studies.hidden.physics.measuring import Sensor
 from studies.hidden.physics.oracle import Verdict, oracle
 
-SCATTER = 0.25
-"""Sd of the logarithm of an effect's size, from sensor to sensor."""
+SCATTER = 0.25  # sd of the logarithm of an effect's size, from sensor to sensor
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ def lot_oracle(lot: LotCase, made: Sequence[tuple[Campaign, Truth]]) -> Verdict:
 
 def _of_type(lot: LotCase, rng: np.random.Generator) -> Mapping[str, Cause]:
     """Effects of the type with their typical parameters; sudden events have none."""
-    case = lot.case
-    knowing = oracle(case.design, case.approach)
+    case, knowing = lot.case, oracle(lot.case.design, lot.case.approach)
     known = {
         name: drawn(name, lam, knowing.conditions, knowing, rng)
         for name, lam, share in zip(case.effect, case.lam, lot.shares, strict=True)

@@ -68,8 +68,7 @@ def observe(session: Session, sensor: Sensor, causes: Sequence[Cause]) -> tuple[
     return output, session.joints + rig["reading"] + np.zeros((len(output), 1, 1))
 
 
-COARSE_SAMPLES = 64
-"""Samples that are drawn for the mean of a hold with coarse readings."""
+COARSE_SAMPLES = 64  # samples that are drawn for the mean of a hold with coarse readings
 Random = np.random.Generator
 
 

@@ -25,21 +25,15 @@ from studies.hidden.physics.measuring import Sensor, observe
 
 Class = tuple[str, ...]
 
-ROUNDING = 1e-12
-"""Share of the readings themselves up to which an effect is only their rounding."""
-ALIKE = 0.9999
-"""Canonical cosine from which on two effects are the same."""
+ROUNDING = 1e-12  # share of the readings themselves up to which an effect is only their rounding
+ALIKE = 0.9999  # canonical cosine from which on two effects are the same
 OUTSIDE_SHARE = 0.15
 """Least share that two effects of the catalogue leave of the noncentrality of one outside it."""
-DRAWS = 7
-"""Draws of an effect, most of which must be outside the catalogue."""
+DRAWS = 7  # draws of an effect, most of which must be outside the catalogue
 LEVEL = 0.05
-CREDIBLE = 0.9
-"""Probability with which a set of alternatives holds the truth."""
-SAME = 5e-5
-"""Largest one less the cosine of two directions of a pair that count as one."""
-SIMULATIONS = 4000
-"""Misclosures without any effect, for the level of the smallest p-value."""
+CREDIBLE = 0.9  # probability with which a set of alternatives holds the truth
+SAME = 5e-5  # largest one less the cosine of two directions of a pair that count as one
+SIMULATIONS = 4000  # misclosures without any effect, for the level of the smallest p-value
 
 
 @dataclass(frozen=True)
@@ -165,27 +159,25 @@ class Oracle:
         sizes : sequence of float, true noncentralities of what is missing
         """
         detected = bool(np.min(self._p_values(z)) < self.threshold)
-        if len(sizes) > 2:  # of which it would have to try too many
-            return Verdict(detected, (), ())
+        told, alternatives = tuple[Class, ...](), 0
         if len(sizes) == 2:
             pairs = self.pairs
             logs = _evidence(pairs.parts(z), pairs.dims, float(sum(sizes)))
             _, best = _most_probable(logs, pairs.starts)
-            both = self.classes[pairs.first[best]], self.classes[pairs.second[best]]
-            return Verdict(detected, both if detected else (), both)
-        # Where nothing is missing, or nothing of the catalogue, any usual size will do.
-        logs = _evidence(self.parts(z), self.dims, sizes[0] if sizes else 25.0)
-        names = [shape.effect.name for shape in self.shapes]
-        starts = np.array([names.index(name) for name in self.visible])
-        of_effects, best = _most_probable(logs, starts)
-        by_class: dict[Class, float] = {}
-        for i, log in zip(starts, of_effects, strict=True):
-            alike = self.classes[i]
-            by_class[alike] = float(np.logaddexp(by_class.get(alike, -np.inf), log))
-        p = np.sort(softmax([*by_class.values()]))[::-1]
-        alternatives = int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
-        one = (self.classes[best],)
-        return Verdict(detected, one if detected else (), one, alternatives)
+            told = self.classes[pairs.first[best]], self.classes[pairs.second[best]]
+        elif len(sizes) < 2:  # of three it would have to try too many
+            # Where nothing is missing, or nothing of the catalogue, any usual size will do.
+            logs = _evidence(self.parts(z), self.dims, sizes[0] if sizes else 25.0)
+            names = [shape.effect.name for shape in self.shapes]
+            starts = np.array([names.index(name) for name in self.visible])
+            of_effects, best = _most_probable(logs, starts)
+            told, by_class = (self.classes[best],), dict[Class, float]()
+            for i, log in zip(starts, of_effects, strict=True):
+                alike = self.classes[i]
+                by_class[alike] = float(np.logaddexp(by_class.get(alike, -np.inf), log))
+            p = np.sort(softmax([*by_class.values()]))[::-1]
+            alternatives = int(np.searchsorted(np.cumsum(p), CREDIBLE)) + 1
+        return Verdict(detected, told if detected else (), told, alternatives)
 
     def _p_values(self, z: Array) -> Array:
         return np.asarray(chdtrc(self.dims, self.parts(z)))

@@ -16,8 +16,7 @@ from studies.hidden.scoring.tables import SCORES, chosen, measure
 
 Frames = Mapping[str, pd.DataFrame]
 LINE: Mapping[str, Any] = {"color": style.INK, "linewidth": 0.8, "linestyle": "--"}
-APART = 0.2
-"""Least distance of two ticks, in the logarithm of the size per panel and inch."""
+APART = 0.2  # least distance of two ticks, in the logarithm of the size per panel and inch
 
 
 def figures(score: str, frames: Frames) -> dict[str, Callable[[], Figure]]:

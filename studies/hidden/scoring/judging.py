@@ -16,11 +16,8 @@ from studies.hidden.physics.oracle import CREDIBLE
 from studies.hidden.scoring.tables import SCORES
 from studies.hidden.study import Row, family_of
 
-Class = Collection[str]
-"""Names that mean the same in a campaign."""
-
-LARGE = 150.0
-"""λ from which on physics outside the catalogue must not get a name of the catalogue."""
+Class = Collection[str]  # names that mean the same in a campaign
+LARGE = 150.0  # λ from which on physics outside the catalogue must not get a name of the catalogue
 LEARNABLE, P_CLASSES = (SCORES["score"][name] for name in ("learnable", "p_classes"))
 
 

@@ -13,22 +13,15 @@ from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import origin, write_table
 from studies.hidden.baselines import METHODS
-from studies.hidden.campaigns import read_rows
-from studies.hidden.real_noise import RealNoiseConfig
-from studies.hidden.scoring.figures import figures
+from studies.hidden.campaigns import Config, read_rows
+from studies.hidden.scoring.figures import Frames, figures
 from studies.hidden.scoring.judging import P_CLASSES, all_true, judge, same_effects
 from studies.hidden.scoring.tables import SCORES, SETS, table
-from studies.hidden.study import HiddenConfig, Row
-
-Frames = Mapping[str, pd.DataFrame]
-Config = HiddenConfig | RealNoiseConfig
+from studies.hidden.study import Row
 
 
 def write_score(
-    config: Config,
-    inputs: Sequence[str],
-    outputs: Mapping[str, str],
-    provenance: Mapping[str, Any],
+    config: Config, inputs: Sequence[str], outputs: Mapping[str, str], made: Mapping[str, Any]
 ) -> str:
     """Score a study; returns the page.
 
@@ -37,13 +30,12 @@ def write_score(
     config : HiddenConfig or RealNoiseConfig
     inputs : paths of the rows of all jobs
     outputs : paths of the judged campaigns, of the page, and of the folder `figures`
-    provenance : see `accelstudy.files.tables.origin`
+    made : provenance, see `accelstudy.files.tables.origin`
     """
     judged = frames(read_rows(inputs), config)
-    page = score_page(config, judged, origin(provenance))
-    nested = (list, dict)
-    flat = judged["campaigns"].map(lambda v: json.dumps(v) if isinstance(v, nested) else v)
-    write_table(outputs["campaigns"], flat, provenance)
+    page = score_page(config, judged, origin(made))
+    flat = judged["campaigns"].map(lambda v: json.dumps(v) if isinstance(v, list | dict) else v)
+    write_table(outputs["campaigns"], flat, made)
     folder = Path(outputs["figures"])
     folder.mkdir(parents=True, exist_ok=True)
     save_all(figures(config.score, judged), folder)

@@ -22,8 +22,7 @@ from accelstudy.basics.shares import clopper_pearson, sigmas_95
 from accelstudy.basics.wording import words
 from studies.hidden.study import Row
 
-HERE = Path(__file__).parent
-SCORES = {name: yaml.safe_load((HERE / f"{name}.yaml").read_text("utf-8"))
+SCORES = {name: yaml.safe_load(Path(__file__).with_name(f"{name}.yaml").read_text("utf-8"))
           for name in ("score", "real")}  # fmt: skip
 SETS: Mapping[Any, str] = SCORES["score"]["sets"]
 Question = Mapping[str, Any] | str
