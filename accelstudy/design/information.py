@@ -87,10 +87,6 @@ class Information:
         """Whether all parameters are determined."""
         return rank_of(self.rows)[0] == self.rows.shape[1]
 
-    def condition(self, estimated: Sequence[int] | NDArray[np.int_]) -> float:
-        """Condition of the estimated parameters, in columns of unit length; inf if singular."""
-        return rank_of(self.rows[:, estimated])[1]
-
     def undetermined(self, estimated: Sequence[int] | NDArray[np.int_]) -> NDArray[np.bool_]:
         """Which of the estimated parameters are not determined."""
         return rank_of(self.rows[:, estimated])[2]

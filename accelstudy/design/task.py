@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 SPHERE = 300
 """Attitudes that stand for the whole sphere."""
 WELL_ABOVE_NOISE = 50.0
-"""Ratio of gravity to the noise of a reading, over the condition of positions, from which on their
-combinations of parameters show above noise without a closer look."""
+"""Where each combination of scaled parameters shows by so much, as a root mean square over the
+positions and over the relative noise of a reading, it shows above noise without a closer look."""
 LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 
 
@@ -185,8 +185,10 @@ class Task:
 
     def missing(self, directions: Array) -> str:
         """Why readings in positions do not determine the model; empty if they do."""
-        condition = self.information(directions).condition(np.flatnonzero(self.estimated))
-        if condition * self.noise.sigma_force < self.gravity / WELL_ABOVE_NOISE:
+        told = (self.information(directions).rows / self.scale)[:, self.estimated]
+        least = np.linalg.svd(told, compute_uv=False)[-1] if len(told) >= told.shape[1] else 0.0
+        noise = self.noise.sigma_force / self.gravity
+        if least > WELL_ABOVE_NOISE * noise * np.sqrt(len(directions)):
             return ""
         measured = directions
         if self.measured is not None:
