@@ -20,9 +20,7 @@ from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.files.reading import read_json, readable
 from accelstudy.files.validation import (
-    Finite,
     Gravity,
-    NotNegative,
     Number,
     ParameterSigma,
     ParameterValue,
@@ -185,20 +183,11 @@ class SensorCalibration:
         return forces, share
 
 
-class _Shown(BaseModel):
-    value: Finite
-    sigma: NotNegative | None
-    unit: str
-
-
 class _Parameter(BaseModel):
     name: str
     value: ParameterValue
     sigma: ParameterSigma | None
-    sigma_priori: ParameterSigma | None
-    sigma_posteriori: ParameterSigma | None
     unit: str
-    shown: _Shown
 
 
 def _regular(matrix: list[list[float]]) -> list[list[float]]:

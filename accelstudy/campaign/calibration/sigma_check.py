@@ -80,26 +80,25 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
         )
     sd = errors.std(axis=0, ddof=1)
     low, high = (sd * np.sqrt((n - 1) / special.chdtri(n - 1, p)) for p in (0.025, 0.975))
-    rows = []
-    for i, parameter in enumerate(model.parameters):
-        shown = {
-            "estimate": fit.parameters[i],
-            "sigma": fit.sigma[i],
-            "sd_empirical": sd[i],
-            "sd_ci95_low": low[i],
-            "sd_ci95_high": high[i],
-            "bias": errors[:, i].mean(),
+    shown = {
+        "estimate": fit.parameters,
+        "sigma": fit.sigma,
+        "sd_empirical": sd,
+        "sd_ci95_low": low,
+        "sd_ci95_high": high,
+        "bias": errors.mean(axis=0),
+    }
+    names, units = zip(*((p.name, p.unit) for p in model.parameters), strict=True)
+    factors = np.array([float(to_display(1.0, unit)) for unit in units])
+    return pd.DataFrame(
+        {
+            "parameter": names,
+            "unit": list(map(display_unit, units)),
+            **{key: values * factors for key, values in shown.items()},
+            "ratio": fit.sigma / sd,
+            "n_converged": n,
         }
-        rows.append(
-            {
-                "parameter": parameter.name,
-                "unit": display_unit(parameter.unit),
-                **{key: float(to_display(value, parameter.unit)) for key, value in shown.items()},
-                "ratio": float(fit.sigma[i] / sd[i]),
-                "n_converged": n,
-            }
-        )
-    return pd.DataFrame(rows)
+    )
 
 
 def what_it_finds(fit: CampaignFit) -> str:
