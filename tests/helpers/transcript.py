@@ -20,6 +20,8 @@ from places import ROOT
 # --- files as text -------------------------------------------------------------------------------
 
 LONG_NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.\d{9,}(?:[eE][-+]?\d+)?")
+OF_DIFFERENCES = r"_(se|gain)$|_error_simulated"
+"""Columns of standard errors and gains, which come from differences of nearly equal numbers."""
 ROWS = 40
 """Rows that are shown of a longer table; the line of a column tells of all rows."""
 BLOCKS = r"h\d|[duo]l|d[dt]|li|p|div|pre|br|table|tr|section|header|footer|figcaption|summary"
@@ -36,7 +38,12 @@ def masked(text, folder):
 
 
 def table_text(table):
-    """The columns of a table with what all rows say together, and rows evenly chosen."""
+    """The columns of a table with what all rows say together, and rows evenly chosen.
+
+    Of what comes from differences three digits are the same on all processors.
+    """
+    for name in table.columns[table.columns.str.contains(OF_DIFFERENCES)]:
+        table = table.assign(**{name: [float(f"{value:.3g}") for value in table[name]]})
     lines = [f"{len(table)} rows"]
     for name, column in table.items():
         numbers = pd.to_numeric(column, errors="coerce").astype(float)
