@@ -8,17 +8,22 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
 from tempfile import mkdtemp
-from time import time
+from types import ModuleType
 
 from accelstudy.basics.errors import InputError
 
+fcntl: ModuleType | None
+try:
+    import fcntl
+except ImportError:  # without locks, the leftovers of a killed run stay until somebody removes them
+    fcntl = None
+
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
-_LONGEST_RUN = 7 * 86400  # s; what is older was left by a run that was killed
 
 
 @dataclass(frozen=True)
@@ -211,20 +216,42 @@ def is_temporary(path: Path) -> bool:
 def _staging(near: Path) -> Iterator[Path]:
     """A private folder in `near` or, if that does not exist, in the nearest folder above it.
 
-    Its name cannot be predicted, so nobody can place a link there.
+    Its name cannot be predicted, so nobody can place a link there. It is locked while it is in use,
+    so the next run recognises the leftovers of a killed run and removes them.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
         raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
     for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
-        with suppress(FileNotFoundError):  # another run removes it, too
-            if left.stat().st_mtime < time() - _LONGEST_RUN:
-                shutil.rmtree(left, ignore_errors=True)
+        if (lock := _locked(left)) is not None:
+            shutil.rmtree(left, ignore_errors=True)
+            os.close(lock)
     stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
+    lock = _locked(stage)
     try:
         yield stage
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _locked(folder: Path) -> int | None:
+    """Descriptor that locks a temporary folder; None if it is in use, or cannot be locked."""
+    if fcntl is None:
+        return None
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        if os.fstat(descriptor).st_uid == os.geteuid():
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return descriptor
+    except OSError:
+        pass
+    os.close(descriptor)
+    return None
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 import errno
 import os
 import resource
-import time
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -206,17 +208,23 @@ def test_a_planted_link_is_not_followed(tmp_path):
     assert not (tmp_path / "out.csv").is_symlink()
 
 
-def test_what_a_killed_run_left_is_removed_after_a_week(tmp_path):
+def test_what_a_killed_run_left_is_removed(tmp_path):
     """But not what a run beside this one is writing."""
     with result_folder(tmp_path / "beside", CALIBRATION) as beside:
+        program = (
+            "import sys, time\nfrom accelstudy.files.outputs import whole_file\n"
+            f"with whole_file({str(tmp_path / 'file')!r}) as path:\n"
+            "    path.write_text('x'); print(path.parent, flush=True); time.sleep(60)"
+        )
+        with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
+            left = Path(process.stdout.readline().decode().strip())
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+        assert left.exists()
+        with whole_file(tmp_path / "file") as path:
+            path.write_text("whole")
+        assert not left.exists()
         write(beside, calibration_json="1")
-        left = tmp_path / ".accelstudy-0.part"
-        left.mkdir()
-        for age, stays in ((1, True), (8, False)):
-            os.utime(left, 2 * (time.time() - 86400 * age,))
-            with whole_file(tmp_path / "file") as path:
-                path.write_text("whole")
-            assert left.exists() == stays
     assert content(tmp_path) == {"file": b"whole", "beside/calibration.json": b"1"}
 
 
