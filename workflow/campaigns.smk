@@ -66,7 +66,7 @@ rule public:
     conda:
         "envs/accelstudy.yaml"
     params:
-        folder=BATCH.public_folder,
+        folder=lambda wildcards: BATCH.public_folder,
     message:
         "Download the public data {wildcards.public}"
     script:
