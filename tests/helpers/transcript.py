@@ -20,7 +20,7 @@ from places import ROOT
 # --- files as text -------------------------------------------------------------------------------
 
 LONG_NUMBER = re.compile(r"(?<![\w.])[-−]?\d+\.\d{9,}(?:[eE][-+]?\d+)?")
-OF_DIFFERENCES = r"_(se|gain)$|_error_simulated"
+OF_DIFFERENCES = r"_(?:se|gain)$|_error_simulated"
 """Columns of standard errors and gains, which come from differences of nearly equal numbers."""
 ROWS = 40
 """Rows that are shown of a longer table; the line of a column tells of all rows."""
