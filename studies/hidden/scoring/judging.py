@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.effects import effect_names
 from studies.hidden.physics.designs import DESIGNS, session
 from studies.hidden.physics.kinds import NOWHERE
 from studies.hidden.physics.oracle import CREDIBLE
@@ -100,7 +99,6 @@ def _judged(row: Row, own: Sequence[str]) -> Row:
         "explained": explained(row["fits"], row["design"]) if learned and true_noise else np.nan,
         "set_holds": any(hits),
         "set_names": len(in_set),
-        "set_has_noise": bool(in_set - {*effect_names()}),
         "set_posterior": sum(one["posterior"] for one in explanations),
         "explanation": "+".join(top["names"]),
         "top_posterior": top["posterior"],
