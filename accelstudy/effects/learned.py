@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.registry import Setting
 from accelstudy.effects.base import Effect, Parameter, get_effect, unlisted
-from accelstudy.effects.components import AXES, Number, multiply
+from accelstudy.effects.components import AXES, Number, Vector, multiply
 from accelstudy.effects.smooth import (
     EDGE,
     MIN_LENGTHS,
@@ -158,7 +158,7 @@ class Learned(Effect):
         return [p[i : i + size] for i in range(0, len(p), size)]
 
     def output(self, f, p, g, hold, xp):
-        """Return h, h f or h f², or what a tilt, a rotation or angles between the axes of h do."""
+        """Return what h of each component of the target adds."""
         if self.target == "reading":
             return super().output(f, p, g, hold, xp)
         parts, arguments = self._parts(p), self.arguments(f, (), hold)
@@ -167,14 +167,7 @@ class Learned(Effect):
             # Where nothing moved, or the position before is not known, it adds nothing.
             step = xp.abs(hold.step_x) + xp.abs(hold.step_y) + xp.abs(hold.step_z)
             h = [xp.sign(step) * h_i for h_i in h]
-        if self.target == "tilt":
-            return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
-        if self.target == "mounting":
-            return get_effect("mounting_rotation").output(f, tuple(h), g, hold, xp)
-        if self.target == "nonorthogonality":
-            return multiply(get_effect("nonorthogonality").axes(tuple(h), xp), f)
-        power = {"bias": 0, "scale": 1, "square": 2}[self.target]
-        return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
+        return added_by(self.target, h, f, g, hold, xp)
 
     def arguments(self, f: Sequence[Number], angles: Sequence[Number], hold: Any) -> list[Number]:
         """Coordinate of each component of the target."""
@@ -199,6 +192,18 @@ class Learned(Effect):
             return super().reading(angles, p, hold, xp)
         arguments = self.arguments((), angles, hold)
         return tuple(self._of(c, w, xp) for c, w in zip(arguments, self._parts(p), strict=True))
+
+
+def added_by(target: str, h: Sequence[Number], f: Vector, g: Number, hold: Any, xp: Any) -> Vector:
+    """Return what values h of the components of a target add to the output of the sensor."""
+    if target == "tilt":
+        return get_effect("base_tilt").output(f, tuple(h), g, hold, xp)
+    if target == "mounting":
+        return get_effect("mounting_rotation").output(f, tuple(h), g, hold, xp)
+    if target == "nonorthogonality":
+        return multiply(get_effect("nonorthogonality").axes(tuple(h), xp), f)
+    power = {"bias": 0, "scale": 1, "square": 2}[target]
+    return tuple(h_i * f_i**power for h_i, f_i in zip(h, f, strict=True))
 
 
 LENGTH = 0.6

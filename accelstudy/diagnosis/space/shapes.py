@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import Frame
 from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.diagnosis.space.signatures import Columns
-from accelstudy.effects import get_effect
+from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
     CYCLES,
     LENGTHS,
@@ -212,7 +212,7 @@ class _Coordinate:
     priors: Array
 
 
-TARGETS = ("bias", "scale", "square", "nonorthogonality", "mounting", "reading", "tilt")
+ANY_TARGET = tuple(TARGETS)
 """What may depend on anything that changes from hold to hold, whatever the attitude."""
 TURNING = ("mounting", "reading", "tilt")
 """Targets that turn the force, to which gravity alone is blind."""
@@ -237,15 +237,15 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
     yield _Coordinate("angle", ("reading",), angles, *_harmonics(angles))
     if hold.yaw is not None and np.ptp(hold.yaw) > 0:
         yaw = hold.yaw[:, None]
-        yield _Coordinate("yaw", TARGETS, yaw, *_harmonics(yaw))
+        yield _Coordinate("yaw", ANY_TARGET, yaw, *_harmonics(yaw))
     if hold.vibration is not None:
-        yield from smooth("vibration", TARGETS, hold.vibration[:, None])
+        yield from smooth("vibration", ANY_TARGET, hold.vibration[:, None])
     if hold.temperature is not None:
-        yield from smooth("temperature", TARGETS, hold.temperature[:, None])
+        yield from smooth("temperature", ANY_TARGET, hold.temperature[:, None])
     if getattr(hold, order) is None or np.ptp(hold.column(order)) == 0:
         return
     when = hold.column(order)
-    yield from smooth("time", TARGETS, when[:, None])
+    yield from smooth("time", ANY_TARGET, when[:, None])
     yield _Coordinate("time", ("bias",), when[:, None], *_waves(when))
     before = np.concatenate([f[:1], f[:-1]])
     yield from smooth("previous", ("bias", "scale"), before)
@@ -256,7 +256,7 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
         rates = np.diff(hold.temperature) / np.diff(when)
         last = np.append(rates[:1], rates)
         for rate in (last, (last + np.append(rates, rates[-1:])) / 2):
-            yield from smooth("dT/dt", TARGETS, rate[:, None])
+            yield from smooth("dT/dt", ANY_TARGET, rate[:, None])
 
 
 def _sines(values: Array) -> tuple[Array, Array]:
@@ -348,32 +348,17 @@ def less_its_mean(functions: Array) -> Array:
 
 def _change(h: Array, target: str, frame: Frame) -> Array:
     """Change of the output, (n, 3, l), by functions h (n, a, k) of a target."""
-    f = frame.sensed
-    if target == "bias":
-        return _each(h, 3)
+    f, n = frame.sensed, len(frame.sensed)
     if target == "bias of the others":
-        parts = np.zeros((len(f), 3, len(PAIRS), h.shape[2]))
+        parts = np.zeros((n, 3, len(PAIRS), h.shape[2]))
         for k, (i, j) in enumerate(PAIRS):
             parts[:, i, k] = h[:, j]
-        return parts.reshape(len(f), 3, -1)
-    if target in ("nonorthogonality", "mounting"):
-        # Each function is that of one of the three angles.
-        if target == "mounting":
-            turned = np.cross(np.eye(3), f[:, None])
-        else:
-            axes = np.array([get_effect(target).axes(tuple(e), np) for e in np.eye(3)])
-            turned = np.einsum("aij,nj->nai", axes, f)
-        return np.einsum("nai,nk->niak", turned, h[:, 0]).reshape(len(f), 3, -1)
-    if target == "scale":
-        return _each(h, 3) * f[..., None]
-    if target == "square":
-        return _each(h, 3) * f[..., None] ** 2
-    a, b, nothing = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
-    hold: Any = Columns(frame.hold, 1)
-    tilt = get_effect("base_tilt").output(
-        (nothing, nothing, nothing), (a, b), frame.solution.gravity, hold, np
-    )
-    return np.einsum("nac,nk->nack", np.stack(tilt, axis=1), h[:, 0]).reshape(len(f), 3, -1)
+        return parts.reshape(n, 3, -1)
+    units, hold = np.eye(len(TARGETS[target][0])), Columns(frame.hold, 1)
+    x, y, z = f.T[..., None]
+    shown = added_by(target, [*units], (x, y, z), frame.solution.gravity, hold, np)
+    by_unit = np.stack([np.broadcast_to(each, (n, len(units))) for each in shown], axis=1)
+    return np.asarray(by_unit @ _each(h, len(units)))
 
 
 def _each(h: Array, count: int) -> Array:
