@@ -38,7 +38,7 @@ CRITERIA = ("I", "D", "A", MINIMAX)
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Estimator:
     """A calibration whose errors count: what it estimates, and what it neglects.
 
     Attributes
@@ -111,13 +111,13 @@ class Criterion(ABC):
     ----------
     name : str
     text : str, what it minimises, for people
-    calibrations : tuple of Calibration, whose parameters the positions must determine
+    estimators : tuple of Estimator, whose parameters the positions must determine
     degree : int, of e^criterion as a function of the variances
     """
 
     name: str
     text: str
-    calibrations: tuple[Calibration, ...]
+    estimators: tuple[Estimator, ...]
     degree: int
 
     @abstractmethod
@@ -146,7 +146,7 @@ class Criterion(ABC):
 class Determinant(Criterion):
     """D: the volume of the confidence ellipsoid of the estimated parameters."""
 
-    calibrations: tuple[Calibration, ...]
+    estimators: tuple[Estimator, ...]
 
     name: str = "D"
     text: str = "determinant of the covariance matrix of the parameters"
@@ -154,15 +154,15 @@ class Determinant(Criterion):
     @property
     def degree(self) -> int:  # type: ignore[override]
         """The determinant has one of each parameter."""
-        return len(self.calibrations[0].estimated)
+        return len(self.estimators[0].estimated)
 
     def value(self, normal: Array) -> Array:
         """Log-determinant of the covariance matrix."""
-        return np.asarray(-np.linalg.slogdet(self.calibrations[0].part(normal))[1])
+        return np.asarray(-np.linalg.slogdet(self.estimators[0].part(normal))[1])
 
     def gradient(self, normal: Array) -> Array:
         """− N⁻¹."""
-        return -self.calibrations[0].cofactors(normal)
+        return -self.estimators[0].cofactors(normal)
 
 
 @dataclass(frozen=True)
@@ -176,20 +176,20 @@ class MeanSquare(Criterion):
 
     Attributes
     ----------
-    name, text, calibrations : see `Criterion`
+    name, text, estimators : see `Criterion`
     power : int, of the power mean
     """
 
     name: str
     text: str
-    calibrations: tuple[Calibration, ...]
+    estimators: tuple[Estimator, ...]
     power: int = 1
 
     degree = 1
 
     def squares(self, normal: Array) -> Array:
         """All mean squares, (a, ...)."""
-        each = [one.squares(*one.covariances(normal)) for one in self.calibrations]
+        each = [one.squares(*one.covariances(normal)) for one in self.estimators]
         return each[0] if len(each) == 1 else np.concatenate(each)
 
     def value(self, normal: Array) -> Array:
@@ -202,13 +202,13 @@ class MeanSquare(Criterion):
 
     def gradient(self, normal: Array) -> Array:
         """Derivative of the logarithm."""
-        errors = [one.covariances(normal) for one in self.calibrations]
-        squares = [one.squares(*at) for one, at in zip(self.calibrations, errors, strict=True)]
+        errors = [one.covariances(normal) for one in self.estimators]
+        squares = [one.squares(*at) for one, at in zip(self.estimators, errors, strict=True)]
         whole = np.concatenate(squares)
         relative = whole / whole.max()
         weights = relative ** (self.power - 1) / np.sum(relative**self.power) / whole.max()
         slope = np.zeros_like(normal)
-        for one, at in zip(self.calibrations, errors, strict=True):
+        for one, at in zip(self.estimators, errors, strict=True):
             own, weights = np.split(weights, [len(one.forms)])
             slope += one.gradient(*at, own)
         return slope
@@ -216,12 +216,12 @@ class MeanSquare(Criterion):
     @property
     def convex(self) -> Criterion:
         """The mean square of the estimated parameters."""
-        alone = (Calibration(each.estimated, each.forms) for each in self.calibrations)
-        return replace(self, calibrations=tuple(alone))
+        alone = (Estimator(each.estimated, each.forms) for each in self.estimators)
+        return replace(self, estimators=tuple(alone))
 
     def bound(self, convex: float) -> float:
         """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
-        one = self.calibrations[0]
+        one = self.estimators[0]
         if not len(one.neglected):
             return convex
         form, (rows, columns) = one.forms[0], one._block
@@ -244,14 +244,14 @@ def get_criterion(name: str, task: Task) -> Criterion:
     mean, own = angles.mean(axis=0)[None], np.diag(task.estimated * 1.0)[None]
     use = "roll and pitch over the tilt range"
     if name == "D":
-        return Determinant((Calibration(places, own),))
+        return Determinant((Estimator(places, own),))
     if name == DISCRIMINATE:
         first, second = (task.places(effect) for effect in task.neglected)
         return MeanSquare(
             name,
             "mean square of the sizes at which the two effects can be told from each other",
             tuple(
-                Calibration(np.array([*places, *rival, one]), np.diag(unit[one])[None])
+                Estimator(np.array([*places, *rival, one]), np.diag(unit[one])[None])
                 for mine, rival in ((first, second), (second, first))
                 for one in mine
             ),
@@ -265,7 +265,7 @@ def get_criterion(name: str, task: Task) -> Criterion:
     if name not in texts:
         raise UnknownNameError("criterion", name, (*CRITERIA, ROBUST))
     if name == ROBUST:
-        calibration = Calibration(places, mean, left, task.neglected_sigmas**2)
+        estimator = Estimator(places, mean, left, task.neglected_sigmas**2)
     else:
-        calibration = Calibration(places, {"I": mean, "A": own, MINIMAX: angles}[name])
-    return MeanSquare(name, texts[name], (calibration,), POWER if name == MINIMAX else 1)
+        estimator = Estimator(places, {"I": mean, "A": own, MINIMAX: angles}[name])
+    return MeanSquare(name, texts[name], (estimator,), POWER if name == MINIMAX else 1)

@@ -125,7 +125,7 @@ def undetermined(task: Task, criterion: Criterion, directions: Array) -> str:
     if reason := task.missing(directions):
         return reason
     information = task.information(directions)
-    if any(information.undetermined(each.estimated).any() for each in criterion.calibrations):
+    if any(information.undetermined(each.estimated).any() for each in criterion.estimators):
         return "they do not tell the two effects apart"
     return ""
 
@@ -133,7 +133,7 @@ def undetermined(task: Task, criterion: Criterion, directions: Array) -> str:
 def _check_determined(task: Task, criterion: Criterion, directions: Array, n: int) -> None:
     if reason := undetermined(task, criterion, directions):
         raise InputError(f"the allowed attitudes do not suffice: {reason}")
-    unknown = max(len(each.estimated) for each in criterion.calibrations)
+    unknown = max(len(each.estimated) for each in criterion.estimators)
     rank_before = int(np.linalg.matrix_rank(task.prior))
     least = -(-(unknown - rank_before) // task.approach.n_conditions)
     if n < least:
