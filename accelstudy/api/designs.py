@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from accelstudy.basics import bounds, units
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.given import path_of
-from accelstudy.basics.names import MAX_BYTES
+from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.wording import amount
 from accelstudy.design.spaces import attitudes
@@ -166,7 +166,7 @@ class Design(Result):
         """Write a file that becomes `place`, by which the scheme is named."""
         proposal = self.proposal
         extra = {"turn_about": proposal.axes} if proposal.axes else None
-        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: MAX_BYTES // 2] or "scheme"
+        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: MAX_NAME_BYTES // 2] or "scheme"
         kind = proposal.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {proposal.request.seed}"

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from accelstudy.basics.errors import InputError, shown
 
-MAX_BYTES = 100
+MAX_NAME_BYTES = 100
 """Bytes. Endings are added to a name, and the name of a file must stay below 255 bytes."""
 
 
 def path_name(text: str, otherwise: str) -> str:
     """Make the name of a file or folder of any text; `otherwise`, if it has no usable letter."""
-    name = re.sub(r"[^\w.-]+", "-", text).lstrip(".-").encode()[:MAX_BYTES]
+    name = re.sub(r"[^\w.-]+", "-", text).lstrip(".-").encode()[:MAX_NAME_BYTES]
     return name.decode(errors="ignore") or otherwise
 
 
@@ -26,15 +26,17 @@ def check_path_name(name: str) -> str:
     ------
     InputError
         If it has other characters than letters, digits, _, - and ., begins with - or ., or is
-        longer than `MAX_BYTES`.
+        longer than `MAX_NAME_BYTES`.
     """
     if not re.fullmatch(r"\w[\w.-]*", name):
         raise InputError(
             f"{shown(name)} cannot be the name of a folder; use letters, digits, _, - and ., and "
             "begin with a letter, a digit or _"
         )
-    if len(name.encode()) > MAX_BYTES:
-        raise InputError(f"{shown(name)} is too long for a folder; use at most {MAX_BYTES} letters")
+    if len(name.encode()) > MAX_NAME_BYTES:
+        raise InputError(
+            f"{shown(name)} is too long for a folder; use at most {MAX_NAME_BYTES} letters"
+        )
     return name
 
 

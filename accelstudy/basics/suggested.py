@@ -6,7 +6,7 @@ import os
 import shlex
 from pathlib import Path
 
-from accelstudy.basics.names import MAX_BYTES
+from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.plugins import loaded_files
 
 HERE = "calibration.json"
@@ -55,7 +55,7 @@ def new_name(folder: str | Path, what: str) -> Path:
     path = Path(folder)
     parts = [part for part in path.relative_to(path.anchor).parts if part != os.pardir]
     text = "".join(sign if sign.isprintable() else "-" for sign in "-".join([*parts, what]))
-    return Path(text.encode(errors="replace")[-2 * MAX_BYTES :].decode(errors="ignore"))
+    return Path(text.encode(errors="replace")[-2 * MAX_NAME_BYTES :].decode(errors="ignore"))
 
 
 def _of_campaign(

@@ -332,7 +332,7 @@ class Diagnosis:
         return sigma_holds(self.problem, self.final)
 
     @property
-    def more_than_noise(self) -> bool:
+    def exceeds_stated(self) -> bool:
         """Whether sigma is given, and the residuals of the final fit are larger than it allows."""
         return exceeds_stated(self.problem, self.final)
 

@@ -32,7 +32,7 @@ from pydantic_core import core_schema
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import MAX_BYTES
+from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files import validation as kinds
@@ -187,10 +187,10 @@ _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 def _own_name(name: str) -> str:
     if name in MODELS:
         raise InputError("is the name of a registered model; choose another")
-    if name == "all" or not re.fullmatch(_NAME, name) or len(name) > MAX_BYTES:
+    if name == "all" or not re.fullmatch(_NAME, name) or len(name) > MAX_NAME_BYTES:
         raise InputError(
             "is not a valid name: use letters, digits, _ and -, "
-            f"at most {MAX_BYTES} of them, and not `all`"
+            f"at most {MAX_NAME_BYTES} of them, and not `all`"
         )
     return name
 
@@ -431,7 +431,7 @@ class Study(Configuration):
         "replicates are enough: leave it out",
     }
 
-    study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=MAX_BYTES)] = Field(
+    study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=MAX_NAME_BYTES)] = Field(
         description="name; results go to results/<study>/"
     )
     seed: kinds.Seed = Field(description="seed of all random numbers")

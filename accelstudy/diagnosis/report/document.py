@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution, position_tests
 from accelstudy.basics import plugins
-from accelstudy.basics.names import MAX_BYTES
+from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
@@ -315,7 +315,9 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
         # The one model of the file's own is the one that the file stands for.
         added = [e.name for e in extended.effects[len(d.model.effects) :]]
         name = "-".join([study_name(models[0]), *added])
-        composed = {"extended" if name in MODELS or len(name) > MAX_BYTES else name: list(effects)}
+        composed = {
+            "extended" if name in MODELS or len(name) > MAX_NAME_BYTES else name: list(effects)
+        }
     noise: dict[str, Any] = {
         "sensor": {"sigma_mps2": d.sigma_position, "per": "position"},
         "gravity": {"sigma_mps2": d.campaign.sigma_gravity, "error_mps2": 0.0},
@@ -370,7 +372,7 @@ def study_holds(campaign: Campaign, model: SensorModel) -> dict[str, Any]:
 
 def study_name(name: str) -> str:
     """Return the name of a campaign as the name of a study: letters, digits, _ and - only."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:MAX_BYTES].strip("-_") or "campaign"
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:MAX_NAME_BYTES].strip("-_") or "campaign"
 
 
 def _truth(model: SensorModel, parameters: list[float]) -> dict[str, dict[str, Any]]:
