@@ -7,9 +7,10 @@ starts at the ideal one and stays near it, and positions that are far off get no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,8 +221,9 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     """
     conversion = campaign.nominal or conversion_of(campaign.unit)
     doubts = check_size(where, campaign.forces, campaign.gravity, campaign.unit, conversion)
-    gross = _of_all_positions(campaign, True, angle_unit) if campaign.angles is not None else []
-    for error in gross:
+    if campaign.angles is None:
+        return doubts
+    for error in _mendings(campaign, True, angle_unit):
         if error.name == "unit_error":
             raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
         if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
@@ -232,9 +234,7 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     return doubts
 
 
-def recognise(
-    campaign: Campaign, attitude: bool = True, angle_unit: str = "gon"
-) -> Recognised | None:
+def recognise(campaign: Campaign, attitude: bool = True) -> Recognised | None:
     """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
 
     Without the angles of a robot, swapped axes and exchanged rows do not show: they leave the norm
@@ -244,7 +244,6 @@ def recognise(
     ----------
     campaign : Campaign
     attitude : bool, whether to compare with the robot's angles, if there are any
-    angle_unit : str, of the numbers that these were read from
 
     Returns
     -------
@@ -255,70 +254,51 @@ def recognise(
     InputError
         If the forces are nowhere near gravity and no unit explains it.
     """
-    attitude = attitude and campaign.angles is not None
-    errors = _of_all_positions(campaign, attitude, angle_unit)
-    mended = errors[-1].campaign if errors else campaign
-    # A sensor that is mounted askew is no reason to reorder its positions.
-    mounted = _is_mounted(mended, attitude)
-    # A row that was not exchanged may still be wrong by itself.
-    for stage in (rows, outliers):
-        errors += _errors((stage,), mended, attitude, mounted)
-        mended = errors[-1].campaign if errors else campaign
-    of_mended = conversion_of("m/s^2")
-    check_size(f"{campaign.name}: fx, fy, fz", mended.forces, campaign.gravity, "m/s^2", of_mended)
-    return Recognised(tuple(errors)) if errors else None
+    errors = tuple(_mendings(campaign, attitude and campaign.angles is not None))
+    forces = errors[-1].campaign.forces if errors else campaign.forces
+    where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
+    check_size(where, forces, campaign.gravity, "m/s^2", si)
+    return Recognised(errors) if errors else None
 
 
-def _of_all_positions(campaign: Campaign, attitude: bool, angle_unit: str) -> list[Mending]:
-    """Gross errors that all positions have: a wrong unit, or wrong axes."""
-    errors: list[Mending] = []
-    everywhere = (axes, partial(units, angle_unit=angle_unit))
+def _mendings(campaign: Campaign, attitude: bool, angle_unit: str = "gon") -> Iterator[Mending]:
+    """Undo gross errors one after the other, first those that all positions have."""
+    everywhere = axes, partial(units, angle_unit=angle_unit)
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    for of_attitude in (False, True)[: 1 + attitude]:
-        mended = errors[-1].campaign if errors else campaign
-        errors += _errors(everywhere, mended, of_attitude)
-    return errors
+    for of_attitude in sorted({False, attitude}):
+        campaign = yield from _undo(RealSensor(campaign, of_attitude), *everywhere)
+    # A sensor that is mounted askew is no reason to reorder its positions.
+    mounted = RealSensor(campaign, attitude).is_askew
+    # A row that was not exchanged may still be wrong by itself.
+    for alone in (rows, outliers):
+        campaign = yield from _undo(RealSensor(campaign, attitude, mounted), alone)
 
 
-def _errors(
-    stage: tuple[Hypotheses, ...], campaign: Campaign, attitude: bool, mounted: bool = False
-) -> list[Mending]:
-    """Gross errors of a stage: the one whose mending helps most first, until none helps clearly."""
-    errors: list[Mending] = []
-    sensor, everywhere = RealSensor.of(campaign, attitude, mounted), axes in stage
-    while len(errors) < MAX_ERRORS:
-        if everywhere and sensor.distance.max() < MIN_GROSS_ERROR * sensor.gravity:
-            break
-        helps = []
-        mirrored = everywhere and RealSensor.of(campaign, attitude, mounted=True).mirrored
-        for hypotheses in stage:
-            for mending in hypotheses(campaign, sensor):
-                after = RealSensor.of(mending.campaign, attitude, mounted)
-                if _clear(mending, sensor, after, mirrored):
-                    helps.append((mending, after))
+def _undo(
+    sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Mending]]
+) -> Generator[Mending, None, Campaign]:
+    """Yield what helps most first, until nothing helps clearly; return the mended campaign."""
+    for _ in range(MAX_ERRORS):
+        helps = [
+            (mending, after)
+            for mending in chain.from_iterable(each(sensor) for each in hypotheses)
+            if _is_clear(mending, sensor, after := replace(sensor, campaign=mending.campaign))
+        ]
         if not helps:
             break
         least = min(after.misfit for _, after in helps)
         best, sensor = next(one for one in helps if one[1].misfit <= AS_GOOD * least)
-        errors.append(best)
-        campaign = best.campaign
-    return errors
+        yield best
+    return sensor.campaign
 
 
-def _is_mounted(campaign: Campaign, attitude: bool) -> bool:
-    """Whether most positions fit clearly better if the sensor may be mounted in any way."""
-    sensor = RealSensor.of(campaign, attitude)
-    if sensor.expected is None or sensor.usual < MIN_POSITION_ERROR * sensor.gravity:
-        return False
-    return MIN_RATIO * RealSensor.of(campaign, attitude, mounted=True).usual < sensor.usual
-
-
-def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bool) -> bool:
+def _is_clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
     """Whether a mending clearly improves what was clearly wrong; no sensor is mirrored."""
     if mending.left_out:
         return True
     if mending.changed is None:
-        if mirrored and mending.matrix is not None and np.linalg.det(mending.matrix) < 0:
+        turned_over = mending.matrix is not None and np.linalg.det(mending.matrix) < 0
+        if turned_over and before.free.is_mirrored:
             return after.misfit < before.misfit
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
@@ -332,9 +312,10 @@ def _clear(mending: Mending, before: RealSensor, after: RealSensor, mirrored: bo
 # --- What would mend a campaign, the simplest first -----------------------------------------------
 
 
-def axes(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+def axes(sensor: RealSensor) -> Iterator[Mending]:
     """Undo each of the 47 exchanges of axes that are likely; none shows without a robot."""
-    if sensor.expected is None:
+    campaign = sensor.campaign
+    if sensor.expected is None or campaign.angles is None or not sensor.is_far_off:
         return
     ideal = attitude_forces(campaign)
     # An ideal sensor with any bias is near enough to compare all quickly.
@@ -352,7 +333,6 @@ def axes(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
-    assert campaign.angles is not None
     exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
     yield Mending("axis_error", "roll and pitch of the robot are exchanged", exchanged)
 
@@ -386,25 +366,29 @@ def _axes_in_words(matrix: Array) -> str:
     return f"axes {wrong}: {words}"
 
 
-def units(campaign: Campaign, sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Mending]:
+def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Mending]:
     """Convert the forces, or the angles, as if they were in another unit."""
+    if not sensor.is_far_off:
+        return
+    campaign = sensor.campaign
     norm = usual_norm(campaign.forces) / campaign.gravity
     own = campaign.unit if campaign.unit in SENSOR_UNITS else "m/s^2"
     for stated in (own, "g" if own == "m/s^2" else "m/s^2"):
         for unit, factor in other_units(SENSOR_UNITS, "m/s^2", stated).items():
             if RIGHT_UNIT < factor * norm < 1 / RIGHT_UNIT:
                 instead = "" if stated == "m/s^2" else f", not in {stated}"
-                mended = turned(campaign, factor * np.eye(3))
+                matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
-                yield Mending("unit_error", reason, mended, factor * np.eye(3))
+                yield Mending("unit_error", reason, turned(campaign, matrix), matrix)
     if sensor.expected is not None:
         for unit, factor in other_units(ROBOT_UNITS, "rad", angle_unit).items():
             reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
             yield Mending("unit_error", reason, angles_times(campaign, factor))
 
 
-def rows(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+def rows(sensor: RealSensor) -> Iterator[Mending]:
     """Move each row that does not fit to the position where it fits; any number of rows."""
+    campaign = sensor.campaign
     if sensor.expected is None or not sensor.tells:
         return
     lost = sensor.usual > MAX_USABLE_ERROR * sensor.gravity
@@ -437,42 +421,28 @@ def _places(cost: Array, least: float) -> NDArray[np.int_]:
     total = cost**2 + least**2 * (1 - np.eye(len(cost)))
     if np.array_equal(np.argmin(total, axis=1), stay):
         return stay
-    from scipy.optimize import linear_sum_assignment  # slow to import, and seldom needed
+    from scipy import optimize, sparse  # slow to import, and seldom needed
 
-    places = linear_sum_assignment(total.T)[1]
-    for cycle in _cycles(places):
-        after = np.linalg.norm(cost[places[cycle], cycle])
-        if np.linalg.norm(cost[cycle, cycle]) < MIN_RATIO * after:
-            places[cycle] = cycle
-    return places
-
-
-def _cycles(places: NDArray[np.int_]) -> list[NDArray[np.int_]]:
-    """Positions that exchange their rows among each other."""
-    left, cycles = set(range(len(places))), []
-    while left:
-        cycle = [left.pop()]
-        while (following := int(places[cycle[-1]])) in left:
-            left.remove(following)
-            cycle.append(following)
-        cycles.append(np.array(cycle))
-    return cycles
+    places = optimize.linear_sum_assignment(total.T)[1]
+    exchanges = sparse.coo_array((np.ones(len(cost)), (stay, places)))
+    _, cycle = sparse.csgraph.connected_components(exchanges)
+    before, after = (np.bincount(cycle, cost[row, stay] ** 2) for row in (stay, places))
+    return np.where((before >= MIN_RATIO**2 * after)[cycle], places, stay)
 
 
-def outliers(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
+def outliers(sensor: RealSensor) -> Iterator[Mending]:
     """Leave out positions that are so wrong that they would spoil a calibration."""
+    campaign = sensor.campaign
     far = sensor.wrong & (sensor.distance > MAX_USABLE_ERROR * sensor.gravity)
     bumped = tuple(campaign.positions[far].tolist())
     if not sensor.tells or not 0 < len(bumped) <= campaign.n_positions // MIN_POSITIONS_PER_OUTLIER:
         return
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
-    free = RealSensor.of(campaign, sensor.expected is not None, mounted=True)
-    if free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
+    if sensor.free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
     sizes = comma_list([f"{size:.2g}" for size in sensor.distance[far]])
-    reason = f"position {comma_list([str(p) for p in bumped])} is wrong by {sizes} m/s^2"
-    if len(bumped) > 1:
-        reason = reason.replace("position", "positions", 1).replace(" is ", " are ", 1)
+    which, are = ("position", "is") if len(bumped) == 1 else ("positions", "are")
+    reason = f"{which} {comma_list([str(p) for p in bumped])} {are} wrong by {sizes} m/s^2"
     left = campaign.without(dict.fromkeys(bumped, reason))
     yield Mending("outlier_position", reason, left, left_out=bumped)
 
@@ -480,25 +450,70 @@ def outliers(campaign: Campaign, sensor: RealSensor) -> Iterator[Mending]:
 # --- How well a real sensor can fit a campaign ----------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RealSensor:
-    """A sensor that was fitted to most positions of a campaign.
+    """A sensor that is fitted robustly to most positions of a campaign.
 
     Attributes
     ----------
-    expected : (n, 3) array, m/s², what it reads in each position; None where only the norm is known
-    distance : (n,) array, m/s², of each reading from what it should be
-    gravity : float, m/s²
-    tells : bool, whether there are enough positions to say which of them are wrong
-    mirrored : bool, whether its axes are left-handed, as those of no sensor are, however mounted;
-        only of one that may be mounted in any attitude
+    campaign : Campaign
+    attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
+    mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
     """
 
-    expected: Array | None
-    distance: Array
-    gravity: float
-    tells: bool
-    mirrored: bool = False
+    campaign: Campaign
+    attitude: bool
+    mounted: bool = False
+
+    @property
+    def gravity(self) -> float:
+        """m/s²."""
+        return self.campaign.gravity
+
+    @cached_property
+    def free(self) -> RealSensor:
+        """The sensor that may be mounted in any attitude."""
+        return replace(self, mounted=True)
+
+    @cached_property
+    def _design(self) -> tuple[Array, Array]:
+        """Design (n, u), and what an ideal sensor lacks, (n, 3) or, of the norm alone, (n, 1)."""
+        g, conditions = self.gravity, _conditions(self.campaign)
+        if self.attitude:
+            ideal = attitude_forces(self.campaign)
+            design = np.stack([*ideal.T / g, np.ones(len(ideal)), *conditions], axis=1)
+            return design, (self.campaign.forces - ideal) / g
+        # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
+        x, y, z = unit = self.campaign.forces.T / g
+        columns = [*unit**2, x * y, y * z, z * x, *unit]
+        columns += [c * axis for c in conditions for axis in unit]
+        return np.stack(columns, axis=1), (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
+
+    @cached_property
+    def _fitted(self) -> Array:
+        """What of the lack a sensor explains, as large as that."""
+        return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
+
+    @cached_property
+    def expected(self) -> Array | None:
+        """What it reads in each position, (n, 3), m/s²; None where only the norm is known."""
+        if not self.attitude:
+            return None
+        return attitude_forces(self.campaign) + self.gravity * self._fitted
+
+    @cached_property
+    def distance(self) -> Array:
+        """Distance of each reading from what it should be, (n,), m/s²."""
+        if self.expected is not None:
+            return np.asarray(np.linalg.norm(self.campaign.forces - self.expected, axis=1))
+        squares = 1 - 2 * (self._design[1] - self._fitted)[:, 0]
+        return self.gravity * np.abs(np.sqrt(np.maximum(squares, 0)) - 1)
+
+    @property
+    def tells(self) -> bool:
+        """Whether there are enough positions to say which of them are wrong."""
+        n, u = self._design[0].shape
+        return n >= u + MIN_SPARE_POSITIONS
 
     @property
     def usual(self) -> float:
@@ -515,34 +530,31 @@ class RealSensor:
         """Which positions, (n,), do not fit."""
         return self.distance > MIN_RATIO * self.usual
 
-    @classmethod
-    def of(cls, campaign: Campaign, attitude: bool, mounted: bool = False) -> RealSensor:
-        """Fit a sensor, robustly.
+    @property
+    def is_far_off(self) -> bool:
+        """Whether a position is so far off that a unit or an axis can be wrong."""
+        return bool(self.distance.max() >= MIN_GROSS_ERROR * self.gravity)
 
-        Parameters
-        ----------
-        campaign : Campaign
-        attitude : bool, whether to compare with the robot's attitudes, or with gravity alone
-        mounted : bool, whether the sensor may be mounted in any attitude, with errors of any size
+    @property
+    def is_askew(self) -> bool:
+        """Whether most positions fit clearly better if it may be mounted in any attitude."""
+        if not self.attitude or self.usual < MIN_POSITION_ERROR * self.gravity:
+            return False
+        return MIN_RATIO * self.free.usual < self.usual
+
+    @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether its axes are left-handed, as those of no sensor are, however mounted.
+
+        Each axis has to show clearly, or its direction would be one of noise.
         """
-        g, conditions = campaign.gravity, _conditions(campaign)
-        share = np.inf if mounted else USUAL_SD
-        if not attitude:
-            # The norm of (I + D) f/g + c is 1: linear in the nine numbers of (I + D)ᵀ(I + D), c.
-            x, y, z = unit = campaign.forces.T / g
-            columns = [*unit**2, x * y, y * z, z * x, *unit]
-            columns += [c * axis for c in conditions for axis in unit]
-            design = np.stack(columns, axis=1)
-            lacking = (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
-            squares = 1 - 2 * (lacking - _robust(design, lacking, share))[:, 0]
-            return cls(None, g * np.abs(np.sqrt(np.maximum(squares, 0)) - 1), g, _tells(design))
-        ideal = attitude_forces(campaign)
-        columns = [*ideal.T / g, np.ones(len(ideal)), *conditions]
-        design, lacking = np.stack(columns, axis=1), (campaign.forces - ideal) / g
-        expected = ideal + g * _robust(design, lacking, share)
-        distance = np.linalg.norm(campaign.forces - expected, axis=1)
-        mirrored = mounted and _left_handed(design, expected / g, float(np.median(distance)) / g)
-        return cls(expected, distance, g, _tells(design), mirrored)
+        if self.expected is None:
+            return False
+        inverse = np.linalg.pinv(self._design[0])
+        matrix = (inverse @ self.expected)[:3] / self.gravity
+        error = self.usual / self.gravity * np.linalg.norm(inverse[:3], ord=2)
+        least = np.linalg.svd(matrix, compute_uv=False)[-1]
+        return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
 
 
 def attitude_forces(campaign: Campaign) -> Array:
@@ -550,23 +562,6 @@ def attitude_forces(campaign: Campaign) -> Array:
     assert campaign.angles is not None
     roll, pitch = campaign.angles.T
     return np.column_stack(specific_force(roll, pitch, campaign.gravity))
-
-
-def _left_handed(design: Array, expected: Array, noise: float) -> bool:
-    """Whether what a sensor reads is a mirror image of the forces, the first columns of a design.
-
-    Each axis has to show clearly, or its direction would be one of noise.
-    """
-    inverse = np.linalg.pinv(design)
-    matrix = (inverse @ expected)[:3]
-    error = noise * np.linalg.norm(inverse[:3], ord=2)
-    least = np.linalg.svd(matrix, compute_uv=False)[-1]
-    return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
-
-
-def _tells(design: Array) -> bool:
-    n, u = design.shape
-    return n >= u + MIN_SPARE_POSITIONS
 
 
 def _conditions(campaign: Campaign) -> list[Array]:
@@ -600,7 +595,3 @@ def _robust(design: Array, lacking: Array, share: float) -> Array:
         normal = design.T * weights @ design / n + np.eye(u) * max((usual / share) ** 2, 1e-12)
         parameters = np.linalg.solve(normal, design.T * weights @ lacking / n)
     return np.asarray(design @ parameters)
-
-
-Hypotheses = Callable[[Campaign, RealSensor], Iterator[Mending]]
-"""What would undo a gross error, for a campaign and the sensor that fits most of its positions."""
