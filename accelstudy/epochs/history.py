@@ -20,8 +20,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.wording import comma_list, counted
-from accelstudy.campaign.calibration.applying import SensorCalibration
-from accelstudy.campaign.calibration.device import KNOWN, USUAL
+from accelstudy.campaign.calibration.applying import KNOWN, USUAL, SensorCalibration
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Parameter

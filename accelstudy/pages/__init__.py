@@ -33,6 +33,7 @@ from accelstudy.basics.wording import (
     p_value,
     probability,
     quantity_text,
+    short_list,
     words,
 )
 from accelstudy.files.outputs import whole_file
@@ -155,6 +156,7 @@ def _environment(markup: bool) -> Environment:
         p=probability,
         p_value=p_value,
         quantity=quantity_text,
+        short_list=short_list,
         words=words,
     )
     environment.globals.update(

@@ -1,8 +1,8 @@
-"""Apply a calibration to readings, and level with it."""
+"""A calibration as it stays with the sensor: it is applied to readings, and levels with them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,8 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
-from accelstudy.effects import Effect, HoldConditions
+from accelstudy.effects import Course, Effect, HoldConditions
+from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.files.reading import read_json, readable
 from accelstudy.files.validation import (
     Gravity,
@@ -47,6 +48,16 @@ CORRELATION_TOLERANCE = 1e-6
 """Parts of a correlation by which a matrix may miss what it should be."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
+KNOWN = {"temperature": "temperature_degC", "time": "time_s", "vibration": "vibration_mps2"}
+"""Columns of `HoldConditions` that a device has, and the ranges of a calibration in them."""
+USUAL = {
+    "temperature": (REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE),
+    "time": (0.0, 0.0),
+    "vibration": (0.0, 0.0),
+}
+"""Ranges of a calibration that does not say its own."""
+LEVELS = 5
+"""Values of a condition that matters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +119,60 @@ class SensorCalibration:
     def drifts(self) -> tuple[str, ...]:
         """Effects that drift during the session; afterwards they keep their value at its end."""
         return tuple(effect.name for effect in self.model.effects if effect.drifts)
+
+    @property
+    def noise_of_reading(self) -> float:
+        """Noise of a reading, m/s²: the noise within the holds of the campaign.
+
+        If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
+        known.
+        """
+        sigmas = (self.content.get(f"sigma_{of}_mps2") for of in ("reading", "position"))
+        return next((sigma for sigma in sigmas if sigma is not None), 0.0)
+
+    def value(self, parameter: str) -> float:
+        """Value of a parameter, SI."""
+        return float(self.parameters[self.model.parameter_names.index(parameter)])
+
+    def check_device(self) -> None:
+        """Raise `InputError` if an effect needs a column that no device knows."""
+        for effect, column in unknown(self.needs):
+            what = "position before" if column.startswith("step_") else column
+            raise InputError(
+                f"{effect} depends on the {what}, which no device knows; calibrate without it"
+            )
+
+    def in_use(
+        self, forces: Array, columns: Collection[str], margin: float = 0.0
+    ) -> tuple[Array, HoldConditions]:
+        """Combine forces with conditions, spread over the ranges of the calibration.
+
+        The temperature is settled: what lags behind it is as warm.
+
+        Parameters
+        ----------
+        forces : (n, 3) array, m/s²
+        columns : names of what varies
+        margin : float, part of the width by which a range is left on either side
+
+        Returns
+        -------
+        forces, hold
+            (n k, 3) array, each force with each of k conditions, and these.
+        """
+        levels = []
+        for column, name in KNOWN.items():
+            low, high = self.ranges.get(name, USUAL[column])
+            more = margin * (high - low)
+            least = -np.inf if column == "temperature" else 0.0
+            count = LEVELS if high > low and column in columns else 1
+            levels.append(np.linspace(max(low - more, least), high + more, count))
+        grid = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
+        each = np.repeat(grid, len(forces), axis=0).T
+        conditions: dict[str, Any] = dict(zip(KNOWN, each, strict=True))
+        conditions |= dict.fromkeys(("step_x", "step_y", "step_z"), np.zeros(each.shape[1]))
+        course = Course(np.zeros(1), np.full(1, REFERENCE_TEMPERATURE))
+        return np.tile(forces, (len(grid), 1)), HoldConditions(**conditions, course=course)
 
     def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
         """Calibrated specific force of readings.
@@ -372,11 +437,6 @@ def needs_of(effects: Iterable[Effect]) -> tuple[tuple[str, str], ...]:
     )
 
 
-def noise_of_reading(calibration: SensorCalibration) -> float:
-    """Noise of a reading, m/s²: the noise within the holds of the campaign.
-
-    If that is unknown it is the noise of the mean of a hold, which is smaller; 0 if neither is
-    known.
-    """
-    sigmas = (calibration.content.get(f"sigma_{what}_mps2") for what in ("reading", "position"))
-    return next((sigma for sigma in sigmas if sigma is not None), 0.0)
+def unknown(needs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Effects that need a column that no device knows, of effects each with a column."""
+    return [(effect, column) for effect, column in needs if column not in KNOWN]

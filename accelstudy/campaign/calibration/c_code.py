@@ -19,7 +19,6 @@ from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.calibration.applying import RANGE_MARGIN, SensorCalibration, affine_form
-from accelstudy.campaign.calibration.device import in_use, must_be_known
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.effects.components import AXES
@@ -57,7 +56,7 @@ def c_header(calibration: SensorCalibration) -> str:
     InputError
         If an effect depends on what no device knows, or no force explains a reading.
     """
-    must_be_known(calibration.needs)
+    calibration.check_device()
     model, p, raw = calibration.model, calibration.parameters, calibration.conversion
     frame = calibration.usual_layout.axes
     # Counts lose no digits of a float if their offset is a whole number of them.
@@ -116,7 +115,7 @@ def _stages(calibration: SensorCalibration) -> list[_Stage]:
     """Stages of the output; the first is of the force in the sensitive axes."""
     model, g = calibration.model, calibration.gravity
     sizes = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
-    force, hold = in_use(calibration, sizes, model.hold_columns, RANGE_MARGIN)
+    force, hold = calibration.in_use(sizes, model.hold_columns, RANGE_MARGIN)
     stages = []
     for name, last in (("accel_output", False), ("accel_last", True)):
         specs = tuple(effect.spec for effect in model.effects if effect.last == last)

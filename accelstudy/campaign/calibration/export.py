@@ -9,12 +9,11 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
 from accelstudy.campaign.calibration.applying import SensorCalibration, affine_form
 from accelstudy.campaign.calibration.c_code import c_header
-from accelstudy.campaign.calibration.parameter_files import PX4
+from accelstudy.campaign.calibration.px4 import px4_losses, px4_parameters
 from accelstudy.sensors.sensor import not_affine
 
 Array = NDArray[np.float64]
 
-FORMS = ("c", "matrix", "px4")
 _WITHOUT_FORMULAS = (
     "calibration.json has the parameters with their sigmas, `--form c` the formulas; "
     "`accelstudy effects` lists those of all effects"
@@ -28,8 +27,8 @@ RETIRED = {
 """Forms of earlier versions, with what to do instead."""
 
 
-def device_matrix(calibration: SensorCalibration) -> Array:
-    """M (3, 4) with f = M · (raw, 1), from raw readings to m/s², both in the axes of the log.
+def matrix_text(calibration: SensorCalibration) -> str:
+    """Write M (3, 4) with f = M · (raw, 1), from raw readings to m/s², in the axes of the log.
 
     Raises
     ------
@@ -47,39 +46,29 @@ def device_matrix(calibration: SensorCalibration) -> Array:
         raise InputError(f"the model {model.name!r} with these parameters has no inverse")
     (k, bias), raw = affine, calibration.conversion
     linear = frame.matrix.T @ k @ calibration.mending @ frame.matrix * raw.scale
-    return np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
+    rows = np.column_stack([linear, -linear @ raw.offset - frame.matrix.T @ k @ bias])
+    return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
+
+
+WRITERS = {"c": c_header, "matrix": matrix_text, "px4": px4_parameters}
+"""Forms: a header in C99, plain 3 × 4 numbers, and a file of parameters."""
 
 
 def export(calibration: SensorCalibration, form: str) -> str:
-    """Text of a calibration in one of `FORMS`.
-
-    Parameters
-    ----------
-    calibration : SensorCalibration
-    form : one of `FORMS`
+    """Text of a calibration in one of the forms of `WRITERS`.
 
     Raises
     ------
     UnknownNameError, InputError
         If there is no such form, or it cannot hold the calibration.
-
-    Notes
-    -----
-    "c" is a header in C99. "matrix" has plain 3 × 4 numbers. "px4" is a file of parameters, in
-    which `losses` of the calibration are missing.
     """
     if form in RETIRED:
         raise InputError(f"form {form}: no longer a form; {RETIRED[form]}")
-    if form == "matrix":
-        rows = device_matrix(calibration)
-        return "".join(" ".join(f"{value: .12e}" for value in row) + "\n" for row in rows)
-    if form == "c":
-        return c_header(calibration)
-    if form == "px4":
-        return PX4(calibration).text
-    raise UnknownNameError("form", form, FORMS)
+    if form not in WRITERS:
+        raise UnknownNameError("form", form, WRITERS)
+    return WRITERS[form](calibration)
 
 
-def losses(calibration: SensorCalibration, form: str) -> tuple[str, ...]:
+def losses(calibration: SensorCalibration, form: str) -> list[str]:
     """What a form cannot hold of a calibration, a sentence each."""
-    return PX4(calibration).lost if form == "px4" else ()
+    return px4_losses(calibration) if form == "px4" else []

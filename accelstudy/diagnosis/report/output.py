@@ -11,8 +11,7 @@ import yaml
 
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import needs_of
-from accelstudy.campaign.calibration.device import unknown
+from accelstudy.campaign.calibration.applying import needs_of, unknown
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report import words
