@@ -62,7 +62,7 @@ test-processors-part: $(READY) ## run a few tests with the instructions of an ol
 	  repository/test_examples.py design/test_schemes.py repository/test_pole.py \
 	  simulation/test_simulation.py)
 
-test-cluster: $(READY) ## run the small configuration by a SLURM on this machine, and compare
+test-cluster: $(READY) ## run the small configuration as on a cluster with SLURM, and compare
 	python tests/helpers/cluster.py
 
 test-breaks: $(READY) ## break a copy of the package on purpose, and see that tests notice

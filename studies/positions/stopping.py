@@ -108,28 +108,31 @@ def simulate(
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
     last: list[Array | None] = [None] * sessions
-    going, ended = np.ones(sessions, dtype=bool), []
+    going, ended = np.arange(sessions), []  # numbers of the sessions that have not ended
     while True:
         known, result = _known(approach, forces, angles)
         rms, n = np.array([chooser.rms(each) for each in known]), forces.shape[1]
         kept = chooser.promise.reached(rms)
-        over = np.flatnonzero(going & (kept | (n == most_positions)))
-        going[over] = False
-        if len(over):
+        over = kept | (n == most_positions)
+        if over.any():
             assert result is not None  # so many positions determine the model
-            outcome = _outcome(chooser, rule, result, truth, over)
-            ended.append(outcome.set_index(over).assign(kept=kept[over], positions=n))
-        if not going.any():
+            outcome = _outcome(chooser, rule, result, truth[going], np.flatnonzero(over))
+            ended.append(outcome.set_index(going[over]).assign(kept=kept[over], positions=n))
+        if over.all():
             break
-        chosen = [chooser.choose(*each) for each in zip(known, rms, last, strict=True)]
-        taken = chooser.directions[chosen] + PLACING * rng.standard_normal((sessions, 3))
+        left = np.flatnonzero(~over)
+        going = going[left]
+        chosen = [chooser.choose(known[i], rms[i], last[i]) for i in left]
+        # Of each session, also of one that has ended: so they do not depend on what ends when.
+        drawn = [rng.standard_normal((sessions, k))[going] for k in (3, 3, 2)]
+        taken = chooser.directions[chosen] + PLACING * drawn[0]
         taken /= np.linalg.norm(taken, axis=1, keepdims=True)
         last, f_b = [*taken], -units.STANDARD_GRAVITY * taken[:, None]
         angle = angles_of(f_b)
-        force = MODEL.sense(f_b, truth) + NOISE.sigma_force * rng.standard_normal(f_b.shape)
-        angle = angle + MODEL.reading_errors(angle, truth)
-        angle = angle + NOISE.sigma_angle * rng.standard_normal(angle.shape)
-        forces, angles = np.hstack([forces, force]), np.hstack([angles, angle])
+        force = MODEL.sense(f_b, truth[going]) + NOISE.sigma_force * drawn[1][:, None]
+        angle = angle + MODEL.reading_errors(angle, truth[going])
+        angle = angle + NOISE.sigma_angle * drawn[2][:, None]
+        forces, angles = np.hstack([forces[left], force]), np.hstack([angles[left], angle])
     table = pd.concat(ended).sort_index()
     table[LABELS] = approach, rule, multiple, promise.accuracy
     return table

@@ -1,7 +1,6 @@
 """Plug-ins: a file or an installed package adds to the registries; what is wrong is one line."""
 
 import os
-import re
 import shutil
 import sys
 from pathlib import Path
@@ -129,25 +128,6 @@ def test_a_bad_one_is_one_line(case):
     line = refusal("--plugin", "bad.py", "effects")
     assert line.startswith("error: bad.py: ")
     assert reason in line
-
-
-def test_each_kind_of_thing_can_be_a_plug_in():
-    """The files that contributors are shown, as they stand."""
-    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    files = re.findall(r"`accelstudy/(\w+)/\w+\.py`:\n\n```python\n(.*?)```", page, re.DOTALL)
-    for room, text in files:
-        Path(f"{room}.py").write_text(text, encoding="utf-8")
-    plugins.load_files(f"{room}.py" for room, _ in files)
-    found = {
-        "effects.py": plugins.source_of("effect", "dead_zone"),
-        "noise_effects.py": plugins.source_of("noise effect", "shared_noise"),
-        "schemes.py": plugins.source_of("scheme", "cones-N"),
-        "approaches.py": plugins.source_of("approach", "turntable"),
-    }
-    assert found == {name: name for name in found}
-    assert [f"{room}.py" for room, _ in files] == [*found]
-    words = ("--model", "bias-scale+dead_zone(width=2)", "--approach", "turntable")
-    assert "cones-18" in succeed("schemes", "cones-18", *words).stdout
 
 
 def test_one_that_is_no_file_is_one_line():

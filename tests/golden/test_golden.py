@@ -4,11 +4,9 @@ Here the quick parts; `make golden` compares all of them.
 """
 
 import re
-import subprocess
-import sys
 
 import pytest
-from golden import compare, kept_of, same_number
+from golden import compare, kept_of, report, same_number
 from golden_parts import PAGES, PARTS, QUICK
 from places import ROOT
 from transcript import commands_of_page, masked
@@ -16,12 +14,12 @@ from transcript import commands_of_page, masked
 from accelstudy.commands.main import main
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("part", QUICK)
-def test_what_is_kept_still_comes_out(part):
-    script = [sys.executable, ROOT / "tests/helpers/golden.py", part]
-    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True)
-    said = f"{done.stdout}{done.stderr}"
-    assert not done.returncode, f"{said}\n`make golden-renew PART={part}` keeps what comes now"
+def test_what_is_kept_still_comes_out(part, capsys):
+    same = report(part)
+    said = capsys.readouterr().out
+    assert same, f"{said}\n`make golden-renew PART={part}` keeps what comes now"
 
 
 # --- what is kept --------------------------------------------------------------------------------

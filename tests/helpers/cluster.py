@@ -1,6 +1,7 @@
 """Run the smoke study by profiles/slurm and on this machine alone; the tables must be the same.
 
-`make test-cluster` runs it. SLURM is one of its own, on the loopback address, and ends with it.
+`make test-cluster` runs it. It needs no SLURM: a few commands stand in for those of one, and what
+they get submitted is a process of this machine.
 """
 
 import os
@@ -12,9 +13,8 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from one_machine_slurm import NoSlurmError, one_machine_slurm
+from places import ROOT
 
-ROOT = Path(__file__).parents[2]
 STUDY = [
     *(sys.executable, "-m", "snakemake", "--snakefile", ROOT / "Snakefile"),
     *("--workflow-profile", ROOT / "profiles" / "default"),
@@ -22,48 +22,65 @@ STUDY = [
 ]
 # It needs all the others.
 ALL_TABLES = "results/smoke/claims.parquet"
-# What the profile cannot know of this SLURM: it has no accounts, and jobs are short. With one job
-# in a submission, several of them run at once.
+# What the profile cannot know: there are no accounts, the cores are few, and jobs are short. With
+# one job in a submission, several of them run at once.
 BY_SLURM = [
-    *("--profile", ROOT / "profiles" / "slurm", "--slurm-no-account"),
-    *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "3"),
-    *("--slurm-keep-successful-logs", "--group-components"),
-    *("simulate=1", "results=100000"),
-    *("--cores", str(min(2, os.cpu_count() or 1))),
+    *("--profile", ROOT / "profiles" / "slurm", "--slurm-no-account", "--jobs", "2"),
+    *("--slurm-init-seconds-before-status-checks", "3", "--group-components"),
+    *("simulate=1", "results=100000", "--cores", str(min(2, os.cpu_count() or 1))),
 ]
+STAND_INS = {
+    "sbatch": r"""
+        while [ $# -gt 0 ]; do
+          case $1 in --output) log=$2 ;; --wrap=*) job=${1#--wrap=} ;; esac
+          shift
+        done
+        log=$(printf %s "$log" | sed "s/%j/$$/")
+        export SLURM_JOB_ID=$$
+        echo RUNNING >"$QUEUE/$$"
+        { sh -c "$job" && end=COMPLETED || end=FAILED; echo $end >"$QUEUE/$$"; } >"$log" 2>&1 &
+        echo $$
+    """,
+    "sacct": """cd "$QUEUE" && grep -H . * | tr : '|'""",
+    "sinfo": "echo all*",
+    "srun": """while [ "${1#-}" != "$1" ]; do shift; done; exec "$@" """,
+}
+"""The commands that the profile's executor calls: a job has the number of its `sbatch`, and a file
+of this name in $QUEUE has its state."""
 
 
 def main() -> None:
-    """Exit with 0 if all is the same, with 1 if not, and with 2 without SLURM."""
-    # Sockets lie in it, and the path of one is at most 107 characters long.
-    folder = Path(tempfile.mkdtemp(prefix="accelstudy-slurm-", dir="/tmp"))
-    for name in ("slurm", "by-slurm", "alone"):
-        (folder / name).mkdir()
+    """Exit with 0 if all is the same, and with 1 if not."""
+    folder = Path(tempfile.mkdtemp(prefix="accelstudy-slurm-"))
     try:
-        with one_machine_slurm(folder / "slurm") as environment:
-            run([*STUDY, *BY_SLURM], folder / "by-slurm", environment)
+        run([*STUDY, *BY_SLURM], folder / "by-slurm", with_stand_ins(folder / "slurm"))
         alone = [*STUDY, "--cores", str(os.cpu_count()), "--", ALL_TABLES]
         run(alone, folder / "alone", dict(os.environ))
         different = differences(folder / "by-slurm", folder / "alone")
-    except NoSlurmError as error:
-        shutil.rmtree(folder)
-        print(error, file=sys.stderr)
-        raise SystemExit(2) from None
     except BaseException:
         print(f"what was run, and the logs, stay in {folder}", file=sys.stderr)
         raise
     if different:
-        sys.exit(
-            "not the same by SLURM and without, in {}: {}".format(folder, ", ".join(different))
-        )
-    submissions = len(list((folder / "by-slurm").glob(".snakemake/slurm_logs/**/*.log")))
+        sys.exit(f"not the same by SLURM and without, in {folder}: {', '.join(different)}")
+    submissions = len(list((folder / "slurm" / "queue").iterdir()))
     tables = len(list((folder / "alone").rglob("*.parquet")))
     print(f"{tables} tables are the same by SLURM, in {submissions} submissions, and without")
     shutil.rmtree(folder)
 
 
+def with_stand_ins(folder: Path) -> dict[str, str]:
+    """Environment in which the commands of SLURM are the stand-ins, written to a new folder."""
+    (folder / "queue").mkdir(parents=True)
+    for name, script in STAND_INS.items():
+        (folder / name).write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+        (folder / name).chmod(0o755)
+    path = f"{folder}:{os.environ['PATH']}"
+    return {**os.environ, "PATH": path, "QUEUE": str(folder / "queue")}
+
+
 def run(command: list[str | Path], folder: Path, environment: dict[str, str]) -> None:
-    """Run a study in a folder; the process ends with one line if it fails."""
+    """Run a study in a new folder; the process ends with one line if it fails."""
+    folder.mkdir()
     if subprocess.run(command, cwd=folder, env=environment, check=False).returncode:
         sys.exit(f"failed: {' '.join(map(str, command))}")
 

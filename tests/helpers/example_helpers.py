@@ -1,31 +1,15 @@
 """Run the examples as their reader would, in a folder of their own.
 
-    python tests/helpers/example_helpers.py        # writes anew what docs/tutorials shows of them
-
-Commands of accelstudy and Python scripts run in this process, which starts no other for them; what
-else a reader types, the shell runs. A sweep runs without Snakemake, by the same functions.
+python tests/helpers/example_helpers.py        # writes anew what docs/tutorials shows of them
 """
 
-import contextlib
-import io
-import os
 import re
-import runpy
-import shlex
 import shutil
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
-from unittest import mock
 
-from click.testing import CliRunner
 from places import ROOT
-from plugin_helpers import forgotten
-from study_helpers import run_study
-
-from accelstudy.commands.main import main
-from accelstudy.files.reading import overlay, read_layer
+from transcript import Shell, commands_of_script
 
 EXAMPLES = ROOT / "examples"
 SHOWN = ROOT / "docs" / "tutorials" / "shown"
@@ -44,77 +28,16 @@ def sections(example):
     """Commands of each section of an example's commands.sh, {name: [command]}."""
     text = (EXAMPLES / example / "commands.sh").read_text(encoding="utf-8")
     found = re.findall(r"\[start:(\w+)\]\n(.*?)# --8<-- \[end:\1\]", text, re.DOTALL)
-    return {
-        name: [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
-        for name, block in found
-    }
+    return {name: commands_of_script(block) for name, block in found}
 
 
 def run_example(example, folder):
-    """Run an example in an empty folder.
-
-    Returns
-    -------
-    {section: output}, warnings included
-    """
+    """Run an example in an empty folder; what a terminal shows by section."""
     shutil.copytree(EXAMPLES / example, folder, dirs_exist_ok=True)
-    with contextlib.chdir(folder):
-        return {
-            name: "".join(output_of(command, str(folder)) for command in commands)
-            for name, commands in sections(example).items()
-        }
-
-
-def output_of(command, folder):
-    """Run a command that a reader types, and forget what it registered; what it prints."""
-    with only_in(folder):
-        return _output_of(command)
-
-
-def _output_of(command):
-    program, *arguments = shlex.split(command)
-    if program == "cd":
-        os.chdir(arguments[0])
-        return ""
-    if program == "accelstudy":
-        arguments, _, file = (" ".join(map(shlex.quote, arguments))).partition(" '>' ")
-        result = CliRunner().invoke(main, shlex.split(arguments))
-        if result.exit_code:
-            raise RuntimeError(f"{command}: {result.output}") from result.exception
-        if file:
-            Path(file).write_text(result.stdout, encoding="utf-8")
-            return result.stderr
-        return result.output
-    if program == "python":
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed), mock.patch.object(sys, "argv", arguments):
-            runpy.run_path(arguments[0], run_name="__main__")
-        return printed.getvalue()
-    if program == "snakemake":
-        content = overlay(read_layer("config/config.yaml"), read_layer(arguments[-1]))
-        results = Path("results", content["study"])
-        results.mkdir(parents=True)
-        run_study(results, **content)
-        return ""
-    return subprocess.run(command, shell=True, check=True, capture_output=True, text=True).stdout
-
-
-@contextlib.contextmanager
-def only_in(folder):
-    """Let a script import its neighbours, and forget with it what they registered."""
-    import matplotlib.pyplot as plt
-
-    before = set(sys.modules)
-    sys.path.insert(0, folder)
-    try:
-        with forgotten():
-            yield
-    finally:
-        sys.path.remove(folder)
-        for name in set(sys.modules) - before:
-            if (getattr(sys.modules[name], "__file__", None) or "").startswith(folder):
-                del sys.modules[name]
-        plt.close("all")
+    shell = Shell(folder)
+    return {
+        name: "".join(map(shell.output, commands)) for name, commands in sections(example).items()
+    }
 
 
 def written_anew():

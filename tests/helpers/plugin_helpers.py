@@ -10,8 +10,16 @@ from accelstudy.effects import base as effects
 from accelstudy.noise_effects import base as noise_effects
 from accelstudy.schemes import registry as schemes
 from accelstudy.sensors import models
+from accelstudy.study.figures import registry as figures
 
-REGISTRIES = [room._registry for room in (effects, noise_effects, schemes, approaches)]
+REGISTRIES = {
+    "effects": effects._registry,
+    "noise_effects": noise_effects._registry,
+    "schemes": schemes._registry,
+    "approaches": approaches._registry,
+    None: figures._REGISTRY,
+}
+"""Registries, by the room for which packages may have something."""
 CACHES = (
     *(effects.get_effect, noise_effects.get_noise_effect, schemes._registered),
     *(style._parameters, models.compose, reading._files, reading._shipped),
@@ -21,11 +29,10 @@ CACHES = (
 @contextlib.contextmanager
 def forgotten():
     """Forget all that is registered within the block; installed packages are looked for again."""
-    rooms = ("effects", "noise_effects", "schemes", "approaches")
-    changed = [registry._items for registry in REGISTRIES]
+    changed = [registry._items for registry in REGISTRIES.values()]
     changed += [plugins._files, plugins._sources]
     before = [dict(each) for each in changed]
-    for registry, room in zip(REGISTRIES, rooms, strict=True):
+    for room, registry in REGISTRIES.items():
         registry._room = room
     for cache in CACHES:
         cache.cache_clear()

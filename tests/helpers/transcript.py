@@ -191,24 +191,30 @@ class Shell:
 
     def run(self, command):
         """Exit status and both streams of a command."""
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            return self._run(command, out, err), _content(out), _content(err)
+
+    def output(self, command):
+        """What a command, which must end well, shows on a terminal."""
+        with tempfile.TemporaryFile() as shown:
+            if self._run(command, shown, shown):
+                raise RuntimeError(f"{command}: {_content(shown)}")
+            return _content(shown)
+
+    def _run(self, command, out, err):
         if command.startswith("cd "):
             self.folder /= command.split()[1]
-            return 0, "", ""
+            return 0
         bare = re.sub(r"'[^']*'|\"[^\"]*\"", "", command)
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            if re.match(r"import |python \S+\.py|accelstudy [^|<>;&*?$]*$", bare):
-                child = FORK.Process(target=self._execute, args=(command, out, err))
-                child.start()
-                child.join()
-                status = child.exitcode
-            else:
-                path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-                variables = os.environ | self.environment | {"PATH": path}
-                status = subprocess.run(["bash", "-c", command], cwd=self.folder, env=variables,
-                                        stdout=out, stderr=err).returncode  # fmt: skip
-            out.seek(0)
-            err.seek(0)
-            return status, out.read().decode("utf-8"), err.read().decode("utf-8")
+        if re.match(r"import |python \S+\.py|accelstudy [^|<>;&*?$]*(> \S+)?$", bare):
+            child = FORK.Process(target=self._execute, args=(command, out, err))
+            child.start()
+            child.join()
+            return child.exitcode
+        path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+        variables = os.environ | self.environment | {"PATH": path}
+        return subprocess.run(["bash", "-c", command], cwd=self.folder, env=variables,
+                              stdout=out, stderr=err).returncode  # fmt: skip
 
     def _execute(self, command, out, err):
         """Execute Python, or a program of it, in the process of this one that was forked for it."""
@@ -222,12 +228,20 @@ class Shell:
         if command.startswith("import "):
             exec(compile(command, "<page>", "exec"), {"__name__": "__main__"})
             return
+        command, _, file = command.partition(" > ")
+        if file:
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
         program, *sys.argv = shlex.split(command, comments=True)
         if program == "python":
             runpy.run_path(sys.argv[0], run_name="__main__")
         else:
             sys.argv.insert(0, program)
             entry_point()()
+
+
+def _content(file):
+    file.seek(0)
+    return file.read().decode("utf-8")
 
 
 def entry_point():

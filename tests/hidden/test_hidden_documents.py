@@ -37,9 +37,9 @@ def test_the_score_is_that_of_the_study(study):
 
 
 def test_the_score_is_that_of_the_code():
-    """Of a sample of its campaigns a third, as the golden set has 400 more, gets the answers."""
-    told = pd.read_csv(SAMPLE, keep_default_na=False).to_dict("records")[::3]
-    assert len(told) > 10
+    """Of a sample of its campaigns an eighth, as the golden set has 400 more, gets the answers."""
+    told = pd.read_csv(SAMPLE, keep_default_na=False).to_dict("records")[::8]
+    assert len(told) > 5
     asked = [(case_of(row["cell"]), int(row["campaign"])) for row in told]
     quiet = CONFIG.model_copy(update={"baselines_every": 0})
     judged = frames([row_of(quiet, case, k) for case, k in asked], CONFIG)["campaigns"]

@@ -3,10 +3,8 @@
 import re
 
 import cluster
-import one_machine_slurm
 import pyarrow as pa
 import pyarrow.parquet as pq
-import pytest
 import yaml
 from places import ROOT
 
@@ -39,15 +37,6 @@ def test_the_profile_names_rules_that_there_are_and_groups_those_of_a_study():
 def test_another_attempt_gets_more_memory():
     assert "attempt" in profile("slurm")["default-resources"]["mem_mb"]
     assert re.search(r"mem_mb=lambda wildcards, attempt: .* \* attempt,", STUDY["simulate"])
-
-
-def test_without_slurm_one_line_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setattr(one_machine_slurm.shutil, "which", lambda *_, **__: None)
-    with pytest.raises(SystemExit) as ended:
-        cluster.main()
-    assert ended.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "apt-get install slurm-wlm munge" in line
 
 
 def test_tables_are_compared_to_the_bit(tmp_path):

@@ -15,7 +15,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, logsumexp, softmax
+from scipy.special import chdtrc, softmax
 
 from studies.hidden.physics.conditions import Conditions, Shape
 from studies.hidden.physics.designs import session
@@ -228,10 +228,10 @@ class Pairs:
 
 def _most_probable(evidence: Array, starts: NDArray[np.int_]) -> tuple[Array, int]:
     """Log evidence of groups, that of their members on average, and the best member of the best."""
-    groups = np.split(evidence, starts[1:])
-    logs = np.array([logsumexp(group) - np.log(len(group)) for group in groups])
+    counts = np.diff(starts, append=len(evidence))
+    logs = np.logaddexp.reduceat(evidence, starts) - np.log(counts)
     best = int(np.argmax(logs))
-    return logs, int(starts[best] + np.argmax(groups[best]))
+    return logs, int(starts[best] + np.argmax(evidence[starts[best] :][: counts[best]]))
 
 
 def _evidence(parts: Array, dims: Array | NDArray[np.int_], size: float) -> Array:
