@@ -5,25 +5,25 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.axes import Axes
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.progress import begin, say, show
 from accelstudy.basics.suggested import study_again
 from accelstudy.data_sheets import of_sigma
-from accelstudy.data_sheets.measured import with_history
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
 from accelstudy.pages.result import Result
 from accelstudy.planning import question, wording
 from accelstudy.planning.answer import Answer, answer
-from accelstudy.planning.figure import draw_plan
 from accelstudy.planning.output import plan_files, plan_table
 from accelstudy.planning.quantities import EQUIPMENT
 from accelstudy.planning.question import Equipment, Question
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
 
@@ -59,10 +59,14 @@ class Plan(Result):
         if given["reference"] is not None:
             planned = question.planned_reference(str(given["reference"]), sheet)
             beside = Equipment("reference", by_hand.moving, question.MOUNTING, planned)
+        if history is not None:
+            from accelstudy.data_sheets.measured import with_history  # slow to import
+
+            sheet = with_history(sheet, history)
         asked = Question(
             given["tilt_accuracy"],
             given["tilt_range"],
-            sheet if history is None else with_history(sheet, history),
+            sheet,
             {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
             given["confidence"],
             tuple(sorted({*given["holds"]})),
@@ -112,6 +116,8 @@ class Plan(Result):
 
     def draw(self, ax: Axes) -> None:
         """Draw the tilt error left over the time in the field."""
+        from accelstudy.planning.figure import draw_plan  # Matplotlib is slow to import
+
         draw_plan(ax, self.answer)
 
     def write(self, folder: Path, place: Path) -> None:

@@ -70,7 +70,7 @@ class Tilt:
         causes = np.array(self.causes)
         return {c: each[:, causes == c].sum(axis=1) for c in dict.fromkeys(self.causes)}
 
-    @property
+    @cached_property
     def rms(self) -> Array:
         """Rms over attitudes, calibrations and sensors, (2,), rad."""
         return np.sqrt(np.trace(self.form, axis1=1, axis2=2))

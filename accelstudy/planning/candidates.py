@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ from accelstudy.sensors.models import MODELS, NINE, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
+
+if TYPE_CHECKING:
+    from accelstudy.planning.simulated import Simulated
 
 Array = NDArray[np.float64]
 
@@ -55,7 +59,7 @@ LEAST_REDUNDANCY = 0.25
 
 @dataclass(frozen=True)
 class Candidate:
-    """One calibration.
+    """One calibration. Candidates are equal if they are of the same kind in the same positions.
 
     Attributes
     ----------
@@ -68,6 +72,9 @@ class Candidate:
     redundancy : int
     request : Request that finds its positions again, as `accelstudy design` does; None of a scheme
         that has a name
+    simulated : Simulated or None
+    fewer : Simulated or None, of the best positions of which there is one less, and which miss the
+        target
     """
 
     equipment: Equipment
@@ -75,37 +82,21 @@ class Candidate:
     scheme: Scheme
     hold: float
     sigma: float
-    tilt: Tilt
+    tilt: Tilt = field(compare=False)
     redundancy: int
     request: Request | None = None
+    simulated: Simulated | None = field(default=None, compare=False)
+    fewer: Simulated | None = field(default=None, compare=False)
 
     @property
     def seconds(self) -> float:
         """Time in the field, s."""
         return self.equipment.seconds(self.scheme.n_positions, self.hold)
 
-    @property
-    def effort(self) -> tuple[float, float, int]:
-        """What to sort candidates by: the time they take, and what they leave after it."""
-        return self.seconds, self.rms, self.model.n_parameters
 
-    @cached_property
-    def rms(self) -> float:
-        """Larger rms of roll and pitch, rad."""
-        return float(self.tilt.rms.max())
-
-    def accuracy(self, confidence: float | None) -> float:
-        """Tilt accuracy by the measure that is asked for, rad."""
-        if confidence is None:
-            return self.rms
-        return self.tilt.of_both(confidence)
-
-    def reaches(self, question: Question) -> bool:
-        """Whether the tilt accuracy that is asked for is reached."""
-        # Such a quantile is not much below the rms, which is faster to compute.
-        if (question.confidence or 0.0) >= 0.7 and self.rms > question.target:
-            return False
-        return self.accuracy(question.confidence) <= question.target
+def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
+    """Candidates by the time they take, and by what they leave after it."""
+    return sorted(unsorted, key=lambda c: (c.seconds, c.tilt.rms.max(), c.model.n_parameters))
 
 
 def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
@@ -119,7 +110,7 @@ def schemes_for(most_positions: int, more: Sequence[str] = ()) -> list[Scheme]:
 def candidates(question: Question) -> list[Candidate]:
     """All calibrations in known schemes whose positions determine their model and check it."""
     schemes = schemes_for(question.most_positions, question.schemes)
-    return [c for scheme in track(schemes, "calibrations") for c in _with_scheme(question, scheme)]
+    return [c for scheme in track(schemes, "calibrations") for c in in_scheme(question, scheme)]
 
 
 def shortest(question: Question) -> Candidate | None:
@@ -127,34 +118,34 @@ def shortest(question: Question) -> Candidate | None:
     free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
     first: dict[str, Candidate] = {}
     for scheme in schemes_for(free.most_positions, free.schemes):
-        for candidate in sorted(_with_scheme(free, scheme), key=lambda c: c.seconds):
+        for candidate in by_time(in_scheme(free, scheme)):
             first.setdefault(candidate.equipment.name, candidate)
         if len(first) == len(question.equipment):
             break
     return min(first.values(), key=lambda c: c.seconds, default=None)
 
 
-def _with_scheme(question: Question, scheme: Scheme) -> list[Candidate]:
-    """Candidates in one scheme, with each equipment."""
-    models = [get_model(name) for name in PLANNED_MODELS]
-    return [
-        candidate
-        for equipment in question.equipment
-        for candidate in of_scheme(question, equipment, scheme, models)
-    ]
+def in_scheme(
+    question: Question,
+    scheme: Scheme,
+    models: Sequence[SensorModel] | None = None,
+    request: Request | None = None,
+) -> Iterator[Candidate]:
+    """Candidates in one scheme, with each equipment, of `PLANNED_MODELS` or other models."""
+    models = models or [get_model(name) for name in PLANNED_MODELS]
+    for equipment in question.equipment:
+        yield from _with_equipment(question, equipment, scheme, models, request)
 
 
-def of_scheme(
+def _with_equipment(
     question: Question,
     equipment: Equipment,
     scheme: Scheme,
-    models: list[SensorModel],
-    request: Request | None = None,
+    models: Sequence[SensorModel],
+    request: Request | None,
 ) -> Iterator[Candidate]:
-    """Candidates in one scheme with one equipment."""
     if equipment.reference is not None:  # the rotation between the sensors is unknown
         models = [model for model in models if ROTATIONS & {*names_of(model)}]
-
     n, single = scheme.n_positions, equipment.name == "gravity"
 
     @cache
@@ -163,7 +154,7 @@ def of_scheme(
         information = information_of(question, equipment, scheme.directions, sigma)
         left = {model: information.conditions - model.n_parameters for model in models}
         return [
-            (model, tilt_of(question, information, model, question.neglectable), r)
+            (model, tilt_of(question, information, model, question.sizes), r)
             for model, r in left.items()
             if r >= LEAST_REDUNDANCY * information.conditions
         ]

@@ -18,7 +18,7 @@ from accelstudy.drawing.style import (
     new_figure,
 )
 from accelstudy.planning.answer import Answer
-from accelstudy.planning.optimised import by_time
+from accelstudy.planning.candidates import by_time
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 IN_SIGHT = 8.0
@@ -36,7 +36,7 @@ def draw_plan(ax: Axes, answer: Answer) -> None:
     """Draw what `plan_figure` shows."""
     question, target = answer.question, float(to_display(answer.question.target, "rad"))
     share, ordered = question.confidence, by_time(answer.compared)
-    left = to_display(np.array([c.accuracy(share) for c in ordered]), "rad")
+    left = to_display(np.array([question.accuracy(c.tilt) for c in ordered]), "rad")
     minutes = np.array([c.seconds / 60 for c in ordered])
     for equipment in question.equipment:
         chosen = np.flatnonzero([c.equipment == equipment for c in ordered])
@@ -45,13 +45,13 @@ def draw_plan(ax: Axes, answer: Answer) -> None:
         ax.scatter(*at, s=3, alpha=0.18, linewidth=0, rasterized=True, color=colour, zorder=2)
         front = chosen[left[chosen] < np.minimum.accumulate([np.inf, *left[chosen]])[:-1]]
         ax.step(minutes[front], left[front], where="post", color=colour, zorder=3)
-    numbered = ((n, r) for n, r in enumerate(answer.ranked, 1) if r.simulated is not None)
     above = dict.fromkeys(question.equipment, False)
-    for number, ranked in numbered:
-        assert ranked.simulated is not None
-        name, time = ranked.candidate.equipment, ranked.candidate.seconds / 60
+    for number, candidate in enumerate(answer.ranked, 1):
+        if candidate.simulated is None:
+            continue
+        name, time = candidate.equipment, candidate.seconds / 60
         colour, marker = approach_colour(name.name), approach_marker(name.name)
-        place = time, float(to_display(ranked.simulated.accuracy(share), "rad"))
+        place = time, float(to_display(question.accuracy(candidate.simulated), "rad"))
         ax.plot(*place, marker=marker, ms=5, mfc="white", mec=colour, ls="", zorder=5)
         ax.annotate(
             str(number), place, xytext=(0, 11 if above[name] else -11), textcoords="offset points",

@@ -7,61 +7,64 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX
+from accelstudy.design.search import STEPS
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
     angle_sigma,
-    of_scheme,
+    by_time,
+    in_scheme,
     sigma_of,
 )
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import Scheme
 from accelstudy.schemes.files import remember
-from accelstudy.sensors.models import get_model
+from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
 
-STARTS = 1
-"""Random sets from which a search starts; more find designs that are better by 0.1 % at most."""
 USUAL_SHARE, MIN_SHARE = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
-REFINED_SHARE = 0.95
-"""About as many of refined positions suffice as of others."""
-SURE_PROBABILITY = 0.99
+MISSED = (math.inf, 1.03, 1.01, 1.003, 1.002, 1.0)
+"""Accuracies over the target beyond which positions miss it, as moves on finer grids bring less:
+before any move, and after those on each grid."""
+SURE_SHARE = 0.99
 """Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
 
 
 @dataclass(frozen=True)
-class Sought:
-    """Calibrations in the best positions, of which the fewest are sought.
+class Kind:
+    """Calibrations that differ by their positions alone.
 
     Attributes
     ----------
     question : Question
     equipment : Equipment
-    model : str
+    model : SensorModel
     hold : float, s
     """
 
     question: Question
     equipment: Equipment
-    model: str
+    model: SensorModel
     hold: float
 
     @classmethod
-    def like(cls, question: Question, candidate: Candidate) -> Sought:
-        """Calibrations of the kind of a candidate."""
-        return cls(question, candidate.equipment, candidate.model.name, candidate.hold)
+    def of(cls, question: Question, candidate: Candidate) -> Kind:
+        """The kind of a candidate."""
+        return cls(question, candidate.equipment, candidate.model, candidate.hold)
 
     @property
     def least(self) -> int:
         """Number of positions with which the model is determined and checked."""
         conditions = 1 if self.equipment.name == "gravity" else 3
-        unknown = get_model(self.model).n_parameters
-        return math.ceil(unknown / (1 - LEAST_REDUNDANCY) / conditions)
+        return math.ceil(self.model.n_parameters / (1 - LEAST_REDUNDANCY) / conditions)
 
     @property
     def most(self) -> int:
@@ -71,55 +74,84 @@ class Sought:
         left = self.question.most_seconds - self.equipment.setup
         return most if left >= most * each else math.floor(left / each + 1e-9)
 
+    def seconds(self, needed: float) -> float:
+        """Time that about so many positions take, s."""
+        return self.equipment.seconds(max(self.least, math.ceil(needed)), self.hold)
+
     def request(self, n: int) -> Request:
-        """Request for the best n positions, as `accelstudy design` takes it."""
+        """Request for the best n positions, as `accelstudy design` takes it.
+
+        It has one random set to start from: more find designs that are better by 0.1 % at most.
+        """
         noise = Noise()
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
             angle = angle_sigma(self.question, self.equipment)
             sigma_angle = float(f"{angle / MGON:.6g}") * MGON
             noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), sigma_angle)
         tilt_range = float(f"{self.question.tilt_range / GON:.6g}") * GON
-        return Request(
-            n, self.model, self.equipment.approach, MINIMAX, tilt_range, noise, starts=STARTS
-        )
+        at = self.model.name, self.equipment.approach, MINIMAX
+        return Request(n, *at, tilt_range, noise, starts=1)
 
-    def candidate(self, n: int, refined: bool = True) -> Candidate | None:
-        """Calibration in the best n positions, or in some near them if these are not refined.
-
-        None if so many are not allowed, or too few.
-        """
+    def best(self, n: int) -> Candidate | None:
+        """Calibration in the best n positions; None if so many are not allowed, or too few."""
         if not self.least <= n <= self.most:
             return None
-        alone, request = replace(self.question, holds=(self.hold,)), self.request(n)
-        scheme, models = best_positions(request, refined), [get_model(self.model)]
-        return next(of_scheme(alone, self.equipment, scheme, models, request), None)
+        request = self.request(n)
+        found = request.search.finished(_positions(request, len(STEPS)), bounded=False)
+        content = {"title": "minimax", "source": "accelstudy design"}
+        content["directions"] = found.directions.tolist()
+        return self._in_positions(remember(content, f"{MINIMAX}-{n}"), request)
 
     def fewest(self, needed: float) -> Candidate | None:
         """Calibration in the fewest positions that reach the target, by linear theory.
 
         The search begins near a number of positions, and goes on as if each gave the same
-        information; first among positions that are not refined, which takes a fifth of the time.
+        information.
         """
-        found = None
-        for refined in (False, True):
-            low, high, found = self.least - 1, self.most + 1, None
-            while high - low > 1:
-                n = min(max(math.ceil(needed), low + 1), high - 1)
-                candidate = self.candidate(n, refined)
-                share = math.inf
-                if candidate is not None:
-                    share = candidate.accuracy(self.question.confidence) / self.question.target
-                    needed = n * share**2
-                if share > 1:
-                    low = n
-                else:
-                    high, found = n, candidate
-                    if SURE_PROBABILITY * share * math.sqrt(n / max(n - 1, 0.5)) > 1:
-                        break
-            needed *= REFINED_SHARE
-            if needed > self.most:
-                return None
-        return found
+        low, high = self.least - 1, self.most + 1
+        while high - low > 1:
+            n = min(max(math.ceil(needed), low + 1), high - 1)
+            share = self._share(n)
+            needed = n * share**2 if share < math.inf else needed
+            if share > 1:
+                low = n
+                continue
+            high = n
+            if share * _of_one_less(n) > 1:
+                break
+        return self.best(high)
+
+    def _share(self, n: int) -> float:
+        """Accuracy of the best n positions over the target, as finely as it decides what is next.
+
+        That is whether they reach it, and whether one position less is worth a try.
+        """
+        request, share = self.request(n), math.inf
+        for moves, missed in enumerate(MISSED):
+            scheme = Scheme("", "", _positions(request, moves), "generated", "")
+            candidate = self._in_positions(scheme)
+            if candidate is not None:
+                share = self.question.accuracy(candidate.tilt) / self.question.target
+            if share > missed or share * _of_one_less(n) <= 1:
+                break
+        return share
+
+    def _in_positions(self, scheme: Scheme, request: Request | None = None) -> Candidate | None:
+        alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
+        return next(in_scheme(alone, scheme, [self.model], request), None)
+
+
+def _of_one_less(n: int) -> float:
+    """Factor of an accuracy if there is one position less, of the same information each."""
+    return max(1.0, SURE_SHARE * math.sqrt(n / max(n - 1, 0.5)))
+
+
+@cache
+def _positions(request: Request, moves: int) -> NDArray[np.float64]:
+    """Positions of a search after the moves on so many grids."""
+    if moves == 0:
+        return request.search.exchanged(1)
+    return request.search.moved(_positions(request, moves - 1), STEPS[moves - 1])
 
 
 def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | None:
@@ -136,36 +168,17 @@ def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | N
     Candidate, or None if none reaches the target
     """
     first: dict[tuple[str, float], Candidate] = {}
-    for c in by_time(c for c in compared if c.reaches(question)):
+    for c in by_time(c for c in compared if question.reached_by(c.tilt)):
         first.setdefault((c.model.name, c.hold), c)
-    best, hopes = next(iter(first.values()), None), []
+    hopes = []
     for c in first.values():
-        sought = Sought.like(question, c)
-        n = c.scheme.n_positions * (c.accuracy(question.confidence) / question.target) ** 2
-        likely, least = (
-            max(sought.least, math.ceil(part * n)) for part in (USUAL_SHARE, MIN_SHARE)
-        )
-        hopes.append((c.equipment.seconds(likely, c.hold), least, likely, sought))
-    for _, least, likely, sought in sorted(hopes, key=lambda hope: hope[0]):
-        assert best is not None
-        if sought.equipment.seconds(least, sought.hold) <= best.seconds:
-            no_longer = replace(question, most_seconds=best.seconds)  # else it is not the cheapest
-            fewest = replace(sought, question=no_longer).fewest(likely)
-            best = by_time(filter(None, [best, fewest]))[0]
-    return best
-
-
-def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
-    """Candidates by the time they take, and by what they leave after it."""
-    return sorted(unsorted, key=lambda c: c.effort)
-
-
-@cache
-def best_positions(request: Request, refined: bool = True) -> Scheme:
-    """The best positions, as a scheme that a study can have."""
-    directions = request.find(bounded=False, refined=refined).directions.tolist()
-    source = "accelstudy design"
-    return remember(
-        {"title": "minimax", "source": source, "directions": directions},
-        f"{MINIMAX}-{request.positions}",
-    )
+        kind = Kind.of(question, c)
+        n = c.scheme.n_positions * (question.accuracy(c.tilt) / question.target) ** 2
+        hopes.append((kind.seconds(USUAL_SHARE * n), kind.seconds(MIN_SHARE * n), n, kind))
+    found = [*first.values()][:1]
+    for _, least, n, kind in sorted(hopes, key=lambda hope: hope[0]):
+        if least <= found[0].seconds:
+            no_longer = replace(question, most_seconds=found[0].seconds)  # else it costs more
+            fewest = replace(kind, question=no_longer).fewest(USUAL_SHARE * n)
+            found = by_time([*found, *([fewest] if fewest else [])])
+    return found[0] if found else None

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import yaml
@@ -16,6 +15,7 @@ from accelstudy.basics.suggested import study_again
 from accelstudy.basics.units import MGON
 from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.answer import Answer
+from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.reasons import limits
 from accelstudy.planning.wording import part_lines, positions_command, table_lines
 from accelstudy.proposal.proposal import field_order, write_design
@@ -44,6 +44,9 @@ def plan_files(
     shown : Path, name of the folder in the files
     study : str, name of the study that reproduces the numbers
     """
+    # Slow to import, and not needed for what is printed.
+    import matplotlib as mpl
+
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI, STYLE
     from accelstudy.files.tables import write_table
@@ -64,7 +67,7 @@ def plan_files(
 
 def write_positions(answer: Answer, path: Path, name: str) -> None:
     """Write the recommended positions as a scheme, in the order in which to take them."""
-    question, first = answer.question, answer.first.candidate
+    question, first = answer.question, answer.first
     directions, command = first.scheme.directions, positions_command(question, first)
     if first.request is not None:
         order = field_order(first.request.task, directions)
@@ -92,46 +95,39 @@ def plan_table(answer: Answer) -> pd.DataFrame:
 
     Angles are in mgon, whatever unit the user chose.
     """
-    question = answer.question
-    ranks = {id(r.candidate): (i, r.simulated) for i, r in enumerate(answer.ranked, 1)}
-    rows = []
-    for c in answer.compared:
-        rank, simulated = ranks.get(id(c), (None, None))
-        noise, unknown = np.sqrt(c.tilt.squares[NOISE]), np.full(2, np.nan)
-        of_both = np.nan if simulated is None else simulated.of_both(0.95)
-        before = {"rms": c.tilt.rms, "noise": noise}
-        after = dict.fromkeys(("rms", "rms_error", "rms_q95"), unknown)
-        if simulated is not None:
-            after = {
-                "rms": simulated.rms,
-                "rms_error": simulated.error,
-                "rms_q95": simulated.quantile(0.95),
-            }
-        row = {
-            "equipment": c.equipment.name,
-            "model": c.model.name,
-            "n_parameters": c.model.n_parameters,
-            "scheme": c.scheme.name,
-            "n_positions": c.scheme.n_positions,
-            "hold_s": c.hold,
-            "sensor_sigma_mps2": c.sigma,
-            "minutes": c.seconds / 60,
-            "redundancy": c.redundancy,
-            **{
-                f"{angle}_{what}_mgon": float(values[i]) / MGON
-                for i, angle in enumerate(ANGLES)
-                for what, values in before.items()
-            },
-            "reaches": c.reaches(question),
-            "rank": rank,
-            "limited_by": limits(question, c) if rank else None,
-            "cell": None if simulated is None else simulated.cell,
-            **{
-                f"{angle}_{what}_simulated_mgon": float(values[i]) / MGON
-                for what, values in after.items()
-                for i, angle in enumerate(ANGLES)
-            },
-            "both_rms_q95_simulated_mgon": of_both / MGON,
-        }
-        rows.append(row)
-    return pd.DataFrame(rows).astype({"rank": "Int64"})
+    return pd.DataFrame([_row(answer, c) for c in answer.compared]).astype({"rank": "Int64"})
+
+
+def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
+    rank = answer.ranked.index(c) + 1 if c in answer.ranked else None
+    expected = {"rms": c.tilt.rms, "noise": np.sqrt(c.tilt.squares[NOISE])}
+    found, of_both = dict.fromkeys(("rms", "rms_error", "rms_q95"), np.full(2, np.nan)), np.nan
+    if c.simulated is not None:
+        values = c.simulated.rms, c.simulated.error, c.simulated.quantile(0.95)
+        found, of_both = dict(zip(found, values, strict=True)), c.simulated.of_both(0.95)
+    return {
+        "equipment": c.equipment.name,
+        "model": c.model.name,
+        "n_parameters": c.model.n_parameters,
+        "scheme": c.scheme.name,
+        "n_positions": c.scheme.n_positions,
+        "hold_s": c.hold,
+        "sensor_sigma_mps2": c.sigma,
+        "minutes": c.seconds / 60,
+        "redundancy": c.redundancy,
+        **{
+            f"{angle}_{what}_mgon": float(values[i]) / MGON
+            for i, angle in enumerate(ANGLES)
+            for what, values in expected.items()
+        },
+        "reaches": answer.question.reached_by(c.tilt),
+        "rank": rank,
+        "limited_by": limits(answer.question, c) if rank else None,
+        "cell": None if c.simulated is None else c.simulated.cell,
+        **{
+            f"{angle}_{what}_simulated_mgon": float(values[i]) / MGON
+            for what, values in found.items()
+            for i, angle in enumerate(ANGLES)
+        },
+        "both_rms_q95_simulated_mgon": of_both / MGON,
+    }

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, key
@@ -19,6 +19,10 @@ from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
+if TYPE_CHECKING:
+    from accelstudy.leveling.distribution import Tilt
+    from accelstudy.planning.simulated import Simulated
+
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
@@ -29,6 +33,7 @@ ALIKE = "alike"
 """A reference of the same type, calibrated by gravity alone in the positions of a scheme, each held
 for the usual time."""
 OF_ALIKE = ("bias-scale-nonorthogonality", "fibonacci-24")
+NONLINEAR = ("quadratic_scale", "cubic_scale")
 LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 """Endings of files that are no data sheets, though one can be made of them."""
 
@@ -76,20 +81,6 @@ ROBOT = Equipment(
 
 
 @dataclass(frozen=True)
-class Size:
-    """Usual size of the parameters of an effect: their standard deviation over sensors, SI.
-
-    Attributes
-    ----------
-    value : float
-    source : "data sheet", "assumed" or "typical"
-    """
-
-    value: float
-    source: Literal["data sheet", "assumed", "typical"]
-
-
-@dataclass(frozen=True)
 class Question:
     """The question that a plan answers, in SI.
 
@@ -119,23 +110,49 @@ class Question:
     most_positions: int = 200
     schemes: tuple[str, ...] = ()
     beside: Equipment | None = None
-    sizes: Mapping[str, Size] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "sizes", sizes_of(self.sheet))
         if not self.holds:
             fixed = self.sheet.position_sigma is not None
             object.__setattr__(self, "holds", (USUAL_HOLD,) if fixed else HOLDS)
 
+    @cached_property
+    def sizes(self) -> dict[str, float]:
+        """Usual sizes, SI, of the effects that cause errors if a model lacks them.
+
+        They are the sds of the parameters over sensors: of the data sheet, else typical ones. A
+        nonlinearity is divided equally into a quadratic and a cubic part. The rotation of the axes
+        against the housing is left out, since it does not change the sensor's own tilt.
+        """
+        shares = {"nonorthogonality": 1.0, **dict.fromkeys(NONLINEAR, math.sqrt(0.5))}
+        stated = {effect: getattr(self.sheet, effect) for effect in shares}
+        return {
+            effect: usual_size(effect) if size is None else shares[effect] * size
+            for effect, size in stated.items()
+        }
+
     @property
-    def neglectable(self) -> dict[str, float]:
-        """Sizes of the effects that cause errors if a model lacks them."""
-        return {name: size.value for name, size in self.sizes.items()}
+    def assumed(self) -> list[str]:
+        """Effects of a usual size, as nothing is known of them."""
+        return [effect for effect in self.sizes if getattr(self.sheet, effect) is None]
 
     @property
     def is_linear(self) -> bool:
         """Whether the sensor is assumed to be linear."""
-        return any(size.source == "assumed" for size in self.sizes.values())
+        return "nonlinearity" in self.sheet.assumed
+
+    def accuracy(self, tilt: Tilt | Simulated) -> float:
+        """Tilt accuracy by the measure that is asked for, rad."""
+        if self.confidence is None:
+            return float(tilt.rms.max())
+        return tilt.of_both(self.confidence)
+
+    def reached_by(self, tilt: Tilt) -> bool:
+        """Whether the tilt accuracy that is asked for is reached."""
+        # Such a quantile is not much below the rms, which is faster to compute.
+        if (self.confidence or 0.0) >= 0.7 and tilt.rms.max() > self.target:
+            return False
+        return self.accuracy(tilt) <= self.target
 
     def written(self, scheme: Scheme) -> str:
         """Name of a scheme in commands and configurations: a name, or the path of its file."""
@@ -158,21 +175,15 @@ def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:
     InputError
         If the calibration tells no angles with their sigmas.
     """
-    return _alike(sheet) if text == ALIKE else _of_calibration(Path(text))
+    if text != ALIKE:
+        # Slow to import, and seldom needed.
+        from accelstudy.campaign.reference_log import reference_sensor, usable_reference
 
-
-def _of_calibration(path: Path) -> ReferenceSensor:
-    # Slow to import, and seldom needed.
-    from accelstudy.campaign.reference_log import reference_sensor, usable_reference
-
-    calibration = usable_reference(path)
-    sigma = calibration.content["sigma_position_mps2"]
-    if not sigma:
-        raise InputError(f"{key('reference')} {path}: it does not tell the noise of a position")
-    return reference_sensor(calibration, sigma)
-
-
-def _alike(sheet: DataSheet) -> ReferenceSensor:
+        calibration = usable_reference(Path(text))
+        sigma = calibration.content["sigma_position_mps2"]
+        if not sigma:
+            raise InputError(f"{key('reference')} {text}: it does not tell the noise of a position")
+        return reference_sensor(calibration, sigma)
     model, scheme = get_model(OF_ALIKE[0]), get_scheme(OF_ALIKE[1])
     noise = Noise(sheet.sigma_mean(USUAL_HOLD))
     return ReferenceSensor(
@@ -201,31 +212,10 @@ def confidence_of(text: str) -> float | None:
     return share
 
 
-def sizes_of(sheet: DataSheet) -> dict[str, Size]:
-    """Sizes of the effects of a sensor: from its data sheet, else typical ones.
-
-    A nonlinearity is divided equally into a quadratic and a cubic part. The rotation of the axes
-    against the housing is left out, since it does not change the sensor's own tilt.
-    """
-    shared = math.sqrt(0.5)
-    stated = {
-        "nonorthogonality": sheet.nonorthogonality,
-        "quadratic_scale": _times(sheet.quadratic_scale, shared),
-        "cubic_scale": _times(sheet.cubic_scale, shared),
-    }
-    sizes = {}
-    for effect, value in stated.items():
-        if value is None:
-            low, high = get_effect(effect).typical
-            sizes[effect] = Size(math.sqrt(low * high), "typical")
-            continue
-        quantity = "nonorthogonality" if effect == "nonorthogonality" else "nonlinearity"
-        sizes[effect] = Size(value, "assumed" if quantity in sheet.assumed else "data sheet")
-    return sizes
-
-
-def _times(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor
+def usual_size(effect: str) -> float:
+    """Size of an effect between that in good and that in cheap equipment, SI."""
+    low, high = get_effect(effect).typical
+    return math.sqrt(low * high)
 
 
 def get_sensor(text: str) -> DataSheet:

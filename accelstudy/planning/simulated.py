@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, 
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.question import Question
+from accelstudy.planning.question import NONLINEAR, Question, usual_size
 from accelstudy.schemes.files import held
 from accelstudy.study.config import parse_study
 from accelstudy.study.estimate import Estimates
@@ -45,11 +44,6 @@ class Simulated:
     statistics: CellStatistics
 
     @property
-    def simulated(self) -> int:
-        """Number of calibrations."""
-        return self.statistics.simulated
-
-    @property
     def rms(self) -> Array:
         """Rms over attitudes and calibrations, (2,), rad."""
         return self.statistics["tilt_rms"].value
@@ -66,10 +60,6 @@ class Simulated:
     def of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
         return float(self._bound(BOTH, probability).value)
-
-    def accuracy(self, confidence: float | None) -> float:
-        """Tilt accuracy by the measure that is asked for, rad."""
-        return float(self.rms.max()) if confidence is None else self.of_both(confidence)
 
     def uncertainty(self, confidence: float | None) -> float:
         """Standard error of `accuracy`, rad, by the number of calibrations."""
@@ -89,7 +79,7 @@ def study_of(
     It can overlay `config/config.yaml`, and is also complete by itself.
     """
     sigma = chosen[0].sigma
-    planned = ("cross_axis_misalignment", "quadratic_scale", "cubic_scale")
+    planned = ("cross_axis_misalignment", *NONLINEAR)
     sensor = {effect: _quantity(question, effect) for effect in (*BASE_EFFECTS, *planned)}
     names = [candidate.scheme.name for candidate in chosen if candidate.request]
     of_files = {name: held(name) for name in names}
@@ -153,10 +143,9 @@ def true_size(question: Question, effect: str) -> float:
     if effect == "cross_axis_misalignment":  # its tilt refers to its own axes
         return 0.0
     if effect in question.sizes:
-        return question.sizes[effect].value
+        return question.sizes[effect]
     stated: float | None = getattr(question.sheet, effect)
-    low, high = get_effect(effect).typical
-    return math.sqrt(low * high) if stated is None else stated
+    return usual_size(effect) if stated is None else stated
 
 
 def _tidy(value: float) -> float:

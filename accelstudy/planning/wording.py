@@ -13,7 +13,7 @@ import numpy as np
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.pages import lines
-from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer, Ranked
+from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import (  # noqa: F401
@@ -45,11 +45,11 @@ def effort(candidate: Candidate) -> str:
 
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
-    return [
-        f"{PLAIN[effect]} ({quantity_text(size.value, unit_of(effect))})"
-        for effect, size in question.sizes.items()
-        if size.source == "typical"
-    ]
+    sizes = {
+        effect: quantity_text(question.sizes[effect], unit_of(effect))
+        for effect in question.assumed
+    }
+    return [f"{PLAIN[effect]} ({size})" for effect, size in sizes.items()]
 
 
 def table_lines(answer: Answer) -> list[str]:
@@ -59,7 +59,7 @@ def table_lines(answer: Answer) -> list[str]:
         "", "equipment", "model", "scheme", "positions", "s each", "minutes",
         f"roll/{unit}", f"pitch/{unit}", f"both/{unit}", "limited by",
     ]  # fmt: skip
-    table = np.array([head, *(_row(answer, i, r) for i, r in enumerate(answer.ranked, 1))])
+    table = np.array([head, *(_row(answer, i, c) for i, c in enumerate(answer.ranked, 1))])
     aligned = [
         (np.char.rjust if 4 <= i < 10 else np.char.ljust)(column, max(map(len, column)))
         for i, column in enumerate(table.T)
@@ -73,10 +73,9 @@ def table_lines(answer: Answer) -> list[str]:
     ]
 
 
-def _row(answer: Answer, rank: int, ranked: Ranked) -> list[str]:
-    candidate = ranked.candidate
-    source = ranked.simulated or candidate.tilt
-    about = "" if ranked.simulated else "~"
+def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
+    source = candidate.simulated or candidate.tilt
+    about = "" if candidate.simulated else "~"
     ends = (source.rms, source.quantile(0.025), source.quantile(0.975))
     cells = [
         f"{about}{number(rms)} ({interval(low, high)})"

@@ -51,8 +51,8 @@ class Proposal:
 
     @classmethod
     def of(cls, request: Request) -> Proposal:
-        """Find the positions, and order them; errors as `Request.find`."""
-        design = request.find()
+        """Find the positions, and order them; errors as `Search.design`."""
+        design = request.search.design(request.starts)
         space, groups = request.space, None
         if isinstance(space, Mountings):
             groups = _fewest_axes(space, design.directions)

@@ -13,7 +13,7 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
 from accelstudy.design.criteria import CRITERIA, DISCRIMINATE, ROBUST, Criterion, get_criterion
-from accelstudy.design.search import STARTS, Design, optimal_design
+from accelstudy.design.search import STARTS, Search
 from accelstudy.design.spaces import Constraints, Mountings, Space, Sphere, by_eye, cube, listed_in
 from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
@@ -157,30 +157,11 @@ class Request:
         """The constraints on the positions."""
         return Constraints(self.roll, self.pitch, self.pole_distance, self.least_angle)
 
-    def find(self, bounded: bool = True, refined: bool = True) -> Design:
-        """Find the positions.
-
-        Parameters
-        ----------
-        bounded : bool, whether a bound of how good they can be is wanted
-        refined : bool, as in `optimal_design`
-
-        Raises
-        ------
-        InputError
-            If the request cannot be met.
-        """
-        return optimal_design(
-            self.task,
-            self.chosen,
-            self.positions,
-            self.space,
-            self.constraints,
-            self.seed,
-            self.starts,
-            bounded,
-            refined,
-        )
+    @property
+    def search(self) -> Search:
+        """The search for the positions."""
+        at = self.positions, self.space, self.constraints, self.seed
+        return Search(self.task, self.chosen, *at)
 
 
 def _named(text: str, key: str, needs_size: bool = True) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.criteria import get_criterion
-from accelstudy.design.search import optimal_design
+from accelstudy.design.search import Search
 from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL, INK, approach_colour, log_ticks, new_figure
@@ -59,7 +59,7 @@ def efficiency_table(
         }
         shown = {scheme.title: scheme.directions for scheme in schemes}
         for n in positions:
-            best = optimal_design(task, criteria["I"], n, seed=SEED, bounded=False)
+            best = Search(task, criteria["I"], n, seed=SEED).design(bounded=False)
             shown[f"{n} I-optimal"] = best.directions
         for i, (title, directions) in enumerate(shown.items()):
             n, reason = len(directions), task.missing(directions)

@@ -193,7 +193,7 @@ def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
 ])  # fmt: skip
 def test_contradictory_wishes_are_said_in_one_line(asked, wrong):
     with pytest.raises(InputError, match=wrong):
-        Request(**{"positions": 8, **asked}).find()
+        Request(**{"positions": 8, **asked}).search.design()
 
 
 def test_what_is_known_before_and_what_is_neglected():
@@ -201,10 +201,8 @@ def test_what_is_known_before_and_what_is_neglected():
     assert known == {"s_x": 5e-4, "s_y": 5e-4, "s_z": 5e-4, "b_x": pytest.approx(9.80665e-3)}
     task = Request(6, neglect=("quadratic_scale=20ppm", "warm")[:1]).task
     assert task.neglected == {"quadratic_scale": pytest.approx(2e-5)}
-    after = Request(6, approach="gravity", after="faces-6", starts=1)
-    assert (
-        Request(6, approach="gravity", after="faces-6").task.missing(after.find().directions) == ""
-    )
+    after = Request(6, approach="gravity", after="faces-6")
+    assert after.task.missing(after.search.design(1, bounded=False).directions) == ""
 
 
 def test_two_effects_are_told_apart_by_what_neither_can_imitate():

@@ -1,5 +1,6 @@
 """Optimal schemes: criteria, constraints, search, and known optima."""
 
+from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -14,7 +15,7 @@ from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.criteria import get_criterion
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import information, position_rows
-from accelstudy.design.search import optimal_design, with_repeats
+from accelstudy.design.search import Search
 from accelstudy.design.spaces import (
     Constraints,
     Listed,
@@ -158,7 +159,7 @@ def test_the_error_by_a_neglected_effect_is_that_of_calibrations_without_it():
 def test_no_positions_are_below_the_bound_of_a_neglected_effect():
     task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2.5e-3})
     criterion = get_criterion("robust", task)
-    found = optimal_design(task, criterion, 24, starts=1)
+    found = Search(task, criterion, 24).design(starts=1)
     assert 0.9 < found.efficiency < 1
     others = [random_directions(24, seed) for seed in range(50)]
     assert min(criterion.value(task.normal(each)) for each in others) > found.value
@@ -186,7 +187,7 @@ def test_moments_of_the_sphere_are_d_optimal_for_the_norm_of_gravity():
 def test_nine_d_optimal_positions_are_the_extremal_points_of_degree_2():
     task, criterion = asked(BY_GRAVITY, "D")
     known = float(criterion.value(task.normal(get_scheme("d-optimal-9").directions)))
-    found = optimal_design(task, criterion, 9, starts=6)
+    found = Search(task, criterion, 9).design(starts=6)
     assert found.value == pytest.approx(known, abs=1e-5)
     assert found.efficiency < 1
     values = [criterion.value(task.normal(random_directions(9, seed))) for seed in range(300)]
@@ -212,7 +213,7 @@ def test_a_continuous_optimum_has_its_own_equivalence_theorem(approach, name):
 
 def test_optimal_positions_level_better_than_those_of_the_literature():
     task = BY_GRAVITY
-    found = optimal_design(task, get_criterion("I", task), 24, starts=2)
+    found = Search(task, get_criterion("I", task), 24).design(starts=2)
     assert found.efficiency > 0.995
     assert efficiency(task, "I", "mclaren-24", found.bound) == pytest.approx(0.676, abs=5e-3)
     assert np.all(task.rms_tilt(found.directions) < task.rms_tilt(MCLAREN))
@@ -225,7 +226,7 @@ def test_the_exchange_finds_the_best_of_all_choices():
         criterion = get_criterion(name, task)
         choices = combinations_with_replacement(range(8), 3)
         best = min(float(criterion.value(task.normal(points[list(c)]))) for c in choices)
-        found = optimal_design(task, criterion, 3, Listed(points, "eight"), bounded=False)
+        found = Search(task, criterion, 3, Listed(points, "eight")).design(bounded=False)
         assert found.value == pytest.approx(best, abs=1e-9)
 
 
@@ -244,7 +245,7 @@ def test_stored_designs_have_their_efficiency_and_bound(family):
         efficiency = min(1.0, criterion.efficiency(value, one["bound"]))
         assert one["efficiency"] == pytest.approx(efficiency, abs=2e-5)
     for n in (10, 16):
-        found = optimal_design(task, criterion, n, starts=1, bounded=False)
+        found = Search(task, criterion, n).design(starts=1, bounded=False)
         known = float(criterion.value(task.normal(stored[n]["directions"])))
         assert found.value > known - SEARCHED
 
@@ -264,7 +265,7 @@ def test_other_numbers_of_optimal_positions_are_refused_with_what_there_is():
 def free():
     """Twelve positions without a constraint."""
     task = BY_ROBOT
-    return optimal_design(task, get_criterion("I", task), 12, starts=2)
+    return Search(task, get_criterion("I", task), 12).design(starts=2)
 
 
 LEVEL = (-60 * GON, 60 * GON)
@@ -276,7 +277,7 @@ LEVEL = (-60 * GON, 60 * GON)
 ])  # fmt: skip
 def test_constraints_are_kept_and_cost_efficiency(constraints, free):
     task, criterion = asked(BY_ROBOT, "I")
-    found = optimal_design(task, criterion, 12, constraints=constraints, starts=1)
+    found = Search(task, criterion, 12, constraints=constraints).design(starts=1)
     assert constraints.met(found.directions)
     assert free.value < found.value < free.value + 0.2
     assert found.efficiency > 0.9
@@ -291,7 +292,7 @@ def test_constraints_are_kept_and_cost_efficiency(constraints, free):
 def test_few_mountings_turn_about_few_axes():
     task, space = BY_ROBOT, Mountings(2, ((1, 0, 0), (0, 1, 0), (0, 1, 1), (1, -1, 0)))
     assert len(Mountings(2).axes) == 9
-    found = optimal_design(task, get_criterion("I", task), 10, space, starts=1)
+    found = Search(task, get_criterion("I", task), 10, space).design(starts=1)
     axes = np.array(space.axes) / np.linalg.norm(space.axes, axis=1, keepdims=True)
     horizontal = np.abs(found.directions @ axes.T) < 1e-8
     assert any(np.all(horizontal[:, i] | horizontal[:, j]) for i in range(4) for j in range(i))
@@ -315,7 +316,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     )
     task, criterion = asked(BY_ROBOT, "I")
     with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
-        optimal_design(task, criterion, 9, Listed(listed.points[:2], "two"))
+        Search(task, criterion, 9, Listed(listed.points[:2], "two")).design()
     for text, wrong in {
         "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
         "x,y,z\n1,0,0\n1,?,0\n": "row 2: x, y, z must be numbers",
@@ -332,14 +333,14 @@ def test_what_cannot_be_is_said_in_one_line():
     with pytest.raises(
         InputError, match=r"9 positions at least 150 gon between positions were not"
     ):
-        optimal_design(task, criterion, 9, constraints=Constraints(least_angle=150 * GON))
+        Search(task, criterion, 9, constraints=Constraints(least_angle=150 * GON)).design()
     with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
-        optimal_design(task, criterion, 8)
+        Search(task, criterion, 8).design()
     nowhere = Constraints(pitch=(90 * GON, 100 * GON), pole_distance=30 * GON)
     with pytest.raises(
         InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
     ):
-        optimal_design(task, criterion, 9, constraints=nowhere)
+        Search(task, criterion, 9, constraints=nowhere).design()
     with pytest.raises(InputError, match=r"depends on the order of the positions \(step_x\)"):
         Task(get_model("bias-scale+hysteresis"), GRAVITY)
     with pytest.raises(InputError, match="needs the time of each position"):
@@ -356,22 +357,22 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
     assert same.any()
     assert cosines[~same].max() < np.cos(1 * GON)
 
-    apart = random_directions(12)
-    assert with_repeats(task, criterion, Constraints(), apart) is apart
+    apart, search = random_directions(12), Search(task, criterion, 13)
+    assert search.joined(apart) is apart
     beside = np.cross(apart[0], apart[1])
     near = apart[0] + 0.01 * GON * beside / np.linalg.norm(beside)
     thirteen = np.vstack([apart, near / np.linalg.norm(near)])
-    joined = with_repeats(task, criterion, Constraints(), thirteen)
+    joined = search.joined(thirteen)
     np.testing.assert_array_equal(joined[0], joined[12])
     np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
     assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
     kept = Constraints(least_angle=0.001 * GON)
-    assert with_repeats(task, criterion, kept, thirteen) is thirteen
+    assert replace(search, constraints=kept).joined(thirteen) is thirteen
 
     # In a row, the first and the last are near each other by way of the second alone.
     beside = np.cross(apart[0], apart[3])
     row = apart[0] + np.outer([0.0, 0.7 * GON, 1.4 * GON], beside / np.linalg.norm(beside))
     row /= np.linalg.norm(row, axis=1, keepdims=True)
     assert row[0] @ row[1] > np.cos(1 * GON) > row[0] @ row[2]
-    joined = with_repeats(task, criterion, Constraints(), np.vstack([row, apart[1:]]))
+    joined = search.joined(np.vstack([row, apart[1:]]))
     np.testing.assert_array_equal(joined[:3], np.tile(row[1], (3, 1)))

@@ -13,7 +13,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON
 from accelstudy.design.criteria import get_criterion
-from accelstudy.design.search import optimal_design
+from accelstudy.design.search import Search
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best, in_order
 from accelstudy.schemes import get_scheme
@@ -32,7 +32,7 @@ def found():
     numbers = {}
     for approach, name, n, tilt in (("gravity", "I", 12, 30), ("robot", "I", 10, 50)):
         task = Task(NINE, get_approach(approach), tilt_range=tilt * GON)
-        design = optimal_design(task, get_criterion(name, task), n, starts=2, bounded=tilt == 30)
+        design = Search(task, get_criterion(name, task), n).design(starts=2, bounded=tilt == 30)
         numbers[f"design {approach}"] = design.directions.tolist()
         if tilt == 30:
             numbers["efficiency"] = design.efficiency

@@ -7,7 +7,7 @@ import json
 
 from accelstudy.approaches import get_approach
 from accelstudy.design.criteria import get_criterion
-from accelstudy.design.search import optimal_design
+from accelstudy.design.search import Search
 from accelstudy.design.task import Task
 from accelstudy.schemes.optimal import TABLE
 from accelstudy.sensors.models import get_model
@@ -20,7 +20,7 @@ DECIMALS = 6
 def searched(name, n):
     """Positions that are found, their efficiency, and the bound of the criterion."""
     criterion = get_criterion(name, TASK)
-    found = optimal_design(TASK, criterion, n)
+    found = Search(TASK, criterion, n).design()
     directions = (found.directions.round(DECIMALS) + 0.0).tolist()
     value = float(criterion.value(TASK.normal(directions)))
     efficiency = min(1.0, criterion.efficiency(value, found.bound))

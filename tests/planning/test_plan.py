@@ -27,7 +27,7 @@ from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
 from accelstudy.planning.candidates import NINE, candidates, information_of, tilt_of
-from accelstudy.planning.optimised import Sought
+from accelstudy.planning.optimised import Kind
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
@@ -156,26 +156,28 @@ def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
 
 def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
     first = plan.first
-    assert first.candidate.equipment == BY_HAND
-    assert first.candidate.model.name == NINE
+    assert first.equipment == BY_HAND
+    assert first.model.name == NINE
     assert first.simulated.rms.max() <= 10 * MGON
     cheaper = [
         c for c in plan.compared
-        if c.equipment == BY_HAND and c.seconds < first.candidate.seconds and c.rms <= 10 * MGON
+        if c.equipment == BY_HAND and c.seconds < first.seconds and c.tilt.rms.max() <= 10 * MGON
     ]  # fmt: skip
-    assert all(c.rms > 9.6 * MGON for c in cheaper)  # linear theory may be optimistic, by little
-    times = [r.candidate.seconds for r in plan.ranked]
+    assert all(
+        c.tilt.rms.max() > 9.6 * MGON for c in cheaper
+    )  # linear theory may be optimistic, by little
+    times = [r.seconds for r in plan.ranked]
     assert times == sorted(times)
-    kinds = {(r.candidate.equipment, r.candidate.model.name) for r in plan.ranked}
+    kinds = {(r.equipment, r.model.name) for r in plan.ranked}
     assert len(kinds) == len(plan.ranked)
-    assert 60 < plan.stricter.candidate.scheme.n_positions < 90
+    assert 60 < plan.stricter.scheme.n_positions < 90
 
 
 def test_simulation_agrees_with_linear_theory(plan):
     for ranked in plan.ranked:
         if ranked.simulated is not None:
-            expected, simulated = ranked.candidate.tilt.rms, ranked.simulated
-            assert simulated.simulated == plan.replicates
+            expected, simulated = ranked.tilt.rms, ranked.simulated
+            assert simulated.statistics.simulated == plan.replicates
             assert np.all(np.abs(simulated.rms - expected) < 4 * simulated.error + 0.01 * expected)
 
 
@@ -202,9 +204,9 @@ def test_the_study_of_a_plan_makes_its_numbers_again(plan, tmp_path):
 def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipment):
     question = asked(get_data_sheet(name), equipment=(equipment,), holds=(10.0,))
     compared = candidates(question)
-    best = min(compared, key=lambda c: c.rms)
+    best = min(compared, key=lambda c: c.tilt.rms.max())
     assert best.equipment == equipment
-    assert 0 < best.rms < 100 * MGON
+    assert 0 < best.tilt.rms.max() < 100 * MGON
     assert limits(question, best)
     assert all(spoiler.size > 0 for spoiler in spoilers(question, best))
     assert in_use(question).reading > 0
@@ -216,9 +218,10 @@ def test_longer_holds_lower_white_noise_and_not_the_bias_instability():
     for sheet, gains in ((loud, True), (wandering, False)):
         question = asked(sheet, equipment=(BY_HAND,), holds=(1.0, 100.0), most_positions=30)
         short, long = (
-            min(c.rms for c in candidates(question) if c.hold == hold) for hold in question.holds
+            min(c.tilt.rms.max() for c in candidates(question) if c.hold == hold)
+            for hold in question.holds
         )
-        assert (long < short / 5) is gains
+        assert (long < short / 5) == gains
     limiting = _candidate(asked(wandering, holds=(10.0,)))
     assert limits(asked(wandering, holds=(10.0,)), limiting) == "wander of the sensor's bias"
 
@@ -226,7 +229,7 @@ def test_longer_holds_lower_white_noise_and_not_the_bias_instability():
 def test_neglected_effects_decide_the_model():
     bent = DataSheet("s", position_sigma=0.5e-3, nonlinearity=0.005, full_scale=19.6133)
     result = answer(asked(bent, equipment=(BY_HAND,)), replicates=500)
-    names = [effect.name for effect in result.first.candidate.model.effects]
+    names = [effect.name for effect in result.first.model.effects]
     assert {"quadratic_scale", "cubic_scale"} <= set(names)
 
 
@@ -295,9 +298,9 @@ def test_by_hand_alone_it_is_said_that_a_robot_would_do():
 def test_the_way_by_hand_stays_in_the_table_however_long_it_takes():
     slow = replace(BY_HAND, moving=600.0)
     result = answer(asked(equipment=(slow, ROBOT)), replicates=500)
-    assert result.first.candidate.equipment == slow
+    assert result.first.equipment == slow
     assert len(result.ranked) <= 8
-    assert result.ranked[-1].candidate.equipment == slow
+    assert result.ranked[-1].equipment == slow
     assert part_lines("answer", result)[0].startswith("You need no robot.")
 
 
@@ -364,13 +367,13 @@ def rms(left):
 def positions(plan, tmp_path_factory):
     """Positions by the command that the plan tells."""
     folder = tmp_path_factory.mktemp("positions")
-    command = positions_command(plan.question, plan.first.candidate)
+    command = positions_command(plan.question, plan.first)
     succeed(*shlex.split(command.replace("positions.yaml", str(folder / "positions.yaml")))[1:])
     return yaml.safe_load((folder / "positions.yaml").read_text(encoding="utf-8"))["directions"]
 
 
 def test_the_command_that_a_plan_tells_finds_the_positions_that_it_simulated(plan, positions):
-    mine = plan.first.candidate.scheme.directions
+    mine = plan.first.scheme.directions
     distances = np.linalg.norm(mine[:, None] - np.array(positions)[None], axis=-1)
     assert len(positions) == len(mine)
     assert distances.min(axis=0).max() < 1e-8
@@ -390,12 +393,12 @@ def test_the_recommended_positions_suffice_and_both_angles_stay_below_what_is_sa
 
 def test_one_position_less_does_not_suffice(plan):
     """Neither the best that are found, nor any at all: the bound is one of all choices."""
-    n = plan.first.candidate.scheme.n_positions
+    n = plan.first.scheme.n_positions
     assert n == 18
-    sought = Sought(plan.question, BY_HAND, plan.first.candidate.model.name, 10.0)
-    value, error = rms(by_hand(sought.candidate(n - 1).scheme.directions, 30 * GON))
+    kind = Kind.of(plan.question, plan.first)
+    value, error = rms(by_hand(kind.best(n - 1).scheme.directions, 30 * GON))
     assert value > 10 * MGON + 2 * error
-    request = sought.request(n - 1)
+    request = kind.request(n - 1)
     optimum = continuous_optimum(request.task, request.chosen, Sphere(), Constraints(), n - 1)
     assert np.exp(optimum.bound / 2) > 10 * MGON
     assert f"{n - 1} positions leave" in part_lines("answer", plan)[2]
@@ -404,25 +407,23 @@ def test_one_position_less_does_not_suffice(plan):
 def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
     question = Question(20 * MGON, 30 * GON, of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
     found = answer(question, replicates=4000).first
-    n = found.candidate.scheme.n_positions
-    sought = Sought(question, BY_HAND, found.candidate.model.name, 10.0)
+    n = found.scheme.n_positions
+    kind = Kind.of(question, found)
     inside = {
-        count: np.mean(
-            np.all(by_hand(sought.candidate(count).scheme.directions, 30 * GON) < 20 * MGON, 1)
-        )
+        count: np.mean(np.all(by_hand(kind.best(count).scheme.directions, 30 * GON) < 20 * MGON, 1))
         for count in (n, n - 2)
     }
     noise = 3 * np.sqrt(0.05 * 0.95 * (1 / REPLICATES + 1 / 4000))
     assert inside[n] > 0.95 - noise
     assert inside[n - 2] < 0.95
     # One angle alone would make fewer positions seem enough.
-    alone = by_hand(found.candidate.scheme.directions, 30 * GON)
+    alone = by_hand(found.scheme.directions, 30 * GON)
     assert np.quantile(alone, 0.95, axis=0).max() < 0.96 * 20 * MGON
 
 
 def test_with_a_robot_five_positions_do_what_four_do_not(plan):
-    robot = next(r for r in plan.ranked if r.candidate.equipment == ROBOT)
-    assert robot.candidate.scheme.n_positions == 5
+    robot = next(r for r in plan.ranked if r.equipment == ROBOT)
+    assert robot.scheme.n_positions == 5
     assert robot.fewer.rms.max() > 10 * MGON
 
 
@@ -481,7 +482,7 @@ def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
     assert config["grids"][0]["schemes"] == str(path)
     (result,) = simulate(question, config)
     assert mine in result.cell
-    assert result.simulated == 200
+    assert result.statistics.simulated == 200
 
 
 def test_an_unreachable_target_has_an_exit_status_of_its_own():
