@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     AfterValidator,
     Field,
-    GetCoreSchemaHandler,
+    GetPydanticSchema,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     field_validator,
@@ -120,39 +119,32 @@ OWN_MODELS: ContextVar[Mapping[str, SensorModel]] = ContextVar(
 """Models that the configuration defines, while the blocks that may name them are parsed."""
 
 
-@dataclass(frozen=True)
-class Written:
-    """How a field is written: the type in the file, and the ways there and back.
-
-    Attributes
-    ----------
-    kind : type, of what the file has
-    parse, plain : functions from that to the object, and back
-    """
-
-    kind: Any
-    parse: Callable[[Any], Any]
-    plain: Callable[[Any], Any]
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        back = core_schema.plain_serializer_function_ser_schema(self.plain)
-        inner = handler.generate_schema(self.kind)
-        return core_schema.no_info_after_validator_function(self.parse, inner, serialization=back)
+def _written(
+    kind: Any, parse: Callable[[Any], Any], plain: Callable[[Any], Any]
+) -> GetPydanticSchema:
+    """How a field is written: the type in the file, and the ways to the object and back."""
+    return GetPydanticSchema(
+        lambda _, handler: core_schema.no_info_after_validator_function(
+            parse,
+            handler.generate_schema(kind),
+            serialization=core_schema.plain_serializer_function_ser_schema(plain),
+        )
+    )
 
 
-def _one(find: Callable[[str], Any]) -> Written:
-    return Written(str, find, lambda thing: thing.name)
+def _one(find: Callable[[str], Any]) -> GetPydanticSchema:
+    return _written(str, find, lambda thing: thing.name)
 
 
-def _several(find: Callable[[str], Any], everything: Callable[[], Iterable[str]]) -> Written:
+def _several(
+    find: Callable[[str], Any], everything: Callable[[], Iterable[str]]
+) -> GetPydanticSchema:
     """How a list of things is written: by their names, or as `all`."""
 
     def parse(names: list[str]) -> list[Any]:
         return [find(name) for name in (everything() if names == ["all"] else names)]
 
-    return Written(OneOrMore[str], parse, lambda things: [thing.name for thing in things])
+    return _written(OneOrMore[str], parse, lambda things: [thing.name for thing in things])
 
 
 def _model(text: str) -> SensorModel:
@@ -206,9 +198,9 @@ Approaches = Annotated[
         description="names of approaches, or all",
     ),
 ]
-Composition = Annotated[SensorModel, Written(OneOrMore[str], _composed, _effects)]
+Composition = Annotated[SensorModel, _written(OneOrMore[str], _composed, _effects)]
 """A model that is written as a list of effects."""
-Simulated = Annotated[SensorModel | None, Written(OneOrMore[str], _simulated, _effects)]
+Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _effects)]
 
 # --- the blocks ----------------------------------------------------------------------------------
 
@@ -251,7 +243,7 @@ class NoiseConfig(Block):
     sensor: SensorNoise = SensorNoise()
     robot: RobotNoise = RobotNoise()
     gravity: GravityNoise = GravityNoise()
-    effects: Annotated[list[NoiseEffect], Written(list[str], _noise_effects, _specs)] = Field(
+    effects: Annotated[list[NoiseEffect], _written(list[str], _noise_effects, _specs)] = Field(
         default_factory=list,
         description="noise effects of the forces, e.g. heavy_tails(nu=3), in the order in which "
         "they act; the calibration ignores them",
@@ -539,10 +531,11 @@ class Study(Configuration):
     @property
     def all_grids(self) -> list[Grid]:
         """The grids, and the presets as grids."""
-        shared = dict(self.presets or ())
-        rows = [(get_model(row.model), get_scheme(row.scheme)) for row in PRESETS if shared]
-        of_rows = [Grid.model_construct(models=[m], schemes=[s], **shared) for m, s in rows]
-        return [*self.grids, *of_rows]
+        if self.presets is None:
+            return self.grids
+        shared = self.presets.model_dump()
+        rows = [{"models": row.model, "schemes": row.scheme, **shared} for row in PRESETS]
+        return [*self.grids, *map(Grid.model_validate, rows)]
 
     @cached_property
     def cells(self) -> list[Cell]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +11,6 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
 from accelstudy.adjustment.linear_theory import LinearTheory
-from accelstudy.files.tables import read_table
 from accelstudy.simulation.sessions import BLOCK
 from accelstudy.study.cell import Cell
 from accelstudy.study.compiling import calibrator
@@ -122,7 +119,7 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     parameter = np.tile(np.arange(u), count)
 
     def coded(codes: Any, names: Any) -> pa.DictionaryArray:
-        return pa.DictionaryArray.from_arrays(pa.array(codes, pa.int32()), pa.array([*names]))
+        return pa.array([*names]).dictionary_encode().take(pa.array(codes, pa.int32()))
 
     columns = {
         "cell": coded(np.zeros(count * u), [cell.name]),
@@ -140,39 +137,3 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
         "converged": np.repeat(simulated.converged, u),
     }
     return pa.table(columns, schema=ESTIMATES)
-
-
-def read_replicates(paths: Sequence[str | Path], cell: Cell) -> Replicates | None:
-    """Read the stored replicates of a cell; None if the files hold none of it.
-
-    Parameters
-    ----------
-    paths : files of estimates; they may hold other cells too
-    cell : Cell
-
-    Returns
-    -------
-    Replicates, whose `correlation_sum`, which is not stored, is NaN; or None
-
-    Raises
-    ------
-    InputError
-        If a file is missing or damaged.
-    """
-    names = ESTIMATES.names[5:]
-    rows = read_table(paths, columns=names, rows=("cell", [cell.name]))
-    if rows.empty:
-        return None
-    u = cell.n_unknowns
-    stored = {name: rows[name].to_numpy().reshape(-1, u) for name in names}
-    simulated = Block(
-        estimates=stored["estimate"],
-        sigma_priori=stored["sigma_priori"],
-        omega=stored["omega"][:, 0],
-        redundancy=int(stored["redundancy"][0, 0]),
-        iterations=stored["iterations"][:, 0],
-        converged=stored["converged"][:, 0],
-        correlation_sum=np.full((u, u), np.nan),
-    )
-    linear = stored["linear_estimate"], stored["linear_omega"][:, 0]
-    return Replicates.of(simulated, cell.linear_theory, *linear)

@@ -7,9 +7,10 @@ from pathlib import Path
 import pandas as pd
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.claims.verdicts import is_claimed, judge
+from accelstudy.study.claims.quantities import Evidence
+from accelstudy.study.claims.verdicts import judge
 from accelstudy.study.config import Study, read_study
-from accelstudy.study.replicates import Replicates
+from accelstudy.study.replicates import Replicates, estimates_table
 from accelstudy.study.results import simulated_tables
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
@@ -39,16 +40,18 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
 
 def study_tables(study: Study) -> dict[str, pd.DataFrame]:
     """Run a checked study in memory; see `run_study`."""
-    calibrations: list[tuple[Cell, Replicates]] = []
+    estimates: dict[str, pd.DataFrame] = {}
 
     def keep(cell: Cell, replicates: Replicates) -> None:
-        if study.paper and is_claimed(study, cell):
-            calibrations.append((cell, replicates))
+        settings = study.sensitivity
+        if study.paper and settings and cell.name == settings.cell(cell.approach, cell.scheme):
+            estimates[cell.name] = estimates_table(cell, replicates).to_pandas()
 
     tables = simulated_tables(study.cells, study.seed, study.leveling.model_dump(), keep)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        tables["claims"], tables["claims_by_scheme"] = judge(study, tables, calibrations)
+        evidence = Evidence(study, tables, estimates.__getitem__)
+        tables |= {"claims": judge(evidence), "claims_by_scheme": evidence.by_scheme}
     return tables

@@ -165,14 +165,13 @@ def _correlations(statistics: CellStatistics) -> dict[str, Any]:
     simulated = None if statistics.replicates is None else statistics.replicates.simulated
     names = [] if simulated is None else [*statistics.cell.parameter_units]
     u, empirical = len(names), statistics["correlation"]
-    pairs = u * (u - 1) // 2
-    number = np.zeros((u, u), int)  # of each pair; the diagonal stands before them
-    number[np.tril_indices(u, -1)] = np.arange(1, pairs + 1)
-    place = (number + number.T).ravel()
+    i, j = np.tril_indices(u, -1)
     one = 1.0 if np.isfinite(empirical.plain).any() else np.nan
 
     def whole(below: Array, diagonal: float) -> Array:
-        return np.append(diagonal, np.broadcast_to(below, pairs))[place]
+        matrix = np.full((u, u), diagonal)
+        matrix[i, j] = matrix[j, i] = below
+        return matrix.ravel()
 
     return {
         "cell": statistics.cell.name,

@@ -25,7 +25,7 @@ from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.beyond_linear_theory import beyond_linear_theory
 from accelstudy.study.claims.page import claims_markdown, claims_page
-from accelstudy.study.claims.quantities import Evidence
+from accelstudy.study.claims.quantities import Evidence, claim_table
 from accelstudy.study.claims.verdicts import (
     FAILS,
     HOLDS,
@@ -34,11 +34,10 @@ from accelstudy.study.claims.verdicts import (
     REPRODUCED,
     TABLES,
     judge,
-    judge_all,
+    judge_claim,
     judge_claims,
     judge_simulation,
 )
-from accelstudy.study.replicates import read_replicates
 from accelstudy.study.sensitivity import shapley_table
 
 REPLICATES = 1000
@@ -77,35 +76,34 @@ def tables(folder):
 
 
 @pytest.fixture(scope="module")
-def calibrations(tables, folder):
-    cells = make_study(**KEYS).cells
-    return [(cell, read_replicates(estimates_in(folder), cell)) for cell in cells]
+def evidence(tables):
+    """Function that gives the evidence where the study, its tables or `by_scheme` are others."""
+    estimates_of = dict([*tables["estimates"].groupby("cell", observed=True)]).__getitem__
+    usual = Evidence(make_study(**KEYS), tables, estimates_of)
+
+    def of(by_scheme=usual.by_scheme, noise=(), **changed):
+        study = make_study(**KEYS, noise=dict(noise))
+        other = Evidence(study, {**tables, **changed}, estimates_of)
+        vars(other)["by_scheme"] = by_scheme
+        return other
+
+    return of
 
 
 @pytest.fixture(scope="module")
-def by_scheme(tables, calibrations):
-    return judge(make_study(**KEYS), tables, calibrations)[1]
+def judged(evidence):
+    return judge(evidence()).set_index("claim")
 
 
-@pytest.fixture(scope="module")
-def rejudge(tables, by_scheme):
-    """Judge again where the study or its tables are others."""
-
-    def claims(keys=KEYS, **changed):
-        evidence = Evidence(make_study(**keys), {**tables, "by_scheme": by_scheme, **changed})
-        return judge_all(evidence).set_index("claim")
-
-    return claims
+def claim_of(name, evidence):
+    """The row of one claim of the paper."""
+    (claim,) = (each for each in claim_table()["paper"] if each["claim"] == name)
+    return judge_claim(claim, evidence)
 
 
-@pytest.fixture(scope="module")
-def judged(rejudge, by_scheme):
-    return rejudge(), by_scheme.set_index(["claim", "scheme"])
-
-
-def test_order_of_the_inputs(tables, judged, rejudge):
+def test_order_of_the_inputs(tables, judged, evidence):
     """At a roll of 50 gon and a pitch of 25 s_y and s_z overtake b_y and b_z; elsewhere none."""
-    claim = judged[0].loc["order-of-inputs"]
+    claim = judged.loc["order-of-inputs"]
     assert claim["verdict"] == NOT_REPRODUCED
     assert claim["ours"] == pytest.approx(100 / 12)  # of 6 attitudes, roll and pitch
     assert "s_y, s_z overtake b_y, b_z, from rank 4 down" in claim["sentence"]
@@ -113,7 +111,7 @@ def test_order_of_the_inputs(tables, judged, rejudge):
 
     shapley = tables["shapley"]
     same = shapley.assign(shapley_effect=shapley["total_effect"])
-    claim = rejudge(shapley=same).loc["order-of-inputs"]
+    claim = claim_of("order-of-inputs", evidence(shapley=same))
     assert (claim["verdict"], claim["ours"]) == (REPRODUCED, 0)
 
 
@@ -126,16 +124,15 @@ def test_order_of_the_inputs(tables, judged, rejudge):
     (0, (-5, 5), NOT_REPRODUCED),
     (41, (-10, 65), REPRODUCED),  # single simulations spread over the paper's number
 ])  # fmt: skip
-def test_verdict_on_a_reduction(tables, judged, by_scheme, rejudge, mean, central, verdict):
+def test_verdict_on_a_reduction(tables, judged, evidence, mean, central, verdict):
     low, high = central
     single = {"single_low": low, "single_high": high, "percentile": 12.34}
-    bias = by_scheme["claim"] == "reduction-bias"
-    changed = pd.concat([by_scheme[~bias], by_scheme[bias].assign(**single)])
     summary = tables["summary"].copy()
     at = (summary["approach"] == "robot") & summary["parameter"].str.startswith("b_")
-    factor = (100 - mean) / (100 - judged[0].loc["reduction-bias", "ours"])
+    factor = (100 - mean) / (100 - judged.loc["reduction-bias", "ours"])
     summary.loc[at, "sd_posteriori_mean"] *= factor
-    claim = rejudge(by_scheme=changed, summary=summary).loc["reduction-bias"]
+    changed = evidence(by_scheme=evidence().by_scheme.assign(**single), summary=summary)
+    claim = claim_of("reduction-bias", changed)
     assert claim["verdict"] == verdict
     assert claim["ours"] == pytest.approx(mean, abs=1e-9)
     assert (claim["single_low"], claim["single_high"]) == (low, high)
@@ -145,36 +142,35 @@ def test_verdict_on_a_reduction(tables, judged, by_scheme, rejudge, mean, centra
     assert said in claim["sentence"]
 
 
-def test_verdict_on_accuracy_near_level(rejudge):
-    claim = rejudge(keys={**KEYS, "noise": {"sensor": {"sigma_mps2": 0.004}}}).loc["level-roll"]
+def test_verdict_on_accuracy_near_level(evidence):
+    claim = claim_of("level-roll", evidence(noise={"sensor": {"sigma_mps2": 0.004}}))
     assert claim["verdict"] == NOT_REPRODUCED
     assert claim["ours"] == pytest.approx(25.97, rel=0.01)
 
 
-def test_verdict_on_the_correlation(tables, rejudge):
+@pytest.mark.parametrize(("claim", "factor", "rest", "verdict"), [
+    ("scale-correlation-gravity", 0.8, 0.0, REPRODUCED),  # 0.20
+    ("scale-correlation-gravity", 1.6, 0.0, NOT_REPRODUCED),  # 0.40
+    ("scale-correlation-gravity", 0.1, 0.0, NOT_REPRODUCED),  # 0.02
+    ("nearly-uncorrelated", 1.0, 0.0, REPRODUCED),
+    ("nearly-uncorrelated", 1.0, 0.2, NOT_REPRODUCED),
+])  # fmt: skip
+def test_verdict_on_the_correlation(tables, evidence, claim, factor, rest, verdict):
     table = tables["correlations"]
     scales = table["parameter_1"].str.startswith("s_") & table["parameter_2"].str.startswith("s_")
-
-    def verdicts(factor, rest=0.0):
-        adjustment = table["adjustment"].where(~scales, factor * table["adjustment"])
-        adjustment = adjustment.where(scales, adjustment + rest)
-        return rejudge(correlations=table.assign(adjustment=adjustment))["verdict"]
-
-    assert verdicts(0.8)["scale-correlation-gravity"] == REPRODUCED  # 0.20
-    assert verdicts(1.6)["scale-correlation-gravity"] == NOT_REPRODUCED  # 0.40
-    assert verdicts(0.1)["scale-correlation-gravity"] == NOT_REPRODUCED  # 0.02
-    assert verdicts(1)["nearly-uncorrelated"] == REPRODUCED
-    assert verdicts(1, 0.2)["nearly-uncorrelated"] == NOT_REPRODUCED
+    adjustment = table["adjustment"] * np.where(scales, factor, 1) + np.where(scales, 0, rest)
+    changed = evidence(correlations=table.assign(adjustment=adjustment))
+    assert claim_of(claim, changed)["verdict"] == verdict
 
 
-def test_a_scheme_without_redundancy_has_no_reduction(tables, calibrations):
+def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
-    study = make_study(**KEYS)
-    claims, by_scheme = judge(study, {**tables, "summary": summary}, calibrations)
-    reductions = by_scheme[by_scheme["claim"].str.startswith("reduction")]
+    usual = evidence()
+    other = Evidence(usual.study, {**tables, "summary": summary}, usual.estimates_of)
+    reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
     assert set(reductions["scheme"]) == {"mclaren-24"}
-    assert "of 1 schemes" in claims.set_index("claim").loc["reduction-bias", "sentence"]
+    assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]
 
 
 # --- what simulation adds ------------------------------------------------------------------------
@@ -225,7 +221,7 @@ def test_what_simulation_adds_holds_or_not_or_is_not_decided(claim, changed, ver
 
 def test_what_simulation_adds_in_simulated_set_ups(tables, judged):
     """At 2 mm/s² linear theory is right; in the limits there is no room for anything else."""
-    own = judged[0][judged[0]["section"] == ""]
+    own = judged[judged["section"] == ""]
     assert len(own) == 6
     assert own["paper"].isna().all()
     assert set(own.loc[["bias-small-robot", "variance-linear-robot"], "verdict"]) == {HOLDS}
@@ -236,21 +232,20 @@ def test_what_simulation_adds_in_simulated_set_ups(tables, judged):
     assert own.loc["noise-when-off-gravity", "ours"] == pytest.approx(off)
 
 
-def test_what_simulation_adds_is_judged_at_the_papers_noise_and_where_theory_knows_all(rejudge):
+def test_what_simulation_adds_is_judged_at_the_papers_noise_and_where_theory_knows_all(evidence):
     rows = simulation()
     noisy = rows.assign(sensor_sigma_mps2=0.2, bias=1.0, bias_half=0.0)
     both = judged_simulation(pd.concat([rows, noisy]))
     pd.testing.assert_frame_equal(both, judged_simulation(rows))
-    heavy = {**KEYS, "noise": {"effects": ["heavy_tails(nu=3)"]}}
-    assert (rejudge(keys=heavy)["section"] != "").all()
+    heavy = evidence(noise={"effects": ["heavy_tails(nu=3)"]})
+    assert (judge(heavy)["section"] != "").all()
 
 
 # --- for people ----------------------------------------------------------------------------------
 
 
-def test_every_claim_is_on_the_page_and_in_the_markdown(judged):
-    claims = judged[0].reset_index()
-    schemes = judged[1].reset_index().assign(scheme="<b>&</b>")
+def test_every_claim_is_on_the_page_and_in_the_markdown(judged, evidence):
+    claims, schemes = judged.reset_index(), evidence().by_scheme.assign(scheme="<b>&</b>")
     page, text = claims_page(claims, schemes), claims_markdown(claims)
     for row in claims.to_dict("records"):
         for words in (row["statement"], row["sentence"], row["verdict"]):
@@ -267,7 +262,7 @@ def test_every_claim_is_on_the_page_and_in_the_markdown(judged):
     assert not re.search(r"(src|href)=[\"']https?:", page)
 
 
-def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
+def test_claims_as_the_workflow_judges_them(tables, folder, judged, evidence, tmp_path):
     """From files to files, with estimates of other cells in them."""
     outputs = {
         "claims": tmp_path / "claims.parquet",
@@ -279,6 +274,6 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, tmp_path):
         {name: folder / f"{name}.parquet" for name in TABLES}, outputs, PROVENANCE,
     )  # fmt: skip
     claims = read_table(outputs["claims"])
-    pd.testing.assert_frame_equal(claims.set_index("claim"), judged[0], check_dtype=False)
-    assert len(read_table(outputs["by_scheme"])) == len(judged[1])
+    pd.testing.assert_frame_equal(claims.set_index("claim"), judged, check_dtype=False)
+    assert len(read_table(outputs["by_scheme"])) == len(evidence().by_scheme)
     assert outputs["html"].read_text(encoding="utf-8").lower().startswith("<!doctype html>")

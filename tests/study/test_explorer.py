@@ -63,6 +63,21 @@ def page(written):
     return written.read_text(encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def other(study, tables, folder):
+    """Another page: all models have one title, which looks like markup, and angles are in degrees.
+
+    Of two set-ups some calibrations failed, and all have an infinite condition.
+    """
+    cells = tables["cells"].assign(condition=np.inf)
+    cells.loc[cells.index[cells["estimable"]][:2], "n_converged"] = [0, 7]
+    with pytest.MonkeyPatch.context() as patch, angles_in("deg"):
+        patch.setattr(content, "model_title", lambda name: "<b>mine</b>")
+        page = explorer_page(study, {**tables, "cells": cells})
+    (folder / "other.html").write_text(page, encoding="utf-8")
+    return page
+
+
 def read(page, name):
     """What the page's script reads."""
     text = re.search(f'id="packed-{name}">(.*?)</script>', page)[1]
@@ -141,17 +156,6 @@ def test_parameters_and_correlations_are_those_of_the_tables(page, tables):
         np.testing.assert_allclose(matrix, expected, rtol=0, atol=0.00051)
 
 
-def test_some_failed_and_an_infinite_condition(study, tables):
-    cells = tables["cells"].copy()
-    sound = cells.index[cells["estimable"]]
-    cells.loc[sound[:2], "n_converged"] = [0, 7]
-    cells["condition"] = np.inf
-    rows = table_of(explorer_page(study, {**tables, "cells": cells}), "setups")
-    states = [f"{n} of 40 converged" for n in (0, 7, 40)]
-    assert list(rows.loc[sound[:3], "state"]) == states
-    assert rows["condition"].isna().all()
-
-
 def test_the_page_is_small_and_whole_and_the_same_again(page, study, tables):
     assert len(page.encode()) <= 1_000_000
     assert_sound(re.sub(r"<script\b.*?</script>", "", page, flags=re.DOTALL))
@@ -159,19 +163,24 @@ def test_the_page_is_small_and_whole_and_the_same_again(page, study, tables):
     assert explorer_page(study, tables) == page
 
 
-def test_models_and_schemes_of_the_same_title_are_told_apart(study, tables, monkeypatch):
-    monkeypatch.setattr(content, "model_title", lambda name: "mine")
-    rows = table_of(explorer_page(study, tables), "setups")
-    assert list(rows["model"]) == [f"mine ({name})" for name in tables["cells"]["model"]]
+def test_failures_and_an_infinite_condition(other, tables):
+    rows = table_of(other, "setups")
+    sound = tables["cells"].index[tables["cells"]["estimable"]]
+    states = [f"{n} of 40 converged" for n in (0, 7, 40)]
+    assert list(rows.loc[sound[:3], "state"]) == states
+    assert rows["condition"].isna().all()
+
+
+def test_models_of_the_same_title_are_told_apart(other, tables):
+    rows = table_of(other, "setups")
+    assert list(rows["model"]) == [f"<b>mine</b> ({name})" for name in tables["cells"]["model"]]
     assert set(rows["scheme"]) == {"24 McLaren", "12 icosahedron"}
 
 
-def test_angles_in_degrees(study, tables):
-    with angles_in("deg"):
-        page = explorer_page(study, tables)
-    assert "mgon" not in json.dumps(read(page, "page")["columns"], ensure_ascii=False)
-    assert "mgon" not in set(table_of(page, "parameters")["unit"])
-    same(table_of(page, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
+def test_angles_in_degrees(other, tables):
+    assert "mgon" not in json.dumps(read(other, "page")["columns"], ensure_ascii=False)
+    assert "mgon" not in set(table_of(other, "parameters")["unit"])
+    same(table_of(other, "setups")["roll_rms"][:1], tables["leveling"]["roll_rms_mgon"][:1] * 0.9)
 
 
 # --- in a browser --------------------------------------------------------------------------------
@@ -327,10 +336,9 @@ def test_conditions_leave_what_is_accurate_enough(shown, tables):
     assert (rows(shown)["both 95 % below / mgon"].astype(float) <= limit).all()
 
 
-def test_names_are_no_markup(tab, study, tables, tmp_path, monkeypatch):
-    monkeypatch.setattr(content, "model_title", lambda name: "<b>mine</b>")
-    (tmp_path / "page.html").write_text(explorer_page(study, tables), encoding="utf-8")
-    load(tab, (tmp_path / "page.html").as_uri())
+@pytest.mark.usefixtures("other")
+def test_names_are_no_markup(tab, folder):
+    load(tab, (folder / "other.html").as_uri())
     assert rows(tab)["model"][0].startswith("<b>mine</b>")
 
 

@@ -2,14 +2,13 @@
 
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from docutils.core import publish_string
 from matplotlib.colors import to_rgb
-from study_helpers import run_study
+from study_helpers import NINE, content, grid, run_study
 
 from accelstudy.basics.errors import InputError
 from accelstudy.drawing import style
@@ -20,40 +19,21 @@ from accelstudy.study.figures import caption, draw, figure_names, get_figure, wr
 from accelstudy.study.figures.attitudes import sigma_table
 from accelstudy.study.figures.calibrations import correlation_table, single_runs
 from accelstudy.study.figures.factors import FACTORS
-from accelstudy.study.figures.leveling_overview import tilt_table
+from accelstudy.study.figures.panels import tilt_errors
 from accelstudy.study.figures.table_1 import preset_table
 from accelstudy.study.figures.total_effects import changes
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 
-NINE = "bias-scale-nonorthogonality"
-SENSOR = {
-    "bias": {"value": [0.05, 0.01, 0.03], "unit": "m/s^2"},
-    "scale": {"value": [200, 200, 200], "unit": "ppm"},
-    "nonorthogonality": {"value": [12, 12, 44], "unit": "mgon"},
-}
-PAPER = {
-    "study": "tiny",
-    "seed": 1,
-    "sensor": SENSOR,
-    "grids": [{"models": NINE, "schemes": ["faces-6", "mclaren-24"], "replicates": 30},
-              {"models": f"{NINE}-crossaxis", "schemes": "mclaren-24", "replicates": 10}],
-    "presets": {"replicates": 5},
-    "leveling": {"attitudes": 10},
-    "sensitivity": {"base_samples": 32,
-                    "resamples": 10,
-                    "roll_gon": [-50, 0, 50],
-                    "pitch_gon": [-25, 0, 25]},
-    "paper": True,
-}  # fmt: skip
-
-
-def run(keys: dict, folder: Path) -> dict[str, pd.DataFrame]:
-    """All tables of a study."""
-    study, tables = parse_study(keys), run_study(folder, **keys)
-    if study.sensitivity:
-        tables["sensitivity"] = sensitivity_table(study, tables["summary"])
-        tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
-    return tables
+PAPER = content(
+    grids=[grid(schemes=["faces-6", "mclaren-24"], replicates=30), grid(f"{NINE}-crossaxis")],
+    presets={"replicates": 5},
+    leveling={"attitudes": 10},
+    sensitivity={
+        **{"base_samples": 32, "resamples": 10},
+        **{"roll_gon": [-50, 0, 50], "pitch_gon": [-25, 0, 25]},
+    },
+    paper=True,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -67,8 +47,11 @@ def paper() -> Study:
 
 
 @pytest.fixture(scope="module")
-def tables(tmp_path_factory) -> dict[str, pd.DataFrame]:
-    return run(PAPER, tmp_path_factory.mktemp("paper"))
+def tables(paper, tmp_path_factory) -> dict[str, pd.DataFrame]:
+    found = run_study(tmp_path_factory.mktemp("paper"), **PAPER)
+    sensitivity = sensitivity_table(paper, found["summary"])
+    shapley = shapley_table(paper, found["summary"], found["correlations"])
+    return {**found, "sensitivity": sensitivity, "shapley": shapley}
 
 
 @pytest.fixture(scope="module")
@@ -215,10 +198,11 @@ def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):
 def test_the_tilt_overview_shows_rms_quantile_and_the_noise_of_a_reading(tables, figure_of):
     drawn, cell = figure_of("leveling-overview"), f"{NINE}/mclaren-24/gravity"
     row = tables["leveling"].set_index("cell").loc[cell]
-    shown = tilt_table(tables).set_index(["angle", "cell"]).loc["roll", cell]
-    assert (shown["rms"], shown["both"]) == (row["roll_rms_mgon"], row["both_rms_q95_mgon"])
+    shown = tilt_errors(tables["cells"], tables["leveling"])
+    shown = shown.set_index(["group", "cell"]).loc["roll", cell]
+    assert (shown["value"], shown["both"]) == (row["roll_rms_mgon"], row["both_rms_q95_mgon"])
     written = {text.get_text() for text in drawn.axes[0].texts}
-    assert f"{shown['rms']:.1f}\n{shown['both']:.1f}" in written
+    assert f"{shown['value']:.1f}\n{shown['both']:.1f}" in written
     (crosses,) = drawn.axes[0].get_lines()
     assert len(crosses.get_xdata()) == tables["cells"]["estimable"].eq(False).sum()
     legend = " ".join(text.get_text() for text in drawn.legends[0].get_texts())

@@ -133,48 +133,44 @@ def test_an_error_of_gravity_shows_a_significant_bias(tmp_path):
     assert biases.iloc[0] == pytest.approx(1e6 * 0.01 / 9.80665, rel=0.05)
 
 
-def found(study, factor):
-    """Held values and x values of each sweep."""
-    by_held = swept(study, factor).dropna(subset="x").groupby("held", sort=False)["x"]
-    return [(held.split("\n"), sorted(set(x))) for held, x in by_held]
+SIZES = ["fibonacci-12", "fibonacci-24", "fibonacci-50"]
+ERRORS = [-0.01, -0.001, 0.001, 0.01]
 
 
-def test_the_value_nearest_to_the_default_is_held_of_those_with_most():
-    def robot_of(values):
-        study = study_of(grid(sensor_sigma_mps2=[0.001, 0.005], robot_sigma_mgon=values))
-        ((held, _),) = found(study, SENSOR)
-        return held
-
-    assert robot_of([1, 3.2, 5, 20]) == ["robot noise 3.2 mgon (one of 4)"]
-    assert robot_of([1, 5, 20, 50]) == ["robot noise 5 mgon (one of 4)"]
-    assert robot_of(20) == ["robot noise 20 mgon"]
+def robot_of(values):
+    return [grid(sensor_sigma_mps2=[0.001, 0.005], robot_sigma_mgon=values)]
 
 
-def test_single_values_other_than_the_default_are_held_and_stated():
-    sizes = ["fibonacci-12", "fibonacci-24", "fibonacci-50"]
-    study = study_of(grid(schemes=sizes, sensor_sigma_mps2=0.005, robot_sigma_mgon=10))
-    assert found(study, POSITIONS) == [
-        (["sensor noise 5 mm/s²", "robot noise 10 mgon"], [12, 24, 50])
-    ]
+TWO_GRIDS = [
+    grid(sensor_sigma_mps2=[0.001, 0.005], robot_sigma_mgon=10, approaches="robot"),
+    grid(robot_sigma_mgon=[1, 3.2, 5], approaches="robot"),
+]
+"""What one grid varies is held at a value of that grid, not at one of another."""
 
 
-def test_an_error_of_gravity_alone_needs_no_zero():
-    study = study_of(grid(gravity_error_mps2=[-0.01, -0.001, 0.001, 0.01]))
-    ((held, x),) = found(study, GRAVITY_ERROR)
-    assert x == [-0.01, -0.001, 0.001, 0.01]
-    assert held == ["sensor noise 2 mm/s²", "robot noise 3.2 mgon"]
-    assert not any(found(study, factor) for factor in FACTORS if factor is not GRAVITY_ERROR)
+@pytest.mark.parametrize(("grids", "factor", "held", "x"), [
+    # The value nearest to the default, of those with most.
+    (robot_of([1, 3.2, 5, 20]), SENSOR, ["robot noise 3.2 mgon (one of 4)"], [0.001, 0.005]),
+    (robot_of([1, 5, 20, 50]), SENSOR, ["robot noise 5 mgon (one of 4)"], [0.001, 0.005]),
+    # Single values other than the default.
+    (robot_of(20), SENSOR, ["robot noise 20 mgon"], [0.001, 0.005]),
+    ([grid(schemes=SIZES, sensor_sigma_mps2=0.005, robot_sigma_mgon=10)], POSITIONS,
+     ["sensor noise 5 mm/s²", "robot noise 10 mgon"], [12, 24, 50]),
+    # An error of gravity alone needs no zero.
+    ([grid(gravity_error_mps2=ERRORS)], GRAVITY_ERROR,
+     ["sensor noise 2 mm/s²", "robot noise 3.2 mgon"], ERRORS),
+    (TWO_GRIDS, SENSOR, ["robot noise 10 mgon (one of 4)"], [0.001, 0.005]),
+    (TWO_GRIDS, ROBOT, ["sensor noise 2 mm/s² (one of 3)"], [1, 3.2, 5]),
+    ([grid(gravity_error_mps2=[0, 0.01]), grid(gravity_sigma_mps2=[0.001, 0.01])], GRAVITY_SD,
+     ["sensor noise 2 mm/s²", "robot noise 3.2 mgon", "error of gravity 0 mm/s² (one of 2)"],
+     [0, 0.001, 0.01]),
+])  # fmt: skip
+def test_other_factors_are_held_at_a_value_that_is_stated(grids, factor, held, x):
+    rows = swept(study_of(*grids), factor).dropna(subset="x")
+    (said,) = set(rows["held"])
+    assert (said.split("\n"), sorted(set(rows["x"]))) == (held, x)
 
 
-def test_each_grid_keeps_the_values_over_which_it_varies():
-    """What one grid varies is held at a value of that grid, not at one of another."""
-    study = study_of(
-        grid(sensor_sigma_mps2=[0.001, 0.005], robot_sigma_mgon=10, approaches="robot"),
-        grid(robot_sigma_mgon=[1, 3.2, 5], approaches="robot"),
-    )
-    ((held, x),) = found(study, SENSOR)
-    assert (held, x) == (["robot noise 10 mgon (one of 4)"], [0.001, 0.005])
-    ((held, x),) = found(study, ROBOT)
-    assert (held, x) == (["sensor noise 2 mm/s² (one of 3)"], [1, 3.2, 5])
-    study = study_of(grid(gravity_error_mps2=[0, 0.01]), grid(gravity_sigma_mps2=[0.001, 0.01]))
-    assert found(study, GRAVITY_SD)[0][1] == [0, 0.001, 0.01]
+def test_what_does_not_vary_is_not_swept():
+    study = study_of(grid(gravity_error_mps2=ERRORS))
+    assert all(swept(study, factor).empty for factor in FACTORS if factor is not GRAVITY_ERROR)

@@ -6,13 +6,15 @@ claim, and further numbers that its rule or its sentence uses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import yaml
 from numpy.typing import NDArray
 
 from accelstudy.basics.shares import Z95
@@ -21,7 +23,10 @@ from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
+from accelstudy.study.cell import Cell
 from accelstudy.study.config import SensitivityConfig, Study
+from accelstudy.study.known import KnownValues
+from accelstudy.study.quantiles import controlled_quantiles, share_below
 from accelstudy.study.sensitivity import APPROACHES
 
 Array = NDArray[np.float64]
@@ -30,6 +35,16 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
+LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
+"""Probabilities of quantiles of single simulations: the first and the last are the ends of the
+central 95 %, and the median is in the middle."""
+
+
+@cache
+def claim_table() -> dict[str, list[dict[str, Any]]]:
+    """Read the claims."""
+    text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text))
 
 
 @dataclass(frozen=True)
@@ -39,12 +54,13 @@ class Evidence:
     Attributes
     ----------
     study : Study, with `sensitivity`
-    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity, shapley, and
-        by_scheme (see `accelstudy.study.claims.by_scheme`), which is made of the others
+    tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
+    estimates_of : function that returns the estimates of a cell by its name, as they are stored
     """
 
     study: Study
     tables: Mapping[str, pd.DataFrame]
+    estimates_of: Callable[[str], pd.DataFrame]
 
     @property
     def settings(self) -> SensitivityConfig:
@@ -65,10 +81,33 @@ class Evidence:
         rows = self.tables[table]
         return rows[rows["cell"] == self.settings.cell(approach, scheme)]
 
+    @cached_property
+    def by_scheme(self) -> pd.DataFrame:
+        """What single simulations show in each scheme, and where the paper's number lies.
+
+        One row per claim and scheme: the paper's number; the `mean` of single simulations, their
+        `single_low`, `median` and `single_high` (the central 95 %), and the `percentile` of the
+        paper's number among them. Correlations hardly change from run to run; theirs are the least,
+        the median and the largest of the pairs of scales.
+        """
+        rows = []
+        for claim in claim_table()["by_scheme"]:
+            for scheme in self.schemes:
+                row = {"claim": claim["claim"], "scheme": scheme, "paper": claim["paper"]}
+                if "scales" in claim:
+                    pairs = scale_pairs(self, claim["scales"], scheme)
+                    ends = _ends(np.quantile(pairs, [0, 0.5, 1]))
+                    rows.append({**row, "mean": pairs.mean(), **ends})
+                    continue
+                mean = mean_reduction(self, claim["effect"], scheme)["value"]
+                if not np.isnan(mean):  # without redundancy there is no sd a posteriori
+                    single = single_reductions(self, claim["effect"], scheme, claim["paper"])
+                    rows.append({**row, "mean": mean, **single})
+        return pd.DataFrame(rows)
+
     def single_simulations(self, claim: str) -> pd.DataFrame:
         """What single simulations show of a claim, a row each scheme."""
-        rows = self.tables["by_scheme"]
-        return rows[rows["claim"] == claim].set_index("scheme")
+        return self.by_scheme[self.by_scheme["claim"] == claim].set_index("scheme")
 
 
 def estimate(value: float, half: float, **others: Any) -> Numbers:
@@ -198,9 +237,66 @@ def reduction(evidence: Evidence, effect: str) -> Numbers:
     return {**mean_reduction(evidence, effect), **single, "where": where}
 
 
+def single_reductions(evidence: Evidence, effect: str, scheme: str, paper: float) -> Numbers:
+    """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
+    cells = {cell.name: cell for cell in evidence.study.cells}
+    pair = [cells[evidence.settings.cell(each, scheme)] for each in reversed(APPROACHES)]
+    sigmas = [_sigmas(cell, evidence.estimates_of(cell.name), effect) for cell in pair]
+    n, known = min(map(len, sigmas)), None
+    ratio, linear = (sigmas[0][:n] / sigmas[1][:n]).T
+    theories = [KnownValues(cell, theory) for cell in pair if (theory := cell.linear_theory)]
+    if len(theories) == len(pair):
+        known = theories[0].effect_ratio_quantiles(theories[1], effect, LEVELS)
+    quantiles = controlled_quantiles(LEVELS, ratio, linear, known)
+    share = share_below(1 - paper / 100, ratio, quantiles)
+    ends = _ends(100 * (1 - quantiles.value[[-1, len(LEVELS) // 2, 0]]))
+    return {**ends, "percentile": float(100 * (1 - share))}
+
+
+def _ends(values: Iterable[float]) -> Numbers:
+    return dict(zip(("single_low", "median", "single_high"), map(float, values), strict=True))
+
+
+def _sigmas(cell: Cell, estimates: pd.DataFrame, effect: str) -> Array:
+    """Mean sigma a posteriori of an effect in each calibration that converged.
+
+    Returns
+    -------
+    (c, 2) array, of the calibrations and by linear theory of the same noise
+    """
+    names = [parameter.name for parameter in get_effect(effect).parameters]
+    rows = estimates[estimates["parameter"].isin(names) & estimates["converged"]]
+    theory = cell.linear_theory
+    priori = np.nan if theory is None else theory.sigma[cell.columns_of(effect)].mean()
+    own = np.sqrt(rows["omega"] / rows["redundancy"]) * rows["sigma_priori"]
+    linear = np.sqrt(rows["linear_omega"] / rows["redundancy"]) * priori
+    both = pd.DataFrame({"own": own, "linear": linear})
+    return both.groupby(rows["replicate"]).mean().to_numpy()
+
+
+def correlations(
+    evidence: Evidence,
+    approach: str = "gravity",
+    scheme: str = "",
+    first: str = "",
+    second: str = "",
+    but_of: str = "",
+) -> Array:
+    """Mean |correlation|, from the adjustment, of each pair of parameters that begin so.
+
+    Without pairs of which both begin with `but_of`, if it is given.
+    """
+    rows = evidence.rows("correlations", approach, scheme)
+    one, other = rows["parameter_1"].astype(str), rows["parameter_2"].astype(str)
+    chosen = (one != other) & one.str.startswith(first) & other.str.startswith(second)
+    if but_of:
+        chosen &= ~(one.str.startswith(but_of) & other.str.startswith(but_of))
+    return rows["adjustment"][chosen].abs().to_numpy(float)
+
+
 def scale_pairs(evidence: Evidence, approach: str, scheme: str = "") -> Array:
-    """Mean |correlation| of each pair of scales, from the adjustment."""
-    return _correlations(evidence, approach, scheme, "s_", "s_")["adjustment"].to_numpy(float)
+    """Mean |correlation| of each pair of scales."""
+    return correlations(evidence, approach, scheme, "s_", "s_")
 
 
 def scale_correlation(evidence: Evidence) -> Numbers:
@@ -212,30 +308,15 @@ def scale_correlation(evidence: Evidence) -> Numbers:
 
 def scale_correlation_ratio(evidence: Evidence) -> Numbers:
     """Mean correlation of the scales, gravity-based over robot-aided."""
-    gravity, robot = (scale_pairs(evidence, approach) for approach in APPROACHES)
-    means = {"gravity": float(gravity.mean()), "robot": float(robot.mean())}
-    value = means["gravity"] / means["robot"]
-    return {"value": value, **means, "least": robot.min(), "most": robot.max()}
+    pairs = {approach: scale_pairs(evidence, approach) for approach in APPROACHES}
+    means = {approach: float(each.mean()) for approach, each in pairs.items()}
+    ends = {"least": pairs["robot"].min(), "most": pairs["robot"].max()}
+    return {"value": means["gravity"] / means["robot"], **means, **ends}
 
 
-def largest_correlation(
-    evidence: Evidence, but_of: str = "", first: str = "", second: str = ""
-) -> Numbers:
-    """Largest gravity-based correlation of parameters that begin so, without pairs `but_of`."""
-    rows = _correlations(evidence, "gravity", "", first, second)
-    if but_of:
-        rows = rows.drop(_correlations(evidence, "gravity", "", but_of, but_of).index)
-    return {"value": float(rows["adjustment"].max())}
-
-
-def _correlations(
-    evidence: Evidence, approach: str, scheme: str, first: str, second: str
-) -> pd.DataFrame:
-    """Absolute correlations of a cell, of two parameters that begin so."""
-    rows = evidence.rows("correlations", approach, scheme)
-    one, other = rows["parameter_1"].astype(str), rows["parameter_2"].astype(str)
-    rows = rows[(one != other) & one.str.startswith(first) & other.str.startswith(second)]
-    return rows.assign(adjustment=rows["adjustment"].abs())
+def largest_correlation(evidence: Evidence, **pairs: str) -> Numbers:
+    """Largest gravity-based correlation of pairs as in `correlations`."""
+    return {"value": float(correlations(evidence, **pairs).max())}
 
 
 def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from accelstudy.basics.wording import counted, number
 from accelstudy.files.outputs import whole_file
@@ -20,13 +19,10 @@ from accelstudy.study.beyond_linear_theory import (
     knows_all,
     noise_when_off,
 )
-from accelstudy.study.cell import Cell
 from accelstudy.study.claims import quantities
-from accelstudy.study.claims.by_scheme import Calibrations, scheme_table
 from accelstudy.study.claims.page import claims_page
-from accelstudy.study.claims.quantities import Evidence, Numbers
+from accelstudy.study.claims.quantities import Evidence, Numbers, claim_table
 from accelstudy.study.config import Study
-from accelstudy.study.replicates import read_replicates
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 HOLDS, FAILS, OPEN = "holds", "does not hold", "not decided"
@@ -34,13 +30,6 @@ HOLDS, FAILS, OPEN = "holds", "does not hold", "not decided"
 TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
 """What the claims are judged by, beside estimates."""
 SINGLE = ("single_low", "single_high", "percentile")
-
-
-@cache
-def claim_table() -> dict[str, list[dict[str, Any]]]:
-    """Read the claims."""
-    text = Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")
-    return dict(yaml.safe_load(text))
 
 
 def judge_claims(
@@ -60,45 +49,21 @@ def judge_claims(
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
-    claimed = [cell for cell in study.cells if is_claimed(study, cell)]
-    stored = ((cell, read_replicates(estimates, cell)) for cell in claimed)
-    calibrations = ((cell, replicates) for cell, replicates in stored if replicates is not None)
+
+    @cache
+    def estimates_of(cell: str) -> pd.DataFrame:
+        return read_table(estimates, rows=("cell", [cell]))
+
     read = {name: read_table(tables[name]) for name in TABLES}
-    claims, by_scheme = judge(study, read, calibrations)
+    evidence = Evidence(study, read, estimates_of)
+    claims = judge(evidence)
     write_table(outputs["claims"], claims, provenance)
-    write_table(outputs["by_scheme"], by_scheme, provenance)
+    write_table(outputs["by_scheme"], evidence.by_scheme, provenance)
     with whole_file(outputs["html"]) as path:
-        path.write_text(claims_page(claims, by_scheme), encoding="utf-8")
+        path.write_text(claims_page(claims, evidence.by_scheme), encoding="utf-8")
 
 
-def is_claimed(study: Study, cell: Cell) -> bool:
-    """Whether the claims use the estimates of a cell: it has their model, and the usual noise."""
-    assert study.sensitivity is not None
-    return cell.name == study.sensitivity.cell(cell.approach, cell.scheme)
-
-
-def judge(
-    study: Study, tables: Mapping[str, pd.DataFrame], calibrations: Iterable[Calibrations]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Judge all claims.
-
-    Parameters
-    ----------
-    study : Study, with `sensitivity`
-    tables : mapping of name to DataFrame, those of `TABLES`
-    calibrations : cells that the claims use, see `is_claimed`, and their replicates
-
-    Returns
-    -------
-    claims : DataFrame, see `judge_all`
-    by_scheme : DataFrame, see `accelstudy.study.claims.by_scheme`
-    """
-    evidence = Evidence(study, tables)
-    by_scheme = scheme_table(evidence, calibrations, claim_table()["by_scheme"])
-    return judge_all(Evidence(study, {**tables, "by_scheme": by_scheme})), by_scheme
-
-
-def judge_all(evidence: Evidence) -> pd.DataFrame:
+def judge(evidence: Evidence) -> pd.DataFrame:
     """Judge all claims by all evidence: those of the paper, then those of this project.
 
     Returns

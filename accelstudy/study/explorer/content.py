@@ -16,10 +16,10 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.approaches import get_approach
-from accelstudy.drawing.style import group_label, group_of, in_order, model_title, shown
+from accelstudy.drawing.style import model_title, shown
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
-from accelstudy.study.figures.panels import ANGLES, by_cell
+from accelstudy.study.figures.panels import ANGLES, by_cell, group_sds
 from accelstudy.study.figures.registry import Tables
 from accelstudy.study.statistics import TILTS
 
@@ -76,12 +76,10 @@ def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str,
     ends = table[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
     table = table.assign(least=ends.min(axis=1), most=ends.max(axis=1))
     titles: dict[str, str] = {}
-    summary = tables["summary"].assign(group=tables["summary"]["parameter"].map(group_of))
-    for group in in_order(summary["group"]):
-        for unit, rows in summary[summary["group"] == group].groupby("unit", sort=False):
-            key, mean = f"sd-{len(titles)}", rows.groupby("cell")["sd_empirical"].mean()
-            table[key], label = shown(cells["cell"].map(mean).to_numpy(float), str(unit))
-            titles[key] = f"sd of {group_label(group)} / {label}"
+    groups = group_sds(tables["summary"]).groupby(["label", "unit"], sort=False)
+    for number, ((label, unit), rows) in enumerate(groups):
+        table[f"sd-{number}"] = cells["cell"].map(by_cell(rows, "value"))
+        titles[f"sd-{number}"] = f"sd of {label} / {unit}"
     return table, titles
 
 

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import jacobian, sigma_roll_pitch, specific_force
-from accelstudy.study.figures.panels import ANGLES, key, panels, surface
+from accelstudy.study.figures.panels import ANGLES, Image, key, panels, surface
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 from accelstudy.study.figures.total_effects import read_shares
-
-if TYPE_CHECKING:
-    from matplotlib.cm import ScalarMappable
 
 ROLL, PITCH = np.linspace(-100.0, 100.0, 81), np.linspace(-80.0, 80.0, 65)
 """Attitudes of figure 2, gon."""
@@ -42,7 +37,7 @@ def accuracy_over_attitude(tables: Tables, study: Study) -> Figure:
     table = sigma_table(roll.ravel(), pitch.ravel(), study.sigma_force, study.gravity_mps2)
     limits = {"vmin": table["sigma"].min(), "vmax": table["sigma"].max()}
 
-    def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
+    def draw(ax: Axes, rows: DataFrame) -> Image:
         square = rows.pivot_table("sigma", "pitch", "roll")
         x, y, values = square.columns.to_numpy(), square.index.to_numpy(), square.to_numpy()
         image = surface(ax, x, y, values, **limits)
@@ -128,7 +123,7 @@ def effects_of_forces(tables: Tables, study: Study) -> Figure:
     table = table.assign(symbol=table["input"].map(style.symbol), unit=attitude_unit())
     look: style.Style = {"vmin": 0, "vmax": 1, "cmap": "viridis"}
 
-    def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
+    def draw(ax: Axes, rows: DataFrame) -> Image:
         first = rows.iloc[0]
         place = ..., ANGLES.index(first["output"]), FORCES.index(first["input"])
         at = [

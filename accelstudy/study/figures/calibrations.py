@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from accelstudy.drawing import style
-from accelstudy.study.figures.panels import in_shown_units, key, matrix, panels, points
+from accelstudy.study.figures.panels import Image, in_shown_units, key, matrix, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
-
-if TYPE_CHECKING:
-    from matplotlib.cm import ScalarMappable
 
 APPROACHES = ("gravity", "robot")
 MIN_WRITTEN = 0.005
@@ -113,7 +108,7 @@ def correlations(tables: Tables, study: Study) -> Figure:
     edges = np.flatnonzero(groups[1:] != groups[:-1]) + 0.5
     look: style.Style = {"cmap": "Blues", "vmin": 0, "vmax": max(0.1, table["size"].max())}
 
-    def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
+    def draw(ax: Axes, rows: DataFrame) -> Image:
         square = rows.pivot_table("size", "parameter_1", "parameter_2", dropna=False)
         values = square.reindex(index=names, columns=names).to_numpy(float)
         texts = np.char.lstrip(np.char.mod("%.2f", values), "0")

@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
-from accelstudy.study.figures.panels import (
-    ANGLES,
-    FAILED,
-    by_cell,
-    in_shown_units,
-    key,
-    matrix,
-    panels,
-)
+from accelstudy.study.figures.panels import FAILED, Image, key, matrix, panels, tilt_errors
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
-
-if TYPE_CHECKING:
-    from matplotlib.cm import ScalarMappable
 
 ROW_MM = 6.0
 
@@ -31,7 +18,7 @@ ROW_MM = 6.0
     *("leveling-overview", "cells", "leveling"),
     when=lambda study: not any(varies(study, noise) for noise in NOISES),
 )
-def tilt_errors(tables: Tables, study: Study) -> Figure:
+def leveling_overview(tables: Tables, study: Study) -> Figure:
     """Tilt error that each calibration leaves.
 
     The tilt error of roll (upper) and pitch (lower half) that a calibration leaves, over all
@@ -44,14 +31,15 @@ def tilt_errors(tables: Tables, study: Study) -> Figure:
     the model, so that a larger model faces a more difficult sensor: compare schemes and approaches
     within a column.
     """
-    table = tilt_table(tables)
+    cells = tables["cells"][["cell", "scheme", "model", "approach"]]
+    table = tilt_errors(cells, tables["leveling"]).rename(columns={"value": "rms"})
     schemes = sorted(set(table["scheme"]), key=lambda name: (get_scheme(name).n_positions, name))
     models = list(table["model"].unique())
     titles = [get_scheme(name).title for name in schemes], [*map(style.model_title, models)]
     low, high = table["rms"].agg(["min", "max"]).fillna(1.0)
     look: style.Style = {"norm": "log", "vmin": low, "vmax": high, "cmap": "YlGnBu"}
 
-    def draw(ax: Axes, rows: DataFrame) -> ScalarMappable:
+    def draw(ax: Axes, rows: DataFrame) -> Image:
         rms, both = (
             rows.pivot_table(name, "scheme", "model", dropna=False)
             .reindex(index=schemes, columns=models)
@@ -76,25 +64,12 @@ def tilt_errors(tables: Tables, study: Study) -> Figure:
         table,
         draw,
         20 + ROW_MM * max(len(schemes), 4),
-        row="angle",
+        row="group",
         column="approach",
-        title="{angle}, {approach}",
+        title="{group}, {approach}",
         colours=f"tilt error (rms) at tilts up to {largest} / {unit}",
         legend=legend,
     )
-
-
-def tilt_table(tables: Tables) -> DataFrame:
-    """Tilt errors of each cell and angle, as shown: `rms`, and `both`, which 95 % stay below."""
-    import pandas as pd
-
-    both, parts = by_cell(tables["leveling"], "both_rms_q95_mgon"), []
-    for angle in ANGLES:
-        rms = by_cell(tables["leveling"], f"{angle}_rms_mgon")
-        cells = tables["cells"][["cell", "scheme", "model", "approach"]]
-        numbers = {"rms": cells["cell"].map(rms), "both": cells["cell"].map(both)}
-        parts.append(cells.assign(angle=angle, unit="mgon", **numbers))
-    return in_shown_units(pd.concat(parts), "rms", "both")
 
 
 def _texts(*values: float) -> str:

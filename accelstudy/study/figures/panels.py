@@ -8,7 +8,7 @@ is here: labels, ticks, colour bar and legend, and what stands where there is no
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,12 @@ from accelstudy.drawing import style
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Tables
 
 if TYPE_CHECKING:
+    import matplotlib.cm
+    import matplotlib.lines
     from matplotlib.axis import Axis
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.lines import Line2D
+
+Image: TypeAlias = "matplotlib.cm.ScalarMappable"
+Line: TypeAlias = "matplotlib.lines.Line2D"
 
 MAX_PANELS = 12
 """Most rows and most columns of panels; with more none could be read."""
@@ -35,7 +38,7 @@ BESIDE = {"title": [(-1, 0), (0, -1)], "xlabel": [(1, 0)], "ylabel": [(0, -1)]}
 
 def panels(
     table: DataFrame,
-    draw: Callable[[Axes, DataFrame], ScalarMappable | None],
+    draw: Callable[[Axes, DataFrame], Image | None],
     height_mm: float,
     *,
     row: str = "",
@@ -44,7 +47,7 @@ def panels(
     xlabel: str = "",
     ylabel: str = "",
     colours: str = "",
-    legend: Sequence[Line2D] = (),
+    legend: Sequence[Line] = (),
     width: float = style.FULL,
     **shared: Any,
 ) -> Figure:
@@ -147,17 +150,13 @@ def in_group_order(table: DataFrame) -> DataFrame:
     return table.sort_values("group", key=lambda names: names.map(order.index), kind="stable")
 
 
-def accuracies(tables: Tables) -> DataFrame:
-    """Accuracy of each cell: a row for each group of parameters, then for roll and for pitch.
+def group_sds(summary: DataFrame) -> DataFrame:
+    """Mean empirical sd of each group of parameters of each cell.
 
-    `value` is the mean empirical sd or the rms tilt error in the `unit` shown, NaN if there is
-    none; `quantity` says which, and `label` of what. `bias` is the rms bias if it is significant
-    for all parameters of the group and above `SMALLEST_BIAS`, and `estimable` says whether all can
-    be estimated.
+    `value` is in the `unit` shown, NaN if there is none. `bias` is the rms bias if it is
+    significant for all parameters of the group and above `SMALLEST_BIAS`, and `estimable` says
+    whether all can be estimated.
     """
-    import pandas as pd
-
-    summary = tables["summary"]
     certain = (summary["bias_ci95_low"] > 0) | (summary["bias_ci95_high"] < 0)
     large = summary["bias"].abs() > SMALLEST_BIAS * summary["sd_empirical"]
     summary = summary.assign(
@@ -169,14 +168,37 @@ def accuracies(tables: Tables) -> DataFrame:
         value=("sd_empirical", "mean"), squared=("squared", "mean"), estimable=("estimable", "all")
     ).reset_index()
     bias = sds["squared"].where(np.isfinite(sds["squared"])) ** 0.5
-    label = sds["group"].map(style.group_label)
-    parts = [in_group_order(sds.assign(bias=bias, label=label, quantity="sd"))]
-    for angle in ANGLES:
-        tilt = pd.DataFrame({"cell": summary["cell"].unique(), "group": angle, "unit": "mgon"})
-        rms = tilt["cell"].map(by_cell(tables["leveling"], f"{angle}_rms_mgon"))
-        tilt = tilt.assign(value=rms, estimable=rms.notna(), label=f"{angle} error")
-        parts.append(tilt.assign(quantity="rms"))
-    table = in_shown_units(pd.concat(parts, ignore_index=True), "value", "bias")
+    sds = sds.assign(bias=bias, label=sds["group"].map(style.group_label), quantity="sd")
+    return in_shown_units(in_group_order(sds), "value", "bias")
+
+
+def tilt_errors(cells: DataFrame, leveling: DataFrame) -> DataFrame:
+    """Rows of cells with the tilt error that each leaves: for roll, then for pitch, as `group`.
+
+    `value` is the rms in the `unit` shown, and `both` what both angles stay below in 95 % of the
+    calibrations; NaN if there is none.
+    """
+    import pandas as pd
+
+    both = cells["cell"].map(by_cell(leveling, "both_rms_q95_mgon"))
+    rms = {angle: by_cell(leveling, f"{angle}_rms_mgon") for angle in ANGLES}
+    table = pd.concat(
+        [cells.assign(group=angle, both=both, value=cells["cell"].map(rms[angle])) for angle in rms]
+    )
+    return in_shown_units(table.assign(unit="mgon", quantity="rms"), "value", "both")
+
+
+def accuracies(tables: Tables) -> DataFrame:
+    """Accuracy of each cell: a row for each group of parameters, then for roll and for pitch.
+
+    `value` is that of `group_sds` or of `tilt_errors`; `quantity` says which, and `label` of what.
+    """
+    import pandas as pd
+
+    summary = tables["summary"]
+    tilt = tilt_errors(summary[["cell"]].drop_duplicates(), tables["leveling"])
+    tilt = tilt.assign(estimable=tilt["value"].notna(), label=tilt["group"] + " error")
+    table = pd.concat([group_sds(summary), tilt], ignore_index=True)
     return table.assign(value=table["value"].where(table["value"] > 0))
 
 
@@ -191,7 +213,7 @@ def points(ax: Axes, rows: DataFrame, x: str = "x", y: str = "y", **look: Any) -
         ax.plot(its[x].to_numpy(), its[y].to_numpy(), **{**usual, **look})
 
 
-def key(label: str, **look: Any) -> Line2D:
+def key(label: str, **look: Any) -> Line:
     """Entry of a legend."""
     from matplotlib.lines import Line2D
 
@@ -203,9 +225,7 @@ def narrow(label: str) -> str:
     return label.replace("orthogonality", "orthogo-\nnality")
 
 
-def surface(
-    ax: Axes, x: ArrayLike, y: ArrayLike, values: ArrayLike, **limits: Any
-) -> ScalarMappable:
+def surface(ax: Axes, x: ArrayLike, y: ArrayLike, values: ArrayLike, **limits: Any) -> Image:
     """Draw values (y, x) as a smooth map."""
     ax.grid(False)
     return ax.pcolormesh(x, y, values, shading="gouraud", rasterized=True, **limits)
@@ -218,7 +238,7 @@ def matrix(
     values: NDArray[np.float64],
     texts: NDArray[np.str_],
     **colours: Any,
-) -> ScalarMappable:
+) -> Image:
     """Draw a matrix as fields with texts; its rows and columns have titles.
 
     Where a value is NaN there is no field.
