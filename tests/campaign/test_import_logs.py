@@ -13,7 +13,7 @@ from scipy.io import loadmat, savemat
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.campaign.importing import sources
+from accelstudy.campaign.importing import text as texts
 from accelstudy.campaign.importing.detection import find_holds
 from accelstudy.campaign.importing.settings import ImportSettings
 
@@ -141,13 +141,13 @@ def test_a_row_that_lacks_a_reading_is_left_out_and_said(tmp_path, text, row, sa
     ",".join(['"1.5"'] * 5000),
 ])  # fmt: skip
 def test_what_is_no_table_is_no_more_work_than_its_size(tmp_path, monkeypatch, text):
-    looked_at, split = [], sources.split_line
+    looked_at, split = [], texts.split_line
 
     def counting(line, delimiter):
         looked_at.append(len(line))
         return split(line, delimiter)
 
-    monkeypatch.setattr(sources, "split_line", counting)
+    monkeypatch.setattr(texts, "split_line", counting)
     with pytest.raises(InputError):
         open_log(written(tmp_path, text), rate_hz=1)
     assert sum(looked_at) < 20 * len(text)

@@ -23,7 +23,7 @@ from accelstudy.campaign.calibration.applying import (
     RANGE_MARGIN,
     SensorCalibration,
 )
-from accelstudy.campaign.calibration.tables import ROWS, infer_types, is_parquet, write_table
+from accelstudy.campaign.calibration.tables import ROWS, is_parquet, write_table
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.recording import AXES, CONDITIONS, Log, read_log
@@ -90,16 +90,14 @@ class Leveled:
             The rows of the log as their owner has them, whose index and columns stay as they are;
             as they were read if omitted.
         """
-        log = self.log
-        frame = infer_types(log.source, log.table).to_pandas() if frame is None else frame
+        frame = self.log.source.typed_table().to_pandas() if frame is None else frame
         columns = zip(self.added.column_names, self.added.columns, strict=True)
         return frame.assign(**{name: column.to_numpy() for name, column in columns})
 
     def write(self, out: str | Path) -> None:
         """Write the log with the added columns, CSV or Parquet; if that fails, there is no file."""
-        table = self.log.table
-        if is_parquet(out):
-            table = infer_types(self.log.source, table)
+        source = self.log.source
+        table = source.typed_table() if is_parquet(out) else source.table
         columns = dict(zip(table.column_names, table.columns, strict=True))
         columns |= zip(self.added.column_names, self.added.columns, strict=True)
         # The row labels that pandas writes as a column are not part of the log.
@@ -133,8 +131,8 @@ def level(
     """
     given = dict(given or {})
     read = _read(calibration, log, given)
-    _ = read.table  # before its numbers, so that the file is read once
-    forces, hold = read.rows[[*AXES]].to_numpy(), _conditions(read, start or 0.0)
+    _ = read.source.table  # before its numbers, so that the file is read once
+    forces, hold = read.forces, _conditions(read, start or 0.0)
     # What the user says of this log is right, whatever was wrong with the campaign.
     option_of = {"unit_error": "unit", "axis_error": "frame"}
     mended = calibration.content.get("mended") or {"error": "", "matrix": None}
@@ -211,15 +209,16 @@ def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]
 
 def _conditions(read: Log, start: float) -> HoldConditions:
     """What is known of the rows besides the forces; the first is `start` s after the session's."""
-    rows = read.rows
-    names = [name for name in ("time", *CONDITIONS) if name in rows]
-    known: dict[str, Any] = {name: rows[name].to_numpy() for name in names}
+    names = [name for name in ("time", *CONDITIONS) if name in read.rows]
+    known: dict[str, Any] = {name: read.rows[name] for name in names}
     if "time" in known:
         known["time"] = start + known["time"]
         if "temperature" in known:
             known["course"] = course_of_log(known["time"], known["temperature"])
     # A log has no position before: effects that depend on it add nothing.
-    steps: dict[str, Any] = dict.fromkeys(("step_x", "step_y", "step_z"), np.zeros(len(rows)))
+    steps: dict[str, Any] = dict.fromkeys(
+        ("step_x", "step_y", "step_z"), np.zeros(len(read.forces))
+    )
     return HoldConditions(**known, **steps)
 
 

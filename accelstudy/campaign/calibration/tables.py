@@ -11,38 +11,11 @@ import pyarrow.compute as pc
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import Source, TextSource
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_parquet
 
 ROWS = 2**16
 """Rows that are worked on together, where what is made of them on the way takes memory."""
-
-
-def infer_types(source: Source, table: pa.Table) -> pa.Table:
-    """Turn the columns of a text that hold only numbers into numbers."""
-    if not isinstance(source, TextSource):
-        return table
-    columns = []
-    for column in table.columns:
-        kinds = (kind for kind in (pa.int64(), pa.float64()) if _holds(column, kind))
-        kind = next(kinds, None)
-        columns.append(column if kind is None else _cast(column, kind))
-    return pa.table(columns, names=table.column_names)
-
-
-def _holds(column: pa.ChunkedArray, kind: pa.DataType) -> bool:
-    """Whether a column of text can be converted to a type without losing digits."""
-    try:
-        _cast(column, kind)
-    except pa.ArrowInvalid:
-        return False
-    whole = pc.match_substring_regex(column, r"^\s*[+-]?[0-9]{16,}\s*$")
-    return pa.types.is_integer(kind) or not pc.any(whole).as_py()
-
-
-def _cast(column: pa.ChunkedArray, kind: pa.DataType) -> pa.ChunkedArray:
-    return pc.if_else(pc.equal(column, ""), None, column).cast(kind)
 
 
 def write_table(path: str | Path, table: pa.Table) -> None:

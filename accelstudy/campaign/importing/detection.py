@@ -121,7 +121,7 @@ def hold_table(log: Recording, parts: Mapping[int, Parts]) -> pd.DataFrame:
         row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
         row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
         for name in log.conditions:
-            values = np.concatenate([log.samples[name].to_numpy()[part] for part in slices])
+            values = np.concatenate([log.conditions[name][part] for part in slices])
             power = 2 if name == "vibration" else 1
             known = values[np.isfinite(values)] ** power
             row[name] = known.mean() ** (1 / power) if len(known) else np.nan
@@ -178,7 +178,7 @@ def find_holds(
     good = ~full & ~turns
     numbers = dict(enumerate(np.flatnonzero(good.any(axis=0)).tolist(), 1))
     if one_each:
-        recording = logs[0].samples["part"].to_numpy()
+        recording = logs[0].part
         by_length = sorted(numbers.values(), key=lambda i: runs[i].stop - runs[i].start)
         numbers = dict(sorted({int(recording[runs[i].start]) + 1: i for i in by_length}.items()))
     result = []
@@ -219,9 +219,9 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     named = [*(which for which, _ in settings.left_out), *settings.joined]
     if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
         raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
-    block = log.samples["part"].to_numpy()
+    block, row = log.part, log.row
     if (size := settings.block) is not None:
-        total, row = len(log.first.rows), log.samples.index.to_numpy()
+        total = len(log.first.forces)
         fewer = total // size * size
         if len(row) and row[-1] >= fewer:  # a note at the end is no sample
             raise InputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
@@ -51,14 +51,14 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
     log = read_log(path, settings, conditions=wanted, untimed=True)
     settings, frame = cast(ImportSettings, log.layout), log.layout.axes
     rows, warnings = _rows(log, settings)
-    forces = rows[["fx", "fy", "fz"]].to_numpy()
+    forces = log.forces
 
     columns: dict[str, Any] = {}
     if "n_samples" in rows:
-        columns["n_samples"] = n_samples = rows["n_samples"].round().to_numpy(dtype=int)
+        columns["n_samples"] = n_samples = np.round(rows["n_samples"]).astype(int)
         if np.any(n_samples < 1):
             raise InputError(f"{path}: column n_samples: must be positive")
-    if {*SDS} <= {*rows}:
+    if {*SDS} <= rows.keys():
         sd = frame.rearranged(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
         columns["sd"] = sd
         if np.any(sd < 0):
@@ -66,13 +66,13 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
         if "n_samples" in columns and np.any(sd > 0):
             columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
             warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
-    columns |= {k: rows[k].to_numpy() for k in ("time", "temperature", "vibration") if k in rows}
+    columns |= {k: rows[k] for k in ("time", "temperature", "vibration") if k in rows}
     if settings.robot is not None:
         unit, signs = UNITS["rad"][settings.robot.unit], frame.signs
         angles = np.column_stack([rows[key] for key in ANGLES]) * signs[:2]
         columns |= {"angles": angles * unit, "sigma_angle": settings.robot.angle_sigma_mgon * MGON}
         if "yaw" in rows:
-            columns["yaw"] = rows["yaw"].to_numpy() * unit * signs[2]
+            columns["yaw"] = rows["yaw"] * unit * signs[2]
     # Logs of the sensor have the unit and the axes of the table, but not its columns.
     layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
     sigma = columns.get("sigma_force")
@@ -88,9 +88,9 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
     )
 
 
-def _rows(log: Log, settings: ImportSettings) -> tuple[pd.DataFrame, list[str]]:
-    """Rows without the columns that are not used, and warnings about these."""
-    rows, warnings = log.rows, []
+def _rows(log: Log, settings: ImportSettings) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+    """Columns of the rows without those that are not used, and warnings about these."""
+    rows, warnings = dict(log.rows), []
     angles = [key for key in (*ANGLES, "yaw") if key in rows]
     if settings.robot is not None:
         for missing in (key for key in ANGLES if key not in angles):
@@ -107,12 +107,12 @@ def _rows(log: Log, settings: ImportSettings) -> tuple[pd.DataFrame, list[str]]:
         warnings.append(
             f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"
         )
-        rows = rows.drop(columns=angles)
-    if not len(rows):
+        rows = {key: values for key, values in rows.items() if key not in angles}
+    if not len(log.forces):
         raise InputError(f"{log.path}: no row of numbers")
-    for row in np.flatnonzero(rows.isna().any(axis=1)):
+    for row in np.flatnonzero(np.isnan([*rows.values()]).any(axis=0)):
         key = next(key for key in log.lacking(int(row)) if key in rows)
         raise InputError(f"{log.path}: {log.describe(int(row), key)}, not a usable number")
     if "time" in log.places and abs(log.start) < _YEARS:
-        rows = rows.assign(time=rows["time"] + log.start)
+        rows["time"] = rows["time"] + log.start
     return rows, warnings

@@ -7,14 +7,8 @@ from pathlib import Path
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER, open_bag, open_ulog
-from accelstudy.campaign.importing.sources import (
-    GZIP,
-    LogFile,
-    Source,
-    TextSource,
-    open_matlab,
-    open_parquet,
-)
+from accelstudy.campaign.importing.sources import LogFile, Source, open_matlab, open_parquet
+from accelstudy.campaign.importing.text import GZIP, TextSource
 from accelstudy.files.reading import readable
 
 _BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")

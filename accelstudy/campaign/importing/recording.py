@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -25,7 +23,7 @@ from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.names import places_by_name, unit_in, without_unit
 from accelstudy.campaign.importing.opening import open_source
-from accelstudy.campaign.importing.sources import LogFile, Source, counted_from_first
+from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.files.reading import overlay
 from accelstudy.sensors.conversion import MAX_VALUE, Conversion, conversion_of
 
@@ -289,25 +287,18 @@ class Log:
         """What the log has besides forces and time."""
         return tuple(key for key in self.places if key not in (*AXES, "time", "nanoseconds"))
 
-    @cached_property
-    def table(self) -> pa.Table:
-        """Rows as they are in the file, with all their columns; by unique names."""
-        names = unique_names(self.source)
-        return pa.table(self.source.columns(range(len(names))), names=names)
-
     @property
-    def rows(self) -> pd.DataFrame:
-        """All rows in SI; what is no number, or absurd, is NaN.
+    def rows(self) -> Mapping[str, Array]:
+        """All rows in SI, each column (n,) by its key; what is no number, or absurd, is NaN.
 
-        Columns are time, s since the first row that has one, if anything tells it; fx, fy, fz,
-        m/s², in forward, right, down; and the conditions, °C or m/s². The rows are those of
-        `table`, if that was asked for before.
+        They are time, s since the first row that has one, if anything tells it; fx, fy, fz, m/s²,
+        in forward, right, down; and the conditions, °C or m/s².
         """
         return self._numbers[0]
 
     @property
     def forces(self) -> Array:
-        """Forces of `rows`, (n, 3), m/s²."""
+        """Forces of `rows`, (n, 3), m/s²; each axis in one piece."""
         return self._numbers[1]
 
     @property
@@ -316,11 +307,10 @@ class Log:
         return self._numbers[2]
 
     @cached_property
-    def _numbers(self) -> tuple[pd.DataFrame, Array, float]:
-        places = [*self.places.values()]
-        cells = [self.table.column(p) for p in places] if "table" in vars(self) else None
-        values = dict(zip(self.places, self.source.numbers(places, cells), strict=True))
-        columns, start = {}, np.nan
+    def _numbers(self) -> tuple[Mapping[str, Array], Array, float]:
+        numbers = self.source.numbers([*self.places.values()])
+        values = dict(zip(self.places, numbers, strict=True))
+        rows, start = {}, np.nan
         if "time" in values:
             time, start = counted_from_first(values["time"])
             time[~_within(time)] = np.nan
@@ -329,9 +319,9 @@ class Log:
                 rest = values["nanoseconds"]
                 time += np.where(_within(rest), 1e-9 * rest, np.nan)
             first = next(iter(time[np.isfinite(time)]), 0.0)
-            columns["time"], start = time - first, start * self.time_factor + first
+            rows["time"], start = time - first, start * self.time_factor + first
         elif self.layout.rate_hz is not None:
-            columns["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
+            rows["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
         frame, conversion = self.layout.axes, self.conversion
         first_rows = np.column_stack([values[axis][:SAMPLED_ROWS] for axis in AXES])
         read = _is_reading(first_rows).all(axis=1)
@@ -347,29 +337,40 @@ class Log:
             if large.any():
                 force[large] = np.where(_is_reading(raw[large]), force[large], np.nan)
             force[~_within(force, limit)] = np.nan
-        columns |= zip(AXES, forces, strict=True)
+        rows |= zip(AXES, forces, strict=True)
         for key in self.conditions:
-            columns[key] = np.where(_within(values[key]), values[key], np.nan)
-        return pd.DataFrame(columns, copy=False), forces.T, start
+            rows[key] = np.where(_within(values[key]), values[key], np.nan)
+        return rows, forces.T, start
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
         """Which rows lack a force, or the time that they should have, (n,)."""
         needed = [*AXES, *(("time",) if "time" in self.places else ())]
-        return np.any([np.isnan(self.rows[key].to_numpy()) for key in needed], axis=0)
+        return np.any([np.isnan(self.rows[key]) for key in needed], axis=0)
 
     def lacking(self, row: int) -> list[str]:
         """Keys of the readings that a row lacks; axes are those of the log."""
-        missing = self.rows.iloc[row].isna()
         of_frame = dict(zip(self.layout.axes.order, AXES, strict=True))
         named = {key: of_frame[i] for i, key in enumerate(AXES)}
-        return [key for key in self.places if missing.get(named.get(key, key))]
+        lost = {key for key, values in self.rows.items() if np.isnan(values[row])}
+        return [key for key in self.places if named.get(key, key) in lost]
 
     def describe(self, row: int, key: str) -> str:
         """Say what stands in a row for "time", "fx", …; this reads the file again to find it."""
         place = self.places[key]
         where, cell = self.source.look_up(row, place)
         return f"{where}, column {self.source.names[place]} ({key}): {cell}"
+
+
+def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
+    """Numbers counted from the first of them, and that first one; NaN if there is none.
+
+    Whole numbers, such as times in ns, are counted as integers.
+    """
+    zero = next(iter(values[np.isfinite(values)]), np.nan)
+    if values.dtype.kind in "iu" and isinstance(zero, np.integer):
+        return (values.astype(np.int64) - zero.astype(np.int64)).astype(float), float(zero)
+    return values - float(zero), float(zero)
 
 
 def _within(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
@@ -382,16 +383,8 @@ def _is_reading(values: NDArray[Any]) -> NDArray[np.bool_]:
     return _within(values) & ~np.isin(values, SENTINELS)
 
 
-def unique_names(source: Source) -> list[str]:
-    """Names of the columns, all different: `column_0` … of a log without names."""
-    if not source.named:
-        return [f"column_{place}" for place in range(len(source.names))]
-    before = [source.names[:place].count(name) for place, name in enumerate(source.names)]
-    return [f"{name}.{n}" if n else name for name, n in zip(source.names, before, strict=True)]
-
-
 class Recording:
-    """The logs of one sensor, often only one, in their order.
+    """The logs of one sensor, often only one, in their order: all rows that lack no reading.
 
     Parameters
     ----------
@@ -404,18 +397,17 @@ class Recording:
     parts, others
     first : Log, which has the layout of all
     path : Path, first of the files
-    conditions : tuple of str, those of `CONDITIONS` that all parts have
     step : float, s, usual time between two samples: the mean, without gaps. Steps may jitter or be
         multiples of a clock's tick. So the median may be far from the mean, and only the mean fits
         the number of samples
     starts : (k,) array, s, time of the first sample of each part as written in its file; NaN
         without any
     timed : bool, whether the times of the parts count from one zero, so that they follow each other
-    samples : DataFrame, of all parts, of rows that lack no reading. Its columns are time, since the
-        first sample, the conditions, and part, the number of the part from 0; its index is the row
-        of the part. If the times of the parts do not tell, each begins where the last one ends
-    time : (n,) array, s
+    time : (n,) array, s, since the first sample; if the times of the parts do not tell, each begins
+        where the last one ends
     forces : (n, 3) array, m/s², in forward, right, down; each axis in one piece
+    conditions : mapping of str to (n,) arrays, those of `CONDITIONS` that all parts have
+    part, row : (n,) int arrays, number of the part, and of the row in it, from 0
 
     Raises
     ------
@@ -427,71 +419,73 @@ class Recording:
     def __init__(self, parts: Sequence[Log], others: Sequence[Sequence[Log]] = ()) -> None:
         self.parts, self.others, self.first = parts, others, parts[0]
         self.path = self.first.path
-        self.conditions = tuple(k for k in CONDITIONS if all(k in log.places for log in parts))
-        sensors = [parts, *others]
-        self._lost = [
-            np.any([log.lost for log in logs], axis=0) for logs in zip(*sensors, strict=True)
-        ]
-        each = [self._samples_of(i) for i in range(len(parts))]
-        self.step = self._usual_step(each)
-        firsts = [samples["time"].iloc[0] for samples in each]
+        sensors = zip(parts, *others, strict=True)
+        self._lost = [np.any([log.lost for log in logs], axis=0) for logs in sensors]
+        self._used = [~lost if lost.any() else slice(None) for lost in self._lost]
+        times = [self._checked_time(i) for i in range(len(parts))]
+        self.step = self._usual_step(times)
+        firsts = [time[0] for time in times]
         self.starts = np.array([part.start for part in parts]) + firsts
         self.timed = bool(np.all(np.diff(self.starts) > 0))
-        end, whole = 0.0, []
-        for i, (part, samples) in enumerate(zip(parts, each, strict=True)):
-            time = samples["time"] - (firsts[i] if "time" in part.places else 0.0)
+        end = 0.0
+        for i, (part, first) in enumerate(zip(parts, firsts, strict=True)):
             start = self.starts[i] - self.starts[0] if i and self.timed else end
             if i and start < end - self.step / 2:  # a clock rounds
                 raise InputError(f"{part.path}: begins before the recording before it ends")
-            whole.append(samples[[*self.conditions]].assign(time=time + start, part=i))
-            end = whole[-1]["time"].iloc[-1] + self.step
-        self.samples = whole[0] if len(whole) == 1 else pd.concat(whole)
-        self.time = self.samples["time"].to_numpy()
-        forces = [
-            part.forces[~lost] if lost.any() else part.forces
-            for part, lost in zip(parts, self._lost, strict=True)
-        ]
-        self.forces = np.hstack([each.T for each in forces]).T if forces[1:] else forces[0]
+            times[i] = times[i] - (first if "time" in part.places else 0.0) + start
+            end = times[i][-1] + self.step
+        self.time = np.concatenate(times) if times[1:] else times[0]
+        self.forces = self._of_all([part.forces.T for part in parts]).T
+        self.conditions = {
+            key: self._of_all([part.rows[key] for part in parts])
+            for key in CONDITIONS
+            if all(key in part.places for part in parts)
+        }
+        self.part = self._of_all([np.full(len(lost), i) for i, lost in enumerate(self._lost)])
+        self.row = self._of_all([np.arange(len(lost)) for lost in self._lost])
 
-    def _samples_of(self, i: int) -> pd.DataFrame:
-        """Rows of a part that lack nothing, with their times in the part; they are checked."""
-        part, lost = self.parts[i], self._lost[i]
-        rows, place = part.rows, part.places.get("time")
-        if "time" not in rows:
-            rows = rows.assign(time=np.arange(float(len(rows))))
-        samples = rows[~lost] if lost.any() else rows
-        backward = np.diff(samples["time"]) <= 0
+    def _of_all(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Columns of the parts, (..., n) each, without the rows that lack a reading."""
+        whole = [part[..., used] for part, used in zip(parts, self._used, strict=True)]
+        return np.concatenate(whole, axis=-1) if whole[1:] else whole[0]
+
+    def _checked_time(self, i: int) -> Array:
+        """Times in a part of its rows that lack nothing, (n,), which are checked."""
+        part, lost, used = self.parts[i], self._lost[i], self._used[i]
+        time = part.rows.get("time", np.arange(float(len(lost))))[used]
+        place = part.places.get("time")
+        backward = np.diff(time) <= 0
         if place is not None and backward.any():
-            row = samples.index[1 + int(np.argmax(backward))]
+            row = int(np.flatnonzero(~lost)[1 + np.argmax(backward)])
             where, cell = part.source.look_up(row, place)
             raise InputError(
                 f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
                 f"increase ({cell}); give the rate if it does not count"
             )
-        if lost.sum() > MAX_BAD_SHARE * len(rows):
+        if lost.sum() > MAX_BAD_SHARE * len(lost):
             said, key = self._describe(i, int(np.argmax(lost)))
             hint = "; give the rate (`rate`) instead" if key == "time" else ""
             raise InputError(
                 f"{part.path}: {said}, not a usable number{hint}; {lost.sum()} of "
-                f"{counted(len(rows), 'row')} lack one, which are too many"
+                f"{counted(len(lost), 'row')} lack one, which are too many"
             )
-        if len(rows) < 2 or (place is not None and len(samples) < 2):
-            raise InputError(f"{part.path}: too few samples ({len(samples)})")
+        if len(lost) < 2 or (place is not None and len(time) < 2):
+            raise InputError(f"{part.path}: too few samples ({len(time)})")
         # In a single position, a channel of a coarse sensor may be constant.
-        constant = [bool((samples[axis] == samples[axis].iloc[0]).all()) for axis in AXES]
+        constant = [bool((force == force[0]).all()) for force in part.forces[used].T]
         if len(self.parts) == 1 and any(constant):
             place = min(part.layout.axes.order[np.array(constant)])
             name = part.source.names[part.places[AXES[place]]]
             raise InputError(f"{part.path}: column {name} ({AXES[place]}) is constant")
-        return samples
+        return time
 
-    def _usual_step(self, parts: Sequence[pd.DataFrame]) -> float:
+    def _usual_step(self, times: Sequence[Array]) -> float:
         """Usual time between two samples, s, which is that of all parts."""
         steps = [
-            usual_step(np.diff(samples["time"]))
+            usual_step(np.diff(time))
             if "time" in part.places
             else 1.0 / (part.layout.rate_hz or 1.0)
-            for part, samples in zip(self.parts, parts, strict=True)
+            for part, time in zip(self.parts, times, strict=True)
         ]
         odd = [i for i, step in enumerate(steps) if not 0.9 < step / steps[0] < 1.1]
         if odd:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +67,6 @@ class Windows:
         sample; NaN about those too near to a gap or an end for a window
     frozen : (n,) bool array, whether an axis does not change in the window
     centred : (n,) bool array, where there is a window
-    counts : (k,) int array, histogram of the variances of windows in which no channel is frozen
 
     Raises
     ------
@@ -79,23 +77,20 @@ class Windows:
     def __init__(self, log: Recording, width: int) -> None:
         self.log, self.width = log, width
         time, forces = log.time, log.forces
-        another = np.diff(log.samples["part"]) > 0
+        another = np.diff(log.part) > 0
         jumps = (np.diff(time) > GAP_RATIO * log.step) & ~another
         self.gaps = int(jumps.sum())
         self.variance = np.full(len(time), np.nan)
         self.frozen = np.zeros(len(time), dtype=bool)
-        self.counts, of_frozen = np.zeros((2, len(_BINS) - 1), dtype=int)
         half = width // 2
         pieces = [0, *(1 + np.flatnonzero(jumps | another)).tolist(), len(time)]
         for start, end in pairwise(pieces):
             for first in range(start, end - width + 1, _TOGETHER):
                 beyond = min(first + _TOGETHER + width - 1, end)
                 middle = slice(first + half, beyond - half)
-                variance, frozen = window_variance(forces[first:beyond], width)
-                self.variance[middle], self.frozen[middle] = variance, frozen
-                self.counts += _histogram(variance[~frozen])
-                of_frozen += _histogram(variance[frozen])
-        self._all_counts = self.counts + of_frozen
+                self.variance[middle], self.frozen[middle] = window_variance(
+                    forces[first:beyond], width
+                )
         self.centred = np.isfinite(self.variance)
         if not self.centred.any():
             raise InputError(
@@ -121,6 +116,11 @@ class Windows:
                 f"{log.unit_hint() or '; is the rate (`rate`) right?'}"
             )
         return cls(log, round(samples) | 1)
+
+    @cached_property
+    def counts(self) -> NDArray[np.int_]:
+        """Histogram of the variances of windows in which no channel is frozen."""
+        return _histogram(self.variance[self.centred & ~self.frozen])
 
     @cached_property
     def extremes(self) -> Array:
@@ -155,6 +155,10 @@ class Windows:
         return bool(
             noise <= MAX_COARSE_RATIO * self.rounding or noise > MAX_REST_NOISE * STANDARD_GRAVITY
         )
+
+    @property
+    def _all_counts(self) -> NDArray[np.int_]:
+        return self.counts + _histogram(self.variance[self.frozen])
 
     def at_rest(self, sd: float) -> NDArray[np.bool_]:
         """Whether the window about each sample is at rest, (n,), up to a standard deviation."""
@@ -193,7 +197,7 @@ class Windows:
             return Threshold(given, np.nan, "as given")
         counts = self.counts
         if self.coarse:
-            counts = self._all_counts.copy()
+            counts = self._all_counts
             least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
             counts[least] += counts[:least].sum() + np.sum(self.variance == 0)
             counts[:least] = 0
@@ -223,29 +227,30 @@ def window_variance(forces: Array, width: int) -> tuple[Array, NDArray[np.bool_]
         variance = _window_sums(offsets**2, width) / width - mean**2
         squares += np.maximum(variance, 0.0) ** 2
         # Rounding may hide a variance of zero, so changes are counted.
-        changed = force[1:] != force[:-1]
-        if not changed.all():
-            frozen |= _window_sums(changed, width - 1) == 0
+        changes = np.concatenate([[0], np.cumsum(force[1:] != force[:-1])])
+        frozen |= changes[width - 1 :] == changes[: len(frozen)]
     return np.sqrt(squares), frozen
 
 
-def _window_sums(values: NDArray[Any], width: int) -> Array:
+def _window_sums(values: Array, width: int) -> Array:
     """Sums of `width` neighbours, each of its own values: a large one costs others no digits.
 
     A window is the end of one part of so many values and the beginning of the next part.
     """
     parts = np.zeros((-(-len(values) // width), width))
     parts.ravel()[: len(values)] = values
-    ends = np.cumsum(parts[:, ::-1], axis=1)[:, ::-1].ravel()
-    result: Array = np.cumsum(parts, axis=1).ravel()[width - 1 : len(values)]
-    beyond = np.arange(len(result)) % width > 0
-    result[beyond] += ends[: len(result)][beyond]
-    return result
+    ends = np.cumsum(parts[:, ::-1], axis=1)[:, ::-1]
+    ends[:, 0] = 0.0  # a window that is a whole part
+    sums: Array = np.cumsum(parts, axis=1).ravel()[width - 1 : len(values)]
+    sums += ends.ravel()[: len(sums)]
+    return sums
 
 
 def _histogram(variance: Array) -> NDArray[np.int_]:
     """Numbers of windows by the logarithms of their variances."""
-    counts: NDArray[np.int_] = np.histogram(np.log10(variance[variance > 0]), _BINS)[0]
+    decades = np.log10(variance[variance > 0])
+    # Bins of equal width, which numpy finds faster than those of an array.
+    counts: NDArray[np.int_] = np.histogram(decades, len(_BINS) - 1, (_BINS[0], _BINS[-1]))[0]
     return counts
 
 
