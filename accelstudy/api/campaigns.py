@@ -39,12 +39,12 @@ class Import:
     ----------
     files : list of path, or the columns of a table in memory
     settings : ImportSettings
-    beside : ReferenceLog, optional, of a calibrated sensor on the same plate
+    reference : ReferenceLog, optional, of a calibrated sensor on the same plate
     """
 
     files: list[LogFile]
     settings: ImportSettings
-    beside: ReferenceLog | None
+    reference: ReferenceLog | None
 
     @classmethod
     def of(
@@ -59,12 +59,12 @@ class Import:
         sensors : mapping of a name to three columns, of several sensors in one log
         """
         settings = settings_of(given, sensors or {})
-        beside = _beside(*(given[name] for name in OTHERS[:-1]))
+        reference = _reference(*(given[name] for name in OTHERS[:-1]))
         if not isinstance(log, Log | pd.DataFrame):
-            return cls([*files_of(each(log))], settings, beside)
+            return cls([*files_of(each(log))], settings, reference)
         log = log_of(log, given)
         layout = settings.model_dump(exclude_unset=True) | log.layout
-        return cls([log.file], parse_settings(layout), beside)
+        return cls([log.file], parse_settings(layout), reference)
 
     def campaign(self) -> Campaign:
         """Campaign of the one sensor."""
@@ -72,7 +72,7 @@ class Import:
             raise InputError(
                 "sensors: several sensors make several campaigns; give the columns of one"
             )
-        return import_sensors(self.files, self.settings, self.beside)[""][0]
+        return import_sensors(self.files, self.settings, self.reference)[""][0]
 
 
 def settings_of(
@@ -137,13 +137,13 @@ def _range(text: str, settings: ImportSettings) -> float:
         ) from None
 
 
-def _beside(
+def _reference(
     log: Path | None,
     calibration: Path | None,
     columns: dict[str, str] | None,
     offset: float | None,
 ) -> ReferenceLog | None:
-    """Return the sensor beside that of the log, if there is one."""
+    """Return the calibrated sensor on the same plate, if there is one."""
     of_log, of_calibration = key("reference_log"), key("reference")
     if log is None and calibration is None:
         more = {"reference_columns": columns, "reference_offset": offset}

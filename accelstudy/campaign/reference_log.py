@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,25 @@ def open_reference(
     return ReferenceLog(path, sensor, Recording([log]), offset)
 
 
+class Angles(NamedTuple):
+    """Roll and pitch of holds by a reference.
+
+    Attributes
+    ----------
+    holds : Holds, those that it covers
+    columns : dict, what the campaign gets
+    left_out : dict of int to str, holds that are too near to the pole for a roll, and why
+    warnings : list of str
+    note : str, how the reference was used
+    """
+
+    holds: Holds
+    columns: dict[str, Any]
+    left_out: dict[int, str]
+    warnings: list[str]
+    note: str
+
+
 @dataclass(frozen=True)
 class ReferenceLog:
     """The open log of a reference, and its calibration; see `open_reference`."""
@@ -94,27 +113,60 @@ class ReferenceLog:
     log: Recording
     offset: float | None
 
-    def average(self, log: Recording, holds: Holds, gravity: float) -> tuple[Holds, list[Array]]:
-        """Take the samples of the reference in the holds of a log.
+    def angles_for(self, holds: Holds, offset: Array, gravity: float) -> Angles:
+        """Roll and pitch of the holds of a log, by the means of the reference in them.
 
-        Returns
-        -------
-        holds : Holds, without those that the reference does not cover
-        records : list of (m, 3) arrays, m/s², one for each of them
+        Parameters
+        ----------
+        holds : Holds
+        offset : (3,) array, m/s², of their means
+        gravity : float, m/s²
 
         Raises
         ------
         InputError
-            If it covers none of them, moves in most, or its forces are not as large as gravity.
+            If the reference covers none of them, moves in most, does not turn with the sensor, is
+            mounted askew to it, or its forces are not as large as gravity.
         """
-        read, full_range = self.log, self.calibration.content.get("range_mps2") or np.inf
         # Both begin together unless they have one clock.
-        apart = float(np.nan_to_num(read.starts[0] - log.starts[0])) + (self.offset or 0.0)
+        apart = self.log.starts[0] - holds.log.starts[0]
+        records, lost = self._records(holds, float(np.nan_to_num(apart)) + (self.offset or 0.0))
+        means = {n: record.mean(axis=0) for n, record in records.items()}
+        self._check_size(np.array([*means.values()]), gravity)
+        lost |= self._moving(records)
+        holds = holds.without(lost)
+        table = holds.table
+        used = ~table.index.isin([*holds.left_out])
+        own = self.calibration.correct(np.array([means[n] for n in table.index]))
+        frame = self._frame((holds.means - offset)[used], own[used])
+        angles = angles_of(frame.to_frd(own))
+        resting = [[records[n]] for n in table.index[used]]
+        noise = hold_noise(resting, self.log.step).accuracy.allan
+        reference = reference_sensor(self.calibration, noise, frame)
+        sigma, common = reference.errors(angles, gravity)
+        poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
+        why = "the x axis of the reference is too near to the vertical for a roll"
+        clock = "of the same clock" if np.isfinite(apart) else "begun together with the log"
+        clock += "" if self.offset is None else f", {self.offset:+g} s"
+        note = (
+            f"reference: {self.path}, {clock}; its axes x, y, z point "
+            f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
+            f"{shown(noise)}"
+        )
+        columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
+        left_out = dict.fromkeys(table.index[poles].tolist(), why)
+        warnings = [*(f"hold {n} left out: {why}" for n in left_out), *_unused(holds.log.first)]
+        return Angles(holds, columns, left_out, warnings, note)
+
+    def _records(self, holds: Holds, apart: float) -> tuple[dict[int, Array], dict[int, str]]:
+        """Samples (m, 3) of the reference, m/s², in holds, and why it has none in others."""
+        read, table = self.log, holds.table
+        full_range = self.calibration.content.get("range_mps2") or np.inf
         time, forces = read.time + apart, read.forces @ self.calibration.mending.T
         records: dict[int, Array] = {}
         lost: dict[int, str] = {}
-        for n, t0, t1 in holds.table[["t0", "t1"]].itertuples():
-            inside = slice(*np.searchsorted(time, [t0, t1 + log.step / 2]).tolist())
+        for n, t0, t1 in table[["t0", "t1"]].itertuples():
+            inside = slice(*np.searchsorted(time, [t0, t1 + holds.log.step / 2]).tolist())
             count = inside.stop - inside.start
             if count * read.step < MIN_COVERAGE * (t1 - t0) or count < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
@@ -123,24 +175,30 @@ class ReferenceLog:
             else:
                 records[n] = forces[inside]
         if not records:
-            table = holds.table
+            first, last = table["t0"].iloc[0], table["t1"].iloc[-1]
             raise InputError(
                 f"`reference_log` {self.path}: runs from {time[0]:.6g} s to {time[-1]:.6g} s of "
-                f"the time of {log.path}, whose holds lie from {table['t0'].iloc[0]:.6g} s to "
-                f"{table['t1'].iloc[-1]:.6g} s: all are left out, the first because "
-                f"{next(iter(lost.values()))}; `reference_offset` gives the seconds to add to the "
-                "times of the reference"
+                f"the time of {holds.log.path}, whose holds lie from {first:.6g} s to {last:.6g} "
+                f"s: all are left out, the first because {next(iter(lost.values()))}; "
+                "`reference_offset` gives the seconds to add to the times of the reference"
             )
-        means = np.array([record.mean(axis=0) for record in records.values()])
-        unit, conversion = read.first.layout.unit, read.first.conversion
+        return records, lost
+
+    def _check_size(self, means: Array, gravity: float) -> None:
+        """Check that means of the reference, (n, 3), are as large as gravity."""
+        first = self.log.first
         try:
-            check_size(f"`reference_log` {self.path}", means, gravity, unit, conversion)
+            where = f"`reference_log` {self.path}"
+            check_size(where, means, gravity, first.layout.unit, first.conversion)
         except InputError as error:
             raise InputError(
                 f"{str(error).split('; give')[0]}; it is read in the unit of the log of which "
                 "`reference` was made"
             ) from None
-        limit = MAX_WANDER * Windows.lasting(read).threshold().sd
+
+    def _moving(self, records: Mapping[int, Array]) -> dict[int, str]:
+        """Holds in which the reference moves; most of them are an error."""
+        limit = MAX_WANDER * Windows.lasting(self.log).threshold().sd
         sds = {n: scatter(record) for n, record in records.items()}
         moving = {n: sd for n, sd in sds.items() if sd > limit}
         if len(moving) > len(records) / 2:
@@ -149,66 +207,7 @@ class ReferenceLog:
                 f"{len(records)} holds; is it on one plate with the sensor, and are its times "
                 "right (`reference_offset`)?"
             )
-        lost |= {n: f"the reference moves: its sd is {sd:.2g} m/s²" for n, sd in moving.items()}
-        return holds.without(lost), [r for n, r in records.items() if n not in moving]
-
-    def angles(
-        self,
-        log: Recording,
-        forces: Array,
-        records: Sequence[Array],
-        used: NDArray[np.bool_],
-        gravity: float,
-    ) -> tuple[dict[str, Any], NDArray[np.bool_], str]:
-        """Roll and pitch of the holds of a log by the means of the reference.
-
-        Parameters
-        ----------
-        log : Recording
-        forces : (n, 3) array, m/s², means of the sensor
-        records : sequence of n arrays, see `average`
-        used : (n,) bool array, which holds are not left out
-        gravity : float, m/s²
-
-        Returns
-        -------
-        columns : dict, what the campaign gets
-        poles : (n,) bool array, which holds are too near to the pole for a roll
-        note : str, how the reference was used
-
-        Raises
-        ------
-        InputError
-            If the two do not turn together, or one is mounted askew to the other.
-        """
-        own = self.calibration.correct(np.array([record.mean(axis=0) for record in records]))
-        frame = self._frame(forces[used], own[used])
-        angles = angles_of(frame.to_frd(own))
-        resting = [[record] for record, use in zip(records, used, strict=True) if use]
-        noise = hold_noise(resting, self.log.step).accuracy.allan
-        reference = reference_sensor(self.calibration, noise, frame)
-        sigma, common = reference.errors(angles, gravity)
-        poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
-        by_clock = np.isfinite(self.log.starts[0] - log.starts[0])
-        clock = "of the same clock" if by_clock else "begun together with the log"
-        clock += "" if self.offset is None else f", {self.offset:+g} s"
-        note = (
-            f"reference: {self.path}, {clock}; its axes x, y, z point "
-            f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
-            f"{shown(noise)}"
-        )
-        columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
-        return columns, poles, note
-
-    @staticmethod
-    def unused(log: Log) -> Iterator[str]:
-        """Say that roll and pitch in the log of the sensor itself are not used."""
-        there = [key for key in ("roll", "pitch") if place_of(log.source, key) is not None]
-        if there:
-            yield (
-                f"{log.path}: columns {', '.join(there)} are left out: roll and pitch are those of "
-                "`reference_log`"
-            )
+        return {n: f"the reference moves: its sd is {sd:.2g} m/s²" for n, sd in moving.items()}
 
     def _frame(self, forces: Array, own: Array) -> Frame:
         """Quarter turns from the axes of the reference to those of a sensor.
@@ -245,6 +244,16 @@ class ReferenceLog:
                 "as only a small rotation is estimated"
             )
         return best
+
+
+def _unused(log: Log) -> Iterator[str]:
+    """Say that roll and pitch in the log of the sensor itself are not used."""
+    there = [key for key in ("roll", "pitch") if place_of(log.source, key) is not None]
+    if there:
+        yield (
+            f"{log.path}: columns {', '.join(there)} are left out: roll and pitch are those of "
+            "`reference_log`"
+        )
 
 
 def reference_sensor(

@@ -36,7 +36,7 @@ def run_import(
 ) -> None:
     """Write a campaign for each sensor of a log."""
     from accelstudy.api.campaigns import Import
-    from accelstudy.campaign.importing.logs import import_each
+    from accelstudy.campaign.importing.logs import import_sensors, write_imported
 
     columns = dict(_sensor(text) for text in sensors)
     logs = Import.of(log, check(campaigns.find_holds, given), columns)
@@ -47,7 +47,9 @@ def run_import(
             name: stack.enter_context(result_folder(folder, outputs.CAMPAIGN, inputs, force))
             for name, folder in folders.items()
         }
-        imported = import_each(made, logs.files, logs.settings, figure, logs.beside)
+        imported = import_sensors(logs.files, logs.settings, logs.reference)
+        for name, result in imported.items():
+            write_imported(*result, made[name], figure)
     for name, result in imported.items():
         if name:
             say(f"sensor {name}")
@@ -201,7 +203,7 @@ def public(
         accelstudy public
         accelstudy public xsens-mti --out xsens
     """
-    from accelstudy.campaign.importing.logs import import_to
+    from accelstudy.campaign.importing.logs import import_log, write_imported
     from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 
     if name is None:
@@ -213,7 +215,8 @@ def public(
         raise InputError("--out: give the folder of the campaign")
     place, downloads = Path(out), Path(folder)
     with result_folder(place, outputs.CAMPAIGN, [downloads], force) as campaign:
-        imported = import_to(campaign, public_file(name, downloads), settings)
+        imported = import_log(public_file(name, downloads), settings)
+        write_imported(*imported, campaign)
     show_import(*imported, place)
 
 

@@ -16,7 +16,6 @@ from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.means import import_means
 from accelstudy.campaign.importing.settings import ImportSettings, read_settings
 
 
@@ -65,13 +64,17 @@ def test_without_offset_no_direction(tmp_path):
     assert any("is an offset missing?" in text for text in campaign.warnings)
 
 
+def means_of(path, **settings):
+    return import_log(path, ImportSettings(means=True, **settings))[0]
+
+
 def test_means(tmp_path):
     table = pd.DataFrame(
         {"n": [400, 100], "fx": [1.0, 0], "fy": [0, 1.0], "fz": [0.0, 0], "t": [1, 2]}
     )
     table[["sx", "sy", "sz"]] = 0.02
     table.to_csv(tmp_path / "means.csv", index=False)
-    campaign = import_means(tmp_path / "means.csv", ImportSettings(unit="g", name="two", time="t"))
+    campaign = means_of(tmp_path / "means.csv", unit="g", name="two", time="t")
     np.testing.assert_allclose(campaign.forces, np.eye(3)[:2] * STANDARD_GRAVITY)
     np.testing.assert_allclose(campaign.sd, 0.02 * STANDARD_GRAVITY)
     assert campaign.n_samples.tolist() == [400, 100]
@@ -84,14 +87,14 @@ def test_means(tmp_path):
 def test_a_table_of_means_has_its_units_in_its_names(tmp_path):
     path = tmp_path / "means.csv"
     path.write_text("fx [g],fy [g],fz [g]\n1,0,0\n0,1,0\n0,0,-1\n")
-    campaign = import_means(path)
+    campaign = means_of(path)
     assert campaign.unit == "g"
     np.testing.assert_allclose(campaign.forces, np.diag([1, 1, -1]) * STANDARD_GRAVITY)
 
 
 def test_means_as_columns(tmp_path):
     savemat(tmp_path / "means.mat", {"means": np.random.default_rng(1).normal(0, 1, (3, 24))})
-    campaign = import_means(tmp_path / "means.mat", ImportSettings(unit="g"))
+    campaign = means_of(tmp_path / "means.mat", unit="g")
     assert campaign.n_positions == 24
     assert campaign.sigma_force is None
 

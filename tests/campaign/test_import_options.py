@@ -12,7 +12,7 @@ from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import import_log, import_sensors, import_to
+from accelstudy.campaign.importing.logs import import_log, import_sensors, write_imported
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
@@ -148,7 +148,7 @@ def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, tur
     raw = turned[0] / 0.001 + [33000, 33100, 32900]
     settings = parse_settings({"rate_hz": RATE, "unit": "counts", "scale": 0.001})
     with drawn():
-        import_to(tmp_path / "out", write(tmp_path, raw), settings)
+        write_imported(*import_log(write(tmp_path, raw), settings), tmp_path / "out")
     low, high = figures[0].axes[0].dataLim.intervaly
     assert -30 < low < -5
     assert 5 < high < 30

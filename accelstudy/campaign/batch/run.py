@@ -16,7 +16,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.logs import import_to
+from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import BATCH_JOB, result_folder
 from accelstudy.sensors.models import get_model
@@ -112,4 +112,6 @@ def _read(task: Task) -> Campaign:
 def _measured(task: Task, folder: Path, public: str | Path | None) -> Campaign:
     if task.settings is None:
         return _read(task)
-    return import_to(folder, public or task.source, task.settings)[0]
+    campaign, holds = import_log(public or task.source, task.settings)
+    write_imported(campaign, holds, folder)
+    return campaign

@@ -1,4 +1,4 @@
-"""From a table of means to a campaign."""
+"""Tables of means, a row for each position."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.making import imported_campaign
 from accelstudy.campaign.importing.noise import shown
 from accelstudy.campaign.importing.recording import SDS, Log, read_log
-from accelstudy.campaign.importing.settings import ImportSettings, named_after
-from accelstudy.campaign.importing.sources import LogFile
-from accelstudy.campaign.session import Campaign
+from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.campaign.importing.sources import Source
 
 ANGLES = ("roll", "pitch")
 MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
@@ -23,46 +21,36 @@ MEANS = ("n_samples", *SDS, "temperature", "vibration", *ANGLES, "yaw")
 _YEARS = 1e8  # s; no session lasts for years, so later times count from 1970
 
 
-def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campaign:
-    """Make a campaign of a table of means, one row for each position.
+def read_means(
+    file: Source, settings: ImportSettings
+) -> tuple[ImportSettings, NDArray[np.float64], dict[str, Any]]:
+    """Read a table of means, one row for each position; a MATLAB array may have columns instead.
 
-    Parameters
-    ----------
-    path : anything that `open_source` opens; a MATLAB array may have a column for each
-        position instead
-    settings : ImportSettings, optional
-        Its `columns` are the forces and those of `MEANS`. Settings of the detector do not matter.
-        With `robot` the columns roll, pitch and perhaps yaw are the robot's angles, in the
-        convention of the frame.
+    The columns are the forces and those of `MEANS`. With `robot` roll, pitch and perhaps yaw are
+    the robot's angles, in the convention of the frame.
 
     Returns
     -------
-    Campaign
-        It has a `sigma_force` if the table has numbers of samples and their standard deviations:
-        that of white noise, since a table of means does not say more.
-
-    Raises
-    ------
-    InputError
-        If the table cannot be read.
+    settings : ImportSettings, with what the table tells
+    forces : (n, 3) array, m/s²
+    columns : dict, what the campaign gets besides. It has a `sigma_force` if the table has numbers
+        of samples and their standard deviations: that of white noise, since a table of means does
+        not say more.
     """
-    settings = named_after(settings or ImportSettings(), [path])
     wanted = [*(["time"] if settings.time is not None else []), *MEANS]
-    log = read_log(path, settings, conditions=wanted, untimed=True)
+    log = read_log(file, settings, conditions=wanted, untimed=True)
     settings, frame = cast(ImportSettings, log.layout), log.layout.axes
     rows, warnings = _rows(log, settings)
-    forces = log.forces
-
     columns: dict[str, Any] = {}
     if "n_samples" in rows:
         columns["n_samples"] = n_samples = np.round(rows["n_samples"]).astype(int)
         if np.any(n_samples < 1):
-            raise InputError(f"{path}: column n_samples: must be positive")
+            raise InputError(f"{file}: column n_samples: must be positive")
     if {*SDS} <= rows.keys():
         sd = frame.rearranged(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
         columns["sd"] = sd
         if np.any(sd < 0):
-            raise InputError(f"{path}: columns sd_fx, sd_fy, sd_fz: must not be negative")
+            raise InputError(f"{file}: columns sd_fx, sd_fy, sd_fz: must not be negative")
         if "n_samples" in columns and np.any(sd > 0):
             columns["sigma_force"] = float(np.sqrt(np.mean(sd**2 / n_samples[:, None])))
             warnings.append("sigma of a mean assumes white noise; coloured noise makes it larger")
@@ -77,15 +65,12 @@ def import_means(path: LogFile, settings: ImportSettings | None = None) -> Campa
     layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
     sigma = columns.get("sigma_force")
     said = f"sigma of a mean: {'unknown' if sigma is None else shown(sigma)}"
-    return imported_campaign(
-        path,
-        settings,
-        forces,
-        log=LogLayout.model_validate(layout),
-        notes=(f"{len(forces)} positions; {said}",),
-        warnings=tuple(warnings),
-        **columns,
-    )
+    columns |= {
+        "log": LogLayout.model_validate(layout),
+        "notes": (f"{len(log.forces)} positions; {said}",),
+        "warnings": tuple(warnings),
+    }
+    return settings, log.forces, columns
 
 
 def _rows(log: Log, settings: ImportSettings) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
