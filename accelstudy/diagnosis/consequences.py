@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import GON
 from accelstudy.diagnosis.prediction import relative_variance
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped

@@ -22,7 +22,7 @@ from accelstudy.diagnosis.decision.learned import coordinate_values, weighted_sh
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals, spans
 from accelstudy.diagnosis.space.shapes import Place, function_rows, less_its_mean
 from accelstudy.effects.learned import OF_EACH, WAVES, Learned

@@ -7,22 +7,17 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import softmax
 
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import stage
 from accelstudy.diagnosis.decision.learned import fit_of_place, most_probable_place
-from accelstudy.diagnosis.decision.noise import exceeds_stated
-from accelstudy.diagnosis.decision.posterior import (
-    Posterior,
-    Weighing,
-)
+from accelstudy.diagnosis.decision.noise import exceeds_stated, unit_variance
+from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import Singles
 from accelstudy.diagnosis.held_out_threshold import threshold
 from accelstudy.diagnosis.prediction import (
     HeldOutGap,
@@ -33,8 +28,6 @@ from accelstudy.diagnosis.prediction import (
 )
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.shapes import Place
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,36 +59,29 @@ class Gap:
         return "name" if len(self.names) == 1 else "effect"
 
 
-def measured_gap(finding: Finding, base: Solution) -> Gap:
-    """Compare the models on the positions to which they were fitted."""
-    before = base.omega / base.redundancy
-    if not finding.chosen:
-        return Gap(before)
-    final = finding.frame.solution
-    return Gap(before, final.omega / final.redundancy * relative_variance(final, base))
-
-
-def predicted_gap(
-    gap: Gap,
-    problem: Problem,
-    weighing: Weighing,
-    finding: Finding,
-    beyond: float,
-    known: float | None,
-    seeds: Sequence[np.random.SeedSequence],
-) -> Gap:
-    """Choose and fit on a part of the positions, and predict the rest.
+def gap_of(case: Case, finding: Finding, seeds: Sequence[np.random.SeedSequence]) -> Gap:
+    """Compare the models on the positions to which they were fitted, and on held-out ones.
 
     Parameters
     ----------
-    gap : Gap, on the positions to which the models were fitted
-    problem, weighing : Problem, Weighing, of all positions
-    finding : Finding, with what was chosen
-    beyond : float, total evidence from which on something counted as missing
-    known : float, variance of unit weight; None takes that of the fit to the part
-    seeds : of the split, the resampling, and the simulation
+    case : Case
+    finding : Finding
+    seeds : of the split, the resampling, and the simulated threshold
     """
-    frame, first = problem.frame, problem.base.solution
+    base, final = case.problem.base.solution, finding.frame.solution
+    before = base.omega / base.redundancy
+    if not finding.chosen:
+        return Gap(before)
+    gap = Gap(before, final.omega / final.redundancy * relative_variance(final, base))
+    if finding.verdict == "gross_error":
+        return gap
+    with stage("held-out positions"):
+        return _predicted(case, finding, gap, [np.random.default_rng(seed) for seed in seeds])
+
+
+def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]) -> Gap:
+    """Choose and fit on a part of the positions, and predict the rest."""
+    problem, first, place = case.problem, case.problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
     k = sum(choice.best.dim for choice in finding.chosen)
     needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
@@ -106,27 +92,26 @@ def predicted_gap(
             f"{fewest} are to be predicted, {needed + fewest} in all; there are {n}"
         )
         return replace(gap, reason=reason)
-    rng = np.random.default_rng(seeds[0])
-    fitted, held = split_positions(frame.forces, frame.hold, count, rng)
+    fitted, held = split_positions(problem.frame.forces, problem.frame.hold, count, rngs[0])
     try:
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
         return replace(gap, reason="the fitted positions do not determine the model")
-    part = pose(replace(problem.base, solution=base))
-    of_part, place = Weighing(part), finding.place
-    chosen, others = _chosen_alike(of_part, finding)
-    refit = _refitted(part, of_part.singles, chosen, place)
+    part = Weighing(pose(replace(problem.base, solution=base)))
+    chosen, others = _chosen_alike(part, finding)
+    refit = _refitted(part, chosen, place)
     if isinstance(refit, str):
         return replace(gap, reason=refit)
-    rest, rng = first.observed.take(held), np.random.default_rng(seeds[1])
-    test = held_out_gap(base, refit, rest, held, known, rng)
+    known = problem.evidence.level.known
+    variance = unit_variance(problem, finding.frame) if known else None
+    test = held_out_gap(base, refit, first.observed.take(held), held, variance, rngs[1])
     if others:
         another = "effect" if place is None else "coordinate or target"
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
-    split, rng = LinearSplit(frame, fitted, held), np.random.default_rng(seeds[2])
-    least = threshold(problem, weighing.classes, place, beyond, part, split, rng)
-    test = replace(test, needed=least)
+    split = LinearSplit(problem.frame, fitted, held)
+    beyond = case.detection.by_chance.beyond(RULES.level(known))
+    test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[2]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.
@@ -136,7 +121,7 @@ def predicted_gap(
     # What was found, and all that could leave the same in this campaign.
     imitators = problem.examined.imitators(choice.best)
     names = tuple(dict.fromkeys((choice.best.name, *choice.members, *imitators)))
-    sure = _is_of(names, problem, part, finding, split)
+    sure = _is_of(names, problem, part.problem, finding, split)
     return replace(gap, names=names) if sure else gap
 
 
@@ -178,21 +163,19 @@ def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     )
 
 
-def _refitted(
-    part: Problem, singles: Singles, chosen: Sequence[Choice], place: Place | None
-) -> Solution | str:
+def _refitted(part: Weighing, chosen: Sequence[Choice], place: Place | None) -> Solution | str:
     """Fit to a part with what was chosen, and a function of a place; or say why that cannot be."""
     alternatives = []
     for choice in chosen:
-        shown = tuple(m for m in choice.members if m in singles.best)
+        shown = tuple(m for m in choice.members if m in part.singles.best)
         if not shown:
             return f"the fitted positions alone cannot show {choice.best.name}"
-        alternatives.append((singles.best[shown[0]], shown))
+        alternatives.append((part.singles.best[shown[0]], shown))
     if place is not None:
-        learned = fit_of_place(part, place, [best for best, _ in alternatives])
+        learned = fit_of_place(part.problem, place, [best for best, _ in alternatives])
         reason = "the fitted positions alone cannot show such a function"
         return reason if learned is None else learned[1]
-    fit = best_refit(part.examined, singles, alternatives)
+    fit = part.refit(alternatives)
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
@@ -210,12 +193,13 @@ def _is_of(
 ) -> bool:
     """Whether held-out positions by themselves prefer some names to the other explanations."""
     assert finding.posterior is not None
-    left, missed = split.beside(problem.residuals.errors[None])
+    errors = problem.residuals.errors[None]
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
     for one in finding.posterior.told[: RULES.held_out_rivals + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
-            ((fit, rest),) = split.predictors(one.best)
-            logs.append(-float(np.sum((missed - left @ fit @ rest) ** 2)) / (2 * variance))
+            (columns,) = problem.frame.columns(one.best)
+            missed = split.beside(errors)[1] - split.corrections(errors, [(0, columns, 0.0)])
+            logs.append(-float(np.sum(missed**2)) / (2 * variance))
             of_group.append(one.names[0] in group)
     return bool(np.sum(softmax(logs)[of_group]) >= RULES.sure)

@@ -12,18 +12,19 @@ positions choose an effect, or learn a function, and predict the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
 from accelstudy.diagnosis.decision.learned import SIZES, weighted_shapes
+from accelstudy.diagnosis.decision.posterior import Weighing
 from accelstudy.diagnosis.decision.problem import Problem
-from accelstudy.diagnosis.evidence.detection import total_odds
-from accelstudy.diagnosis.evidence.field import Seen, log_ratio, simulated
-from accelstudy.diagnosis.evidence.hypotheses import Class
-from accelstudy.diagnosis.prediction import LinearSplit
+from accelstudy.diagnosis.evidence.detection import log_ratio, simulated, total_odds
+from accelstudy.diagnosis.evidence.field import Seen
+from accelstudy.diagnosis.evidence.singles import Class
+from accelstudy.diagnosis.prediction import Group, LinearSplit
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
 from accelstudy.diagnosis.space.shapes import Place
@@ -33,8 +34,7 @@ Ints = NDArray[np.int_]
 
 
 def threshold(
-    problem: Problem,
-    classes: Sequence[Class],
+    weighing: Weighing,
     place: Place | None,
     beyond: float,
     part: Problem,
@@ -45,20 +45,20 @@ def threshold(
 
     Parameters
     ----------
-    problem : Problem, of all positions
-    classes : of candidates, of which one was named
+    weighing : Weighing, of all positions
     place : Place, of which a function was learned in place of a name; None for a name
     beyond : float, total evidence from which on something counts as missing
     part : Problem, of the fitted positions
     split : LinearSplit
     rng : Generator
     """
-    residuals, field, label = problem.residuals, problem.field, labels(classes)
-    drawn = list[Shapes](field.candidates.values())
+    problem, label = weighing.problem, labels(weighing.classes)
+    residuals, field = problem.residuals, problem.field
+    drawn = list[Shapes](field.named)
     if place is not None:
-        if field.unknown is None or part.field.unknown is None:
+        if problem.unknown is None or part.unknown is None:
             return RULES.z_significant
-        drawn = [field.unknown.at([place])]
+        drawn = [problem.unknown.at([place])]
         if not len(drawn[0].dims):
             return RULES.z_significant
     added = simulated(drawn, len(residuals.design), RULES.threshold_sets, rng)
@@ -110,50 +110,50 @@ def by_name(
     part: Problem, split: LinearSplit, noise: Array, label: Mapping[str, int]
 ) -> tuple[Ints, Array]:
     """Class that the fitted positions choose of noise (b, m), and the corrections that it makes."""
-    field, z = part.field.named, split.residuals(part.residuals, noise)
-    seen, left = field.seen(z), split.beside(noise)[0]
-    names, candidate = field.names, np.argmax(field.densities(part.evidence, seen), axis=1)
-    change = np.zeros((len(noise), len(split.rows[1])))
-    for k in np.unique(candidate):
-        shapes, rows = field.candidates[names[k]], np.flatnonzero(candidate == k)
-        if names[k] == OUTLIER:
-            continue
-        logs = shapes.logs(part.evidence, seen.parts[k][rows], seen.squares[rows])
-        places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)
-        predictors = split.predictors([shapes[int(place)] for place in places])
-        for i, (fit, rest) in enumerate(predictors):
-            some = rows[which == i]
-            change[some] = left[some] @ fit @ rest
-    return np.array([label.get(names[k], -2) for k in candidate]), change
+    field, z = part.named, split.residuals(part.residuals, noise)
+    seen, names = field.seen(z), field.names
+    candidate = np.argmax(field.densities(part.evidence, seen), axis=1)
+
+    def groups() -> Iterator[Group]:
+        for k in np.unique(candidate[[names[k] != OUTLIER for k in candidate]]):
+            shapes, rows = field.named[k], np.flatnonzero(candidate == k)
+            logs = shapes.logs(part.evidence, seen.parts[k][rows], seen.squares[rows])
+            places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)
+            tried = split.frame.columns([shapes[int(place)] for place in places])
+            for i, columns in enumerate(tried):
+                yield rows[which == i], columns, 0.0
+
+    found = np.array([label.get(names[k], -2) for k in candidate])
+    return found, split.corrections(noise, groups())
 
 
 def learned(problem: Problem, seen: Seen, place: Place) -> Ints:
     """Whether a function of a place would be learned of residuals, (b,): 0, or −1 if not."""
-    field, evidence, unknown = problem.field, problem.evidence, problem.field.unknown
+    field, evidence, unknown = problem.field, problem.evidence, problem.unknown
     assert unknown is not None
+    prior = np.log(problem.prior_unknown)
     densities = field.densities(evidence, seen)
-    densities[:, :-1] -= np.log(len(field.candidates))
-    densities[:, -1] += np.log(unknown.weight)
+    densities[:, :-1] -= np.log(len(field.named))
+    densities[:, -1] += prior
     of_place = unknown.of_place(evidence, seen.parts[-1], seen.squares)[place]
-    share = np.exp(of_place + np.log(unknown.weight) - log_sum(densities))
-    return np.where(share >= RULES.sure, 0, -1)
+    return np.where(np.exp(of_place + prior - log_sum(densities)) >= RULES.sure, 0, -1)
 
 
 def by_place(part: Problem, split: LinearSplit, noise: Array, place: Place) -> tuple[Ints, Array]:
     """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
-    unknown, z, frame = part.field.unknown, split.residuals(part.residuals, noise), split.frame
+    unknown, z, frame = part.unknown, split.residuals(part.residuals, noise), split.frame
     assert unknown is not None
     each = unknown.of_place(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
     most = np.max([*each.values()], axis=0)
     found = np.where(each.get(place, np.full(len(z), -np.inf)) >= most, 0, -1)
-    left, change = split.beside(noise)[0], np.zeros((len(noise), len(split.rows[1])))
     shapes = weighted_shapes(place, part.frame, part.residuals, z, part.evidence)
-    best = np.argmax([log_sum(one.logs) for one in shapes], axis=0) if shapes else np.zeros(0)
-    for i, one in enumerate(shapes):
-        sizes = np.argmax(one.logs, axis=1)
-        shown = frame.residuals.whitened(frame.signature(one.effect)) * one.effect.deviations
-        for size in np.unique(sizes[best == i]):
-            some = np.flatnonzero((best == i) & (sizes == size))
-            fit, rest = split.predictor(shown, one.trace / SIZES[size])
-            change[some] = left[some] @ fit @ rest
-    return found, change
+
+    def groups() -> Iterator[Group]:
+        best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)
+        for i, one in enumerate(shapes):
+            sizes = np.argmax(one.logs, axis=1)
+            shown = frame.residuals.whitened(frame.signature(one.effect)) * one.effect.deviations
+            for size in np.unique(sizes[best == i]):
+                yield (best == i) & (sizes == size), shown, one.trace / SIZES[size]
+
+    return found, split.corrections(noise, groups() if shapes else ())

@@ -24,10 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.design.information import Information
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame, signature
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.learned import Learned
 from accelstudy.leveling.angles import angles_of

@@ -18,13 +18,12 @@ from __future__ import annotations
 import numpy as np
 
 from accelstudy.approaches import Approach
-from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.certain import add_certain_effects, withdraw_refuted
 from accelstudy.diagnosis.decision.learned import learn_function
-from accelstudy.diagnosis.decision.noise import tests_of_noise, unit_variance, worst_of
+from accelstudy.diagnosis.decision.noise import tests_of_noise, worst_of
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.verdict import (
@@ -35,7 +34,7 @@ from accelstudy.diagnosis.decision.verdict import (
     judge_noise,
 )
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.held_out import Gap, measured_gap, predicted_gap
+from accelstudy.diagnosis.held_out import Gap, gap_of
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.sensors.sensor import SensorModel
@@ -71,7 +70,7 @@ def diagnose(
         for key in (0, 1, 2, 4)
     )
     base = fit_base(campaign, model, approach)
-    case = Case(campaign, pose(base), Chance(null, len(base.solution.design)))
+    case = Case(pose(base), campaign, Chance(null, len(base.solution.design)))
     finding, gap = confirm(case, decide(case), [split, resampling, threshold])
     return Diagnosis(case, finding, gap, recognised)
 
@@ -122,16 +121,8 @@ def confirm(
     finding : Finding, without what was refuted: first a learned function, then all effects
     gap : Gap, how far the disagreement shrinks, and whether that is confirmed
     """
-    problem = case.problem
-    sigma_stated, base = problem.evidence.level.known, problem.base.solution
-    gap = measured_gap(finding, base)
-    while finding.chosen and finding.verdict != "gross_error":
-        with stage("held-out positions"):
-            significant = case.detection.by_chance.beyond(RULES.level(sigma_stated))
-            variance = unit_variance(problem, finding.frame) if sigma_stated else None
-            gap = predicted_gap(gap, problem, case.weighing, finding, significant, variance, seeds)
+    while True:
+        gap = gap_of(case, finding, seeds)
         if gap.held_out is None or not gap.held_out.refutes:
-            break
+            return finding, gap
         finding = finding.without_function or withdraw_refuted(case, finding, gap.held_out)
-        gap = measured_gap(finding, base)
-    return finding, gap

@@ -13,10 +13,10 @@ residuals at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import HoldConditions
 
@@ -33,6 +32,9 @@ Array = NDArray[np.float64]
 
 
 RESAMPLES = 1000
+Group: TypeAlias = tuple[Any, Array, float]
+"""Some of several residuals, columns (m, l) that l parameters show in all positions, and the
+information that there is on each of them before."""
 
 
 @dataclass(frozen=True)
@@ -266,23 +268,22 @@ class LinearSplit:
         scale = np.sqrt(size * variance)
         return np.asarray(np.sum(change * missed, axis=1) / np.where(scale > 0, scale, np.inf))
 
-    def predictor(self, columns: Array, prior: float = 0.0) -> tuple[Array, Array]:
-        """Matrices (f c, l) and (l, h c): their product turns what is left into corrections.
+    def corrections(self, errors: Array, groups: Iterable[Group]) -> Array:
+        """Corrections of the held-out part, (b, h c), by what the fitted part shows of errors.
 
         Parameters
         ----------
-        columns : (m, l) array, what l parameters show in all positions
-        prior : float, information on each of them; none by default
+        errors : (b, m) array, of all positions
+        groups : Groups, of some of these each
         """
-        fitted, rest = self.beside(columns.T)
-        if not prior:
-            return np.asarray(np.linalg.pinv(fitted), dtype=float), rest
-        inner = fitted @ fitted.T + prior * np.eye(len(fitted))
-        return fitted.T @ np.linalg.inv(inner), rest
-
-    def predictors(self, hypotheses: Sequence[Hypothesis]) -> list[tuple[Array, Array]]:
-        """Predictors of shapes of one effect."""
-        effects = [one.effect for one in hypotheses if one.effect is not None]
-        shown = self.frame.residuals.whitened(self.frame.signatures(effects))
-        each = zip(hypotheses, np.split(shown, len(effects), axis=1), strict=True)
-        return [self.predictor(column @ one.directions) for one, column in each]
+        left, rows = self.beside(errors)[0], self.rows[1]
+        change = np.zeros((len(errors), len(rows)))
+        for some, columns, prior in groups:
+            fitted, rest = self.beside(columns.T)
+            if prior:
+                inner = fitted @ fitted.T + prior * np.eye(len(fitted))
+                fit = fitted.T @ np.linalg.inv(inner)
+            else:
+                fit = np.linalg.pinv(fitted)
+            change[some] = left[some] @ fit @ rest
+        return change

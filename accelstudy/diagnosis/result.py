@@ -45,7 +45,8 @@ from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape, shape_of
-from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits

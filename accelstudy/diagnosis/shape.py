@@ -12,7 +12,7 @@ from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.forms import TARGETS
 from accelstudy.diagnosis.formulas import Ranking, argument, ranked
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.shapes import function_rows
 from accelstudy.effects.learned import Learned
 

@@ -17,7 +17,8 @@ from accelstudy.basics.wording import amount
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
+from accelstudy.diagnosis.space.examined import ExaminedFit, examine
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme

@@ -174,13 +174,13 @@ def sensor_evidence(
     base = fit_base(campaign, model, approach or usual_approach(campaign))
     problem = pose(base if noise is None else replace(base, level=noise.level))
     chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
-    case = Case(campaign, problem, chance)
-    detection, weighing = case.detection, case.weighing
+    case = Case(problem, campaign, chance)
+    detection = case.detection
     # A sensor with a noise of its own is no usual one.
     usual = detection.noise if noise is None else detection.noise[:1]
     nothing = float(np.logaddexp.reduce(usual))
-    z, unknown, of_means = problem.residuals.z, problem.field.unknown, problem.residuals
-    odds = {name: log - nothing for name, log in weighing.singles.densities.items()}
+    z, unknown, of_means = problem.residuals.z, problem.unknown, problem.residuals
+    odds = {name: log - nothing for name, log in case.singles.densities.items()}
     odds |= {one.names[0]: one.log_weight - nothing for one in case.noises}
     if noise is not None and noise.said:
         doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
@@ -192,7 +192,7 @@ def sensor_evidence(
             for place, log in unknown.by_place(problem.evidence, z).items()
         }
     pairs, pair_specs = {}, {}
-    for pair in weigh_sets(weighing.singles.shapes, problem.residuals, problem.evidence, most=2):
+    for pair in weigh_sets(case.singles.shapes, problem.residuals, problem.evidence, most=2):
         effects = sorted((h.effect for h in pair.best if h.effect), key=lambda e: e.name)
         if len(effects) == 2:
             one, other = effects
@@ -205,10 +205,10 @@ def sensor_evidence(
         p_value=detection.p_value,
         odds=odds,
         pairs=pairs,
-        classes=tuple(members for _, members in weighing.classes),
+        classes=tuple(members for _, members in case.classes),
         specs={
             name: best.effect.spec
-            for name, best in weighing.singles.best.items()
+            for name, best in case.singles.best.items()
             if best.effect is not None
         },
         pair_specs=pair_specs,
@@ -219,7 +219,7 @@ def sensor_evidence(
         square=float(z @ z) / variance,
         shown={
             name: Shown.of(problem, effects, variance)
-            for name, shapes in problem.field.candidates.items()
+            for name, shapes in problem.examined.candidates.items()
             if (effects := [h.effect for h in shapes if h.effect is not None])
             and not effects[0].sudden
         },

@@ -25,7 +25,7 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.effects import get_effect
 from accelstudy.lots.noise import SensorNoise, with_noise
 from accelstudy.sensors.sensor import SensorModel

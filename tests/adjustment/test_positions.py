@@ -31,7 +31,7 @@ from accelstudy.diagnosis.evidence.noise_models import LENGTHS, quadratic_forms,
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
-from accelstudy.diagnosis.space.repeats import clusters, lack_of_fit
+from accelstudy.diagnosis.space.hypotheses import clusters, lack_of_fit
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 

@@ -16,7 +16,8 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.next_positions import _rows
-from accelstudy.diagnosis.space.examined import ExaminedFit, Frame
+from accelstudy.diagnosis.space.examined import ExaminedFit
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import get_model

@@ -108,7 +108,7 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
         "named", problem.frame, chosen=(Choice(best, (best.name,), 1.0),),
         posterior=Posterior.of([weighed]),
     )  # fmt: skip
-    case = Case(campaign, problem, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
+    case = Case(problem, campaign, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
     said = withdraw_refuted(case, finding, gap)
     assert said.verdict == "unknown"
     assert said.reason == Reason.of(

@@ -9,9 +9,10 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, 
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out, held_out_threshold
+from accelstudy.diagnosis.decision.posterior import Weighing
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.detection import Chance, detect
-from accelstudy.diagnosis.evidence.hypotheses import classes_of, equivalents, weigh_singles
+from accelstudy.diagnosis.evidence.singles import weigh_singles
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
@@ -36,7 +37,7 @@ def parts(request):
 
 def weighed(problem):
     """The evidence for each candidate by itself."""
-    return weigh_singles(problem.examined, problem.field, problem.evidence)
+    return weigh_singles(problem.examined, problem.evidence)
 
 
 def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
@@ -45,17 +46,15 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
     beyond = detect(field, evidence, residuals, chance).by_chance.beyond(RULES.level_effects)
-    singles = weighed(problem)
-    classes = classes_of(singles, equivalents(problem.examined, singles))
-    rng = np.random.default_rng(3)
-    needed = held_out_threshold.threshold(problem, classes, None, beyond, part, split, rng)
+    weighing, rng = Weighing(problem), np.random.default_rng(3)
+    needed = held_out_threshold.threshold(weighing, None, beyond, part, split, rng)
     assert needed > RULES.z_significant + 0.3
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
     odds = field.odds(evidence, field.seen(z))
     of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
-    label = held_out_threshold.labels(classes)
+    label = held_out_threshold.labels(weighing.classes)
     claimed = held_out_threshold.named(odds, field.names, label)
     sets = np.flatnonzero((claimed >= 0) & (of_any > beyond))
     found, change = held_out_threshold.by_name(part, split, noise[sets], label)
@@ -76,9 +75,10 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     fit = refit(part.frame.solution, [weighed(part).best["quadratic_scale"]])
     rest = first.observed.take(split.held)
     gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
-    left, missed = split.beside(problem.residuals.errors[None])
-    ((fitted, rest),) = split.predictors([weighed(problem).best["quadratic_scale"]])
-    change = left @ fitted @ rest
+    errors = problem.residuals.errors[None]
+    missed = split.beside(errors)[1]
+    (columns,) = problem.frame.columns([weighed(problem).best["quadratic_scale"]])
+    change = split.corrections(errors, [(0, columns, 0.0)])
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
     assert np.mean((missed - change) ** 2) == pytest.approx(gap.after, rel=0.02)
 

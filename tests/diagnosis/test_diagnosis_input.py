@@ -141,7 +141,7 @@ def test_one_repeat_or_none_is_enough_and_no_robot_too_good(repeat_first, sigma_
     measured = campaign(repeat_first=repeat_first)[0]
     found = diagnose(replace(measured, sigma_angle=sigma_angle), NINE)
     assert found.verdict == "no_effect"
-    assert found.problem.repeated == (repeat_first > 0)
+    assert (found.problem.attitude is not None) == (repeat_first > 0)
 
 
 def test_positions_that_are_needed_to_hold_some_out_are_counted():

@@ -8,9 +8,9 @@ import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
 
 from accelstudy.adjustment.quality import solve
+from accelstudy.diagnosis.space.frame import signature
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.diagnosis.space.signatures import signature
 from accelstudy.diagnosis.visibility import (
     examine_campaign,
     signature_columns,

@@ -15,7 +15,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
 from accelstudy.diagnosis.report.words import advice, headline, verdict_lines
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.effects import get_effect
 
 SIGMA, N = 2e-3, 40

@@ -11,13 +11,12 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis.decision import posterior
+from accelstudy.diagnosis.decision.problem import BaseFit, Problem
 from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
-from accelstudy.diagnosis.evidence.field import Field
-from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.repeats import lack_of_fit
 from accelstudy.pages import lines
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
@@ -41,10 +40,8 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
     examined, rng = designs[approach], np.random.default_rng([1, 2])
     residuals = examined.frame.residuals
-    field = Field(
-        examined.candidates, examined.frame, lack_of_fit(residuals, examined.frame.forces)
-    )
-    evidence = Evidence(level, residuals.redundancy)
+    problem = Problem(BaseFit(examined.frame.solution, level, None), examined)
+    field, evidence = problem.field, problem.evidence
     rates, seen, weights = [], [], []
     for seed in range(RUNS):
         chance = Chance(np.random.SeedSequence(seed), len(residuals.design))

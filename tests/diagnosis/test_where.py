@@ -12,7 +12,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.space.repeats import LackOfFit, clusters
+from accelstudy.diagnosis.space.hypotheses import LackOfFit, clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.schemes import get_scheme

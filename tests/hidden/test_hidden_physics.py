@@ -11,7 +11,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.header import COLUMNS
-from accelstudy.diagnosis.space.signatures import signature
+from accelstudy.diagnosis.space.frame import signature
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.models import get_model
 from studies.hidden import physics

@@ -14,15 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from accelstudy.adjustment.quality import Solution
-from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
-from accelstudy.diagnosis.decision.problem import Problem
-from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement
 from accelstudy.diagnosis.decision.verdict import Choice, Finding, Reason
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.effects import effect_names
 
@@ -33,16 +31,15 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
     assert posterior is not None
     if finding.verdict != "unknown":
         return replace(finding, says=statement(finding.credible_set, case.cosine))
-    problem, weighing = case.problem, case.weighing
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
     if finding.code == "misfit" or beyond > 1 - RULES.credible:
         posterior = posterior.doubting(_perhaps_imitations(case, posterior))
     says = statement(posterior.all, case.cosine)
     finding = replace(finding, posterior=posterior, says=says)
-    chosen = [choice for _, choice in _certain_effects(weighing, posterior, says)]
+    chosen = [choice for _, choice in _certain_effects(case, posterior, says)]
     if not chosen:
         return finding
-    fit = _fit_of(problem, weighing, chosen)
+    fit = _fit_of(case, chosen)
     if fit is None:
         return replace(finding, says=Statement((), ()))
     added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
@@ -50,14 +47,14 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
 
 
 def _certain_effects(
-    weighing: Weighing, posterior: Posterior, says: Statement
+    case: Case, posterior: Posterior, says: Statement
 ) -> list[tuple[Part, Choice]]:
     """Components that are certain and effects, each with its most probable name."""
     chosen = []
     for part in says.certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
-            best = next(shapes, weighing.singles.best[name.name])
+            best = next(shapes, case.singles.best[name.name])
             chosen.append((part, Choice(best, name.members, part.posterior)))
     return chosen
 
@@ -68,34 +65,30 @@ def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     More is missing than the catalogue explains. An effect of it may imitate what is in none, though
     hardly ever nearly all of that.
     """
-    problem, weighing = case.problem, case.weighing
-    seeming = _certain_effects(weighing, posterior, statement(posterior.all, case.cosine))
+    seeming = _certain_effects(case, posterior, statement(posterior.all, case.cosine))
     chosen, names = [choice for _, choice in seeming], set[str]()
-    after = _disagreement(problem, _fit_of(problem, weighing, chosen))
+    after = _disagreement(case, chosen)
     for i, (part, _) in enumerate(seeming):
-        without = _fit_of(problem, weighing, [*chosen[:i], *chosen[i + 1 :]])
-        if after > (1 - RULES.nearly_all) * _disagreement(problem, without):
+        without = _disagreement(case, [*chosen[:i], *chosen[i + 1 :]])
+        if after > (1 - RULES.nearly_all) * without:
             names |= {name.name for name in part.names}
     return names
 
 
-def _fit_of(
-    problem: Problem, weighing: Weighing, chosen: Sequence[Choice]
-) -> tuple[list[Hypothesis], Solution] | None:
+def _fit_of(case: Case, chosen: Sequence[Choice]) -> tuple[list[Hypothesis], Solution] | None:
     """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
     if not chosen:
-        return [], problem.frame.solution
-    classes = [(choice.best, choice.members) for choice in chosen]
-    return best_refit(problem.examined, weighing.singles, classes)
+        return [], case.problem.frame.solution
+    return case.refit([(choice.best, choice.members) for choice in chosen])
 
 
-def _disagreement(problem: Problem, fit: tuple[list[Hypothesis], Solution] | None) -> float:
-    """Ω beyond that of the given noise, all of it if none is given; infinite without a solution."""
+def _disagreement(case: Case, chosen: Sequence[Choice]) -> float:
+    """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
+    fit = _fit_of(case, chosen)
     if fit is None:
         return np.inf
-    solution = fit[1]
-    noise = solution.redundancy * float(problem.evidence.level.known)
-    return max(solution.omega - noise, 1e-9)
+    noise = fit[1].redundancy * float(case.problem.evidence.level.known)
+    return max(fit[1].omega - noise, 1e-9)
 
 
 def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:

@@ -16,14 +16,14 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.decision.noise import misfit
-from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
+from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
@@ -58,7 +58,7 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
     if found is None or found.probability < RULES.sure:
         return None
     certain = [choice for choice in finding.chosen if choice.best.name not in found.names]
-    doubted = [_choice(problem, case.weighing, posterior, name) for name in found.names]
+    doubted = [_choice(case, posterior, name) for name in found.names]
     # What is doubted may be the mean of what the function changes, or a part of the function.
     for beside in (finding.chosen, (*certain, *doubted)):
         fitted = fit_of_place(problem, found.place, [choice.best for choice in beside])
@@ -107,16 +107,16 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
     return FoundPlace(place, totals[place], beside[place][1])
 
 
-def _choice(problem: Problem, weighing: Weighing, posterior: Posterior, name: str) -> Choice:
+def _choice(case: Case, posterior: Posterior, name: str) -> Choice:
     """Effect that an explanation has beside a function, with its probability."""
     having = [one.posterior for one in posterior.all if name in one.names]
-    best = problem.examined.candidates[name].strongest(problem.residuals.z)
-    return Choice(best, weighing.members[name], min(sum(having), 1.0))
+    best = case.problem.examined.candidates[name].strongest(case.problem.residuals.z)
+    return Choice(best, case.members[name], min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:
     """Probabilities of the places of something unknown, beside effects with some names."""
-    unknown, left = problem.field.unknown, problem.residuals
+    unknown, left = problem.unknown, problem.residuals
     if unknown is None:
         return {}
     for name in names[: names.index(UNKNOWN)]:

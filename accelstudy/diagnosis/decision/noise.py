@@ -27,9 +27,8 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     within_hold_test,
 )
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
-from accelstudy.diagnosis.space.hypotheses import Spaces
-from accelstudy.diagnosis.space.repeats import LackOfFit, clusters
+from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.hypotheses import LackOfFit, Spaces, clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 
 SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
@@ -72,7 +71,7 @@ def misfit(problem: Problem, solution: Solution) -> Misfit | None:
 
 def lack_of_fit(problem: Problem) -> float:
     """p-value of the test whether repeats agree better with each other than with the model."""
-    residuals, same = problem.residuals, problem.field.attitude
+    residuals, same = problem.residuals, problem.attitude
     if same is None:
         return 1.0
     return _of_fit(residuals, *_of_repeats(residuals, same))

@@ -15,21 +15,15 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.adjustment.quality import column_basis
+from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import (
-    Class,
-    Singles,
-    classes_of,
-    equivalents,
-    unknown_beside,
-    weigh_singles,
-)
 from accelstudy.diagnosis.evidence.noise_models import colour_densities
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
@@ -41,6 +35,14 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
 )
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
+from accelstudy.diagnosis.evidence.singles import (
+    Class,
+    Singles,
+    classes_of,
+    equivalents,
+    unknown_beside,
+    weigh_singles,
+)
 from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis, cosines
@@ -189,8 +191,7 @@ class Weighing:
     @cached_property
     def singles(self) -> Singles:
         """Evidence for each candidate by itself."""
-        problem = self.problem
-        return weigh_singles(problem.examined, problem.field, problem.evidence)
+        return weigh_singles(self.problem.examined, self.problem.evidence)
 
     @cached_property
     def members(self) -> Mapping[str, tuple[str, ...]]:
@@ -205,7 +206,7 @@ class Weighing:
     @cached_property
     def alone(self) -> list[Explanation]:
         """Explanations by one effect, one outlying position, or something unknown."""
-        each, unknown = -np.log(max(len(self.classes), 1)), self.problem.field.unknown
+        each, unknown = -np.log(max(len(self.classes), 1)), self.problem.unknown
         alone = [
             Explanation((best.name,), (names,), self.singles.densities[best.name] + each, (best,))
             for best, names in self.classes
@@ -213,7 +214,7 @@ class Weighing:
         if unknown is not None:
             z = self.problem.residuals.z
             density = unknown.log_density(self.problem.evidence, unknown.parts(z), z @ z)
-            log = float(density + np.log(unknown.weight))
+            log = float(density + np.log(self.problem.prior_unknown))
             alone.append(Explanation((UNKNOWN,), ((UNKNOWN,),), log))
         return alone
 
@@ -243,14 +244,14 @@ class Weighing:
     def with_unknown(self) -> list[Explanation]:
         """Explanations by something unknown beside the strongest effects and pairs of effects."""
         problem, weighed = self.problem, list[Explanation]()
-        unknown = problem.field.unknown
+        unknown = problem.unknown
         if len(self.classes) < 2 or unknown is None:
             return weighed
         singles = [one for one in self.alone if one.best]
         least = max(one.log_weight for one in (*self.alone, *self.sets)) - RULES.sets_within
         pairs = [one for one in self.sets if len(one.best) == 2 and one.log_weight > least]
         pairs.sort(key=lambda one: -one.log_weight)
-        prior = float(np.log(RULES.prior_two * unknown.weight))
+        prior = float(np.log(RULES.prior_two * problem.prior_unknown))
         for one in (*singles[: RULES.unknown_beside], *pairs[: RULES.unknown_beside]):
             basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
             log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
@@ -259,20 +260,28 @@ class Weighing:
                 weighed.append(Explanation(names, classes, one.log_weight + log + prior))
         return weighed
 
+    def refit(self, chosen: Iterable[Class]) -> tuple[list[Hypothesis], Solution] | None:
+        """Fit with the members of classes that fit best; None if none has a solution."""
+        return best_refit(self.problem.examined, self.singles, chosen)
+
+    def cosine(self, name: str, other: str) -> float:
+        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
+        one, two = (self.singles.best.get(each) for each in (name, other))
+        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
+
 
 @dataclass(frozen=True)
-class Case:
-    """A campaign and what it has to explain; the evidence for that is weighed once it is needed.
+class Case(Weighing):
+    """A campaign and everything that could explain it, the noise among it.
 
     Attributes
     ----------
-    campaign : Campaign, with a recognised gross error mended
     problem : Problem, that it poses
+    campaign : Campaign, with a recognised gross error mended
     chance : Chance, residuals without any effect
     """
 
     campaign: Campaign
-    problem: Problem
     chance: Chance
 
     @cached_property
@@ -282,61 +291,38 @@ class Case:
         return detect(problem.field, problem.evidence, problem.residuals, self.chance)
 
     @cached_property
-    def weighing(self) -> Weighing:
-        """Evidence for everything that may be missing."""
-        return Weighing(self.problem)
+    def posterior(self) -> Posterior:
+        """Probabilities of everything that may be missing or wrong."""
+        return Posterior.of([*self.alone, *self.sets, *self.with_unknown, *self.noises])
 
-    def cosine(self, name: str, other: str) -> float:
-        """Canonical cosine of the best shapes of two candidates; 0 of what is no candidate."""
-        one, two = (self.weighing.singles.best.get(each) for each in (name, other))
-        return 0.0 if one is None or two is None else float(cosines(one.ideal, two.ideal)[0])
-
-    @property
+    @cached_property
     def noises(self) -> list[Explanation]:
         """Explanations by wrong noise alone, one of each kind."""
-        return self._noises[0]
+        problem, by_level = self.problem, self.detection.noise
+        nothing = float(np.logaddexp.reduce(by_level))
+        # Weighted axes need no further evidence that they differ.
+        weighted = problem.frame.solution is not problem.base.solution
+        unequal = by_level[0] if weighted else nothing + problem.unequal_axes
+        tails = most_evidence(tail_test(problem.residuals, self.chance).p_value)
+        logs = {
+            COLOUR: np.log(RULES.prior_coloured) + log_mean(self._colours),
+            AXES: unequal,
+            TAILS: nothing + np.log(RULES.prior_tails) + tails,
+        }
+        if len(by_level) > 1:
+            # More noise than within the holds is an offset from hold to hold.
+            name = LEVEL if problem.evidence.level.known else COLOUR
+            logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
+        return [Explanation((name,), ((name,),), float(log)) for name, log in logs.items()]
 
     @property
     def slow(self) -> float:
         """Probability that the noise lasts for some holds, by the evidence alone."""
-        return self._noises[1]
+        by_level, weights = self.detection.noise, self.problem.evidence.level.weights
+        fast = max(self._colours[0], *(by_level[1:] - np.log(weights[1:])))
+        return float(special.expit(log_mean(self._colours[1:]) - fast))
 
     @cached_property
-    def posterior(self) -> Posterior:
-        """Probabilities of everything that may be missing or wrong."""
-        weighing = self.weighing
-        weighed = [*weighing.alone, *weighing.sets, *weighing.with_unknown, *self.noises]
-        return Posterior.of(weighed)
-
-    @cached_property
-    def _noises(self) -> tuple[list[Explanation], float]:
-        return _noises(self.problem, self.detection, self.chance)
-
-
-def _noises(
-    problem: Problem, detection: Detection, chance: Chance
-) -> tuple[list[Explanation], float]:
-    """Weigh each kind of wrong noise, with nothing else missing; and how slow coloured noise is."""
-    residuals, evidence, by_level = problem.residuals, problem.evidence, detection.noise
-    nothing = float(np.logaddexp.reduce(by_level))
-    assert problem.axes is not None
-    # Weighted axes need no further evidence that they differ.
-    unequal = nothing + np.log(RULES.prior_axes) + problem.axes.log_evidence
-    if problem.frame.solution is not problem.base.solution:
-        unequal = float(by_level[0])
-    tails = tail_test(residuals, chance)
-    processes = colour_densities(residuals, evidence)
-    logs = {
-        COLOUR: np.log(RULES.prior_coloured) + log_mean(processes),
-        AXES: unequal,
-        TAILS: nothing + np.log(RULES.prior_tails) + most_evidence(tails.p_value),
-    }
-    lasting, fast = log_mean(processes[1:]), processes[0]
-    if len(by_level) > 1:
-        # More noise than within the holds is an offset from hold to hold.
-        name = LEVEL if evidence.level.known else COLOUR
-        logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
-        fast = max(fast, by_level[1] - np.log(evidence.level.weights[1]))
-    slow = float(special.expit(lasting - fast))
-    weighed = [Explanation((name,), ((name,),), float(log)) for name, log in logs.items()]
-    return weighed, slow
+    def _colours(self) -> NDArray[np.float64]:
+        """Log densities of the residuals with coloured noise, by its length."""
+        return colour_densities(self.problem.residuals, self.problem.evidence)

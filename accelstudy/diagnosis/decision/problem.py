@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,15 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import ExaminedFit, Frame, examine
-from accelstudy.diagnosis.space.repeats import lack_of_fit
+from accelstudy.diagnosis.space.examined import ExaminedFit, examine
+from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.hypotheses import LackOfFit, lack_of_fit
 from accelstudy.diagnosis.space.residuals import Residuals
+from accelstudy.diagnosis.space.shapes import LearnedShapes
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -94,22 +97,16 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
 
 @dataclass(frozen=True)
 class Problem:
-    """A fit and all that its model may lack, side by side.
+    """A fit and all that its model may lack.
 
     Attributes
     ----------
     base : BaseFit, with equal axes
     examined : ExaminedFit, the same with unequal axes weighted, and the hypotheses about it
-    axes : UnequalAxes, how probable these are; None of an exact fit
-    field : Field, all candidates
-    evidence : Evidence, by which they are weighed
     """
 
     base: BaseFit
     examined: ExaminedFit
-    axes: UnequalAxes | None
-    field: Field
-    evidence: Evidence
 
     @property
     def frame(self) -> Frame:
@@ -121,10 +118,60 @@ class Problem:
         """Those of the fit."""
         return self.examined.frame.residuals
 
+    @cached_property
+    def evidence(self) -> Evidence:
+        """By which all that may be missing is weighed."""
+        return Evidence(self.base.level, self.residuals.redundancy)
+
+    @cached_property
+    def attitude(self) -> LackOfFit | None:
+        """All that repeated positions have in common; None if the noise does not show by itself."""
+        return lack_of_fit(self.residuals, self.frame.forces)
+
+    @cached_property
+    def unknown(self) -> LearnedShapes | None:
+        """Something without a name; None where nothing but the candidates shows."""
+        shapes = LearnedShapes.of(self.frame, self.attitude) if self.examined.candidates else None
+        return shapes if shapes is not None and shapes.places else None
+
     @property
-    def repeated(self) -> bool:
-        """Whether attitudes were measured repeatedly, so that the noise shows by itself."""
-        return self.field.attitude is not None
+    def prior_unknown(self) -> float:
+        """Prior weight of something without a name."""
+        slow = self.frame.absent and self.unknown is not None and self.unknown.is_slow.any()
+        return RULES.prior_unknown + (RULES.prior_unrecorded if slow else 0.0)
+
+    @cached_property
+    def named(self) -> Field:
+        """All candidates that have names."""
+        return Field(self.examined.candidates)
+
+    @cached_property
+    def field(self) -> Field:
+        """All candidates."""
+        unknown = {} if self.unknown is None else {UNKNOWN: self.unknown}
+        return Field({**self.examined.candidates, **unknown})
+
+    @cached_property
+    def axes(self) -> UnequalAxes:
+        """Unequal axes of the base fit, and the evidence for them."""
+        residuals = Residuals.of(self.base.solution)
+        evidence = Evidence(self.base.level, residuals.redundancy)
+        return UnequalAxes.of(residuals, evidence, self.base.within)
+
+    @property
+    def unequal_axes(self) -> float:
+        """Log odds that nothing is wrong but the noise of the axes, against nothing."""
+        return float(np.log(RULES.prior_axes) + self.axes.log_evidence)
+
+    def best_odds(self, field: Field) -> float:
+        """Log odds of the most probable single thing that is missing against nothing, or 0."""
+        if not field.names:
+            return 0.0
+        prior = np.full(len(field.names), 1 / len(field.named))
+        if UNKNOWN in field.names:
+            prior[-1] = self.prior_unknown
+        odds = field.odds(self.evidence, field.seen(self.residuals.z)) + np.log(prior)
+        return max(0.0, float(np.max(odds)))
 
 
 def pose(base: BaseFit) -> Problem:
@@ -133,47 +180,23 @@ def pose(base: BaseFit) -> Problem:
     The axes are weighted by their noise where unequal axes explain the residuals better than equal
     ones do, with nothing missing, with any single effect, or with something unknown.
     """
-    first, examined, axes = base.solution, examine(base.solution), None
-    field = _field(examined)
-    if not is_exact(first):
-        residuals = examined.frame.residuals
-        evidence = Evidence(base.level, residuals.redundancy)
-        axes = UnequalAxes.of(residuals, evidence, base.within)
-        noisier = float(np.log(RULES.prior_axes) + axes.log_evidence)
-        # Something unknown is asked last, as it takes longest.
-        if noisier > _best_odds(field.named, evidence, residuals.z) and (
-            noisier > _best_odds(field, evidence, residuals.z)
-        ):
-            sigma = np.sqrt(axes.ratios)
-            mean = np.mean(np.sqrt(first.variances[:, :3]))
-            shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
-            observed = replace(first.observed, sigma_force=shaped)
-            # With other weights a sensor that clips may have no solution.
-            with suppress(InputError):
-                examined = examine(solve(first.model, first.approach, observed))
-                field = _field(examined)
-    evidence = Evidence(base.level, examined.frame.residuals.redundancy)
-    return Problem(base, examined, axes, field, evidence)
-
-
-def _field(examined: ExaminedFit) -> Field:
-    """All candidates of a fit."""
-    frame = examined.frame
-    return Field(examined.candidates, frame, lack_of_fit(frame.residuals, frame.forces))
+    first = base.solution
+    problem = Problem(base, examine(first))
+    if is_exact(first):
+        return problem
+    noisier = problem.unequal_axes
+    # Something unknown is asked last, as it takes longest.
+    if noisier > problem.best_odds(problem.named) and noisier > problem.best_odds(problem.field):
+        sigma = np.sqrt(problem.axes.ratios)
+        mean = np.mean(np.sqrt(first.variances[:, :3]))
+        shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))
+        observed = replace(first.observed, sigma_force=shaped)
+        # With other weights a sensor that clips may have no solution.
+        with suppress(InputError):
+            return Problem(base, examine(solve(first.model, first.approach, observed)))
+    return problem
 
 
 def is_exact(fit: Solution) -> bool:
     """Whether a campaign is its own model, so that only rounding errors are left."""
     return float(np.sqrt(np.mean(fit.misclosures**2))) < ROUNDING * fit.gravity
-
-
-def _best_odds(field: Field, evidence: Evidence, z: NDArray[np.float64]) -> float:
-    """Log odds of the most probable single thing that is missing against nothing, at least 0."""
-    if not field.names:
-        return 0.0
-    unknown = [] if field.unknown is None else [field.unknown.weight]
-    prior = [*np.full(len(field.candidates), 1 / len(field.candidates)), *unknown]
-    nothing = np.logaddexp.reduce(evidence.of_noise(z @ z))
-    return max(
-        0.0, float(np.max(field.densities(evidence, field.seen(z)) + np.log(prior)) - nothing)
-    )

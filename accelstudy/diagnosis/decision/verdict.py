@@ -12,21 +12,14 @@ import numpy as np
 from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
-from accelstudy.diagnosis.decision.posterior import (
-    Case,
-    Explanation,
-    Posterior,
-    Weighing,
-)
+from accelstudy.diagnosis.decision.posterior import Case, Explanation, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.decision.statement import Statement
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.hypotheses import equivalents, weigh_singles
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
@@ -142,7 +135,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
     frame, top = case.problem.frame, posterior.told[0]
     if top.best:
         chosen = zip(top.best, top.classes, strict=True)
-        fit = best_refit(case.problem.examined, case.weighing.singles, chosen)
+        fit = case.refit(chosen)
         reason = _against(case.problem, top, fit)
         if fit is None or reason is not None:
             return Finding("unknown", frame, reason, posterior=posterior)
@@ -254,7 +247,7 @@ def unrecorded(case: Case, finding: Finding) -> Reason | None:
     noise = "slow"
     if finding.verdict != "unknown" and slow < RULES.sure:
         noise = "by hold" if slow <= 1 - RULES.sure else "either"
-    repeated = case.problem.repeated
+    repeated = case.problem.attitude is not None
     return Reason.of(
         "unrecorded", noise=noise, absent=absent, repeated=repeated, why=finding.reason
     )
@@ -263,7 +256,7 @@ def unrecorded(case: Case, finding: Finding) -> Reason | None:
 def _of_courses(problem: Problem, posterior: Posterior) -> float:
     """Probability of effects of time or temperature, and of something unknown like them."""
     courses = {name for name in effect_names() if get_effect(name).is_course}
-    unknown = problem.field.unknown
+    unknown = problem.unknown
     if unknown is not None:
         places = unknown.by_place(problem.evidence, problem.residuals.z)
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
@@ -291,63 +284,45 @@ def _posterior_by_refits(case: Case, single: Explanation, count: int) -> Posteri
     single : Explanation, the effect
     count : int, sets of candidates that are refitted, the most probable to first order
     """
-    problem, weighing = case.problem, case.weighing
-    tried = [single, *sorted(weighing.sets, key=lambda one: -one.log_weight)[:count]]
-    refitted = [_refitted(problem, weighing, one) for one in tried]
-    weighed = [one for one, _ in refitted]
+    tried = [single, *sorted(case.sets, key=lambda one: -one.log_weight)[:count]]
+    refitted = [_refitted(case, one) for one in tried]
     alone, solution = refitted[0]
+    weighed = [one for one, _ in refitted]
     if solution is not None:
-        weighed += _beside(problem, len(weighing.classes), alone, solution)
-    others = [one for one in weighing.alone if one.names != single.names]
+        weighed += _beside(case, alone, solution)
+    others = [one for one in case.alone if one.names != single.names]
     return Posterior.of([*weighed, *others, *case.noises])
 
 
-def _refitted(
-    problem: Problem, weighing: Weighing, one: Explanation
-) -> tuple[Explanation, Solution | None]:
+def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
     """Weigh an explanation by its refit instead of by first order."""
-    chosen = zip(one.best, one.classes, strict=True)
-    fit = best_refit(problem.examined, weighing.singles, chosen)
+    fit = case.refit(zip(one.best, one.classes, strict=True))
     if fit is None:
         return one, None
     best, solution = fit
-    z, basis = problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
+    z, basis = case.problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
     gain = max(float(left @ left) - solution.omega, 0.0)
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
-    first, refit = problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
+    first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
     return replace(one, log_weight=weight, best=tuple(best)), solution
 
 
-def _beside(
-    problem: Problem, count: int, alone: Explanation, solution: Solution
-) -> list[Explanation]:
-    """One effect with another one, or with something unknown, in what its refit leaves.
-
-    Parameters
-    ----------
-    problem : Problem
-    count : int, classes of candidates
-    alone : Explanation, the effect
-    solution : Solution, its refit
-    """
-    inner = pose(replace(problem.base, solution=solution))
-    z, field = inner.residuals.z, inner.field
-    members = equivalents(inner.examined, weigh_singles(inner.examined, field, inner.evidence))
-    nothing = float(np.logaddexp.reduce(inner.evidence.of_noise(z @ z)))
-    logs = field.densities(inner.evidence, field.seen(z)) - nothing + alone.log_weight
-    k, weighed = max(count, 1), []
-    for name, log in zip(field.names, logs.tolist(), strict=True):
+def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
+    """One effect with another one, or with something unknown, in what its refit leaves."""
+    inner = Weighing(pose(replace(case.problem.base, solution=solution)))
+    problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
+    odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
+    for name, log in zip(problem.field.names, odds.tolist(), strict=True):
         if name == UNKNOWN:
-            assert field.unknown is not None
-            weight = log + float(np.log(RULES.prior_two * field.unknown.weight))
-            names, classes = (*alone.names, UNKNOWN), (*alone.classes, (UNKNOWN,))
-            weighed.append(Explanation(names, classes, weight))
-            continue
-        other = inner.examined.candidates[name].strongest(z)
-        both = (*alone.classes, members[name])
-        within = float(within_bounds((other,), z, inner.evidence)[0])
-        weight = log + within + float(np.log(RULES.prior_two / k))
-        weighed.append(Explanation((*alone.names, name), both, weight, (*alone.best, other)))
+            members: tuple[str, ...] = (UNKNOWN,)
+            best, more = alone.best[:0], np.log(problem.prior_unknown)
+        else:
+            other = problem.examined.candidates[name].strongest(z)
+            members, best = inner.members[name], (*alone.best, other)
+            more = within_bounds((other,), z, problem.evidence)[0] - np.log(len(case.classes))
+        weight = log + float(more + np.log(RULES.prior_two))
+        classes = (*alone.classes, members)
+        weighed.append(Explanation((*alone.names, name), classes, weight, best))
     return weighed

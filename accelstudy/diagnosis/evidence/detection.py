@@ -12,16 +12,17 @@ simulated values the bound P(S ≥ s) ≤ exp(−s) is used: in noise alone exp(
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
-from accelstudy.diagnosis.evidence.field import Field, log_ratio, simulated
+from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.hypotheses import Shapes, log_sum
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -33,6 +34,8 @@ AT_ONCE = 500_000
 
 PRIORS = 1
 """Stream of the rows of priors, apart from all others of the same seed."""
+PROPOSED = np.array([12.0, 25.0, 50.0])
+"""Noncentralities of the simulated effects: where tests at the usual levels decide."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,12 @@ class Chance:
 
     def errors_with_effects(self, residuals: Residuals, field: Field) -> Iterator[Array]:
         """Yield residuals without an effect and as many with a random one."""
-        key, named = (*self.seed.spawn_key, 0), [*field.candidates.values()]
+        key = (*self.seed.spawn_key, 0)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))
         for errors in self.errors(residuals):
             half = len(errors) // 2 or 1
             yield errors[:half]
-            changed = errors[-half:] + simulated(named, errors.shape[1], half, rng)
+            changed = errors[-half:] + simulated(field.named, errors.shape[1], half, rng)
             yield changed - (changed @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
@@ -145,7 +148,7 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
         nobody: Array = np.zeros(0)
         noise = evidence.of_noise(residuals.z @ residuals.z)
         return Detection(0.0, 1.0, {}, noise, {}, {}, Simulated(nobody, nobody))
-    seen, k, named = field.seen(residuals.z), len(field.names), [*field.candidates.values()]
+    seen, k = field.seen(residuals.z), len(field.names)
     densities, noise = field.densities(evidence, seen), evidence.of_noise(seen.squares)
     nothing = np.logaddexp.reduce(noise)
     odds: list[Array] = []
@@ -153,7 +156,7 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     for errors in chance.errors_with_effects(residuals, field):
         drawn = field.seen(errors)
         odds.append(field.odds(evidence, drawn))
-        ratio = np.exp(np.minimum(log_ratio(named, drawn.parts), 700.0))
+        ratio = np.exp(np.minimum(log_ratio(field.named, drawn.parts), 700.0))
         weights.append(1 / (0.5 + 0.5 * ratio))
     each, w = np.concatenate(odds), np.concatenate(weights)
     total = total_odds(each)
@@ -184,3 +187,49 @@ def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:
         return float(min(np.sum(weights[beyond]) / len(weights), 1.0))
     least = np.sum(weights[values >= np.sort(values)[-RULES.enough]]) / len(weights)
     return float(min(least, bound, 1.0))
+
+
+# --- simulated effects --------------------------------------------------------------------------
+
+
+def simulated(
+    candidates: Sequence[Shapes], conditions: int, count: int, rng: np.random.Generator
+) -> Array:
+    """Draw what a random candidate adds to so many conditions, (count, conditions).
+
+    Its shape is any of its shapes, and its size one of `PROPOSED`.
+    """
+    ends = np.cumsum([0, *(len(one.dims) for one in candidates)])
+    probable = np.concatenate([one.prior for one in candidates]) / len(candidates)
+    drawn = rng.choice(ends[-1], size=count, p=probable)
+    sizes = rng.choice(PROPOSED, size=count)
+    candidate = np.searchsorted(ends, drawn, side="right") - 1
+    dims = np.concatenate([one.dims for one in candidates])[drawn]
+    normal = np.split(rng.standard_normal(dims.sum()), np.cumsum(dims)[:-1])
+    added = np.zeros((count, conditions))
+    for k in np.unique(candidate):
+        rows, shapes = np.flatnonzero(candidate == k), candidates[k]
+        places = drawn[rows] - ends[k]
+        shares = np.concatenate([shapes.shares[place] for place in places])
+        variances = np.repeat(sizes[rows], dims[rows]) * shares
+        amounts = np.concatenate([normal[row] for row in rows]) * np.sqrt(variances)
+        added[rows] = shapes.drawn(places, amounts)
+    return added
+
+
+def log_ratio(candidates: Sequence[Shapes], parts: Sequence[Array]) -> Array:
+    """Log ratio of the densities of residuals with such an effect and of noise alone, (b,).
+
+    Parameters
+    ----------
+    candidates : Shapes
+    parts : arrays (b, p), of residuals, by candidate
+    """
+    logs = []
+    for size in PROPOSED.tolist():
+        of_size = []
+        for shapes, seen in zip(candidates, parts, strict=False):
+            taken, growth = shapes.taken(seen, size)
+            of_size.append((taken - growth) / 2 + np.log(shapes.prior / len(candidates)))
+        logs.append(log_sum(np.concatenate(of_size, axis=-1)))
+    return log_mean(np.stack(logs, axis=-1))

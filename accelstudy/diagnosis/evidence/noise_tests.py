@@ -15,7 +15,7 @@ from scipy import special
 from accelstudy.adjustment.quality import global_test
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.noise_models import quadratic_forms
-from accelstudy.diagnosis.space.repeats import clusters
+from accelstudy.diagnosis.space.hypotheses import clusters
 from accelstudy.diagnosis.space.residuals import Residuals, position_products
 
 Array = NDArray[np.float64]

@@ -1,9 +1,9 @@
-"""A calibrated session, and all that may be missing from its model."""
+"""All that may be missing from the model of a calibrated session."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
     BumpedPositions,
@@ -20,151 +21,10 @@ from accelstudy.diagnosis.space.hypotheses import (
     Hypothesis,
     same_space,
 )
-from accelstudy.diagnosis.space.residuals import Residuals, ideal_residuals, spans
-from accelstudy.diagnosis.space.signatures import Columns, Signature, signatures
-from accelstudy.effects import Effect, HoldConditions, effect_names, get_effect
-from accelstudy.leveling.angles import angles_of
+from accelstudy.effects import Effect, effect_names, get_effect
 from accelstudy.sensors.models import compose
 
 Array = NDArray[np.float64]
-
-
-ROUNDING = 1e-9
-"""Share of a signature that rounding errors may leave where nothing is left."""
-
-
-@dataclass(frozen=True)
-class Frame:
-    """One calibrated session, in which effects are evaluated.
-
-    Attributes
-    ----------
-    solution : Solution
-    residuals : Residuals
-    ideal : Residuals, of an ideal sensor in the same positions
-    forces : (n, 3) array, m/s², of the ideal sensor
-    sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
-    output : (n, 3) array, m/s², adjusted readings, on which effects act that act last
-    angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
-    hold : HoldConditions, completed with what is implied
-    """
-
-    solution: Solution
-    residuals: Residuals
-    ideal: Residuals
-    forces: Array
-    sensed: Array
-    output: Array
-    angles: Array
-    hold: HoldConditions
-
-    @property
-    def absent(self) -> tuple[str, ...]:
-        """Columns that would tell what changes slowly, and that the campaign lacks."""
-        return tuple(n for n in ("temperature", "time") if getattr(self.hold, n) is None)
-
-    @cached_property
-    def _columns(self) -> Columns:
-        """Columns of the holds beside arrays of settings and parameters."""
-        return Columns(self.hold, 2)
-
-    @classmethod
-    def of(cls, solution: Solution) -> Frame:
-        """Frame of a calibration at its solution."""
-        ideal, forces = ideal_residuals(solution)
-        observed, model = solution.observed, solution.model
-        if observed.angles is not None and solution.approach.uses_angles:
-            angles = np.asarray(observed.angles[0])
-        else:
-            angles = angles_of(forces)
-        t = model.axes_matrix(solution.parameters[: model.n_parameters])
-        return cls(
-            solution=solution,
-            residuals=Residuals.of(solution),
-            ideal=ideal,
-            forces=forces,
-            sensed=np.asarray(np.linalg.solve(t, forces.T).T),
-            output=observed.forces[0] + solution.residuals[:, :3],
-            angles=angles,
-            hold=implied_hold(solution, angles),
-        )
-
-    def signature(self, effect: Effect) -> Signature:
-        """Signature of an effect of the sensor."""
-        return self.signatures((effect,))
-
-    def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
-        """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
-        forces = self.forces if ideal else self.output if shapes[0].last else self.sensed
-        shown = signatures(shapes, forces, self.angles, self.solution.gravity, self._columns)
-        model = self.solution.model
-        if ideal or shapes[0].last or not any(effect.last for effect in model.effects):
-            return shown
-        p = self.solution.parameters[: model.n_parameters]
-        slope = model.slope_of_last(self.sensed, p, self.hold)
-        return replace(shown, force=slope @ shown.force)
-
-    def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
-        """Return what shapes of an effect would leave in the residuals; None for nothing."""
-
-        def of_each(columns: Array) -> Array:
-            """Columns (m, s k) of all shapes as those of each, (s, m, k)."""
-            return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
-
-        shown = self.signatures(shapes, ideal=True)
-        projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
-        sizes = self.ideal.size(shown, self.solution.gravity).reshape(len(shapes), -1)
-        directions, ideal, seen = spans(projected, sizes, RULES.visible)
-        columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
-        # A force that passes a knee at the ideal sensor may not do so along the real axes.
-        sizes = np.linalg.norm(projected @ directions, axis=1)
-        also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
-        for i in np.flatnonzero(rank < seen):
-            directions[i] = directions[i] @ also[i]
-            ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
-        found = [
-            Hypothesis(
-                name=effect.name,
-                effect=effect,
-                directions=directions[i, :, : rank[i]],
-                basis=basis[i, :, : rank[i]],
-                ideal=ideal[i, :, : rank[i]],
-            )
-            if rank[i]
-            else None
-            for i, effect in enumerate(shapes)
-        ]
-        if not np.isfinite(shapes[0].bounds).any():
-            return found
-        return [
-            None if one is None else replace(one, estimates=_estimates(one, columns[i]))
-            for i, one in enumerate(found)
-        ]
-
-
-def _of_robot(effect: Effect) -> bool:
-    """Whether only a robot has an effect: it is in its readings, or turns with its axes."""
-    if type(effect).reading is not Effect.reading:
-        return True
-    columns = compose(effect.spec, (effect.spec,)).hold_columns
-    return effect.part == "rig" and bool({"roll", "pitch", "yaw"} & {*columns})
-
-
-def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
-    """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
-    from scipy.linalg import qr  # slow to import, and seldom needed
-
-    shown = hypothesis.basis.T @ columns
-    most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
-    return np.asarray(np.linalg.inv(shown[:, most]))
-
-
-def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
-    """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
-    hold = solution.observed.hold or HoldConditions()
-    yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
-    return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
-
 
 AT_ONCE = 10_000_000
 """Numbers in one block of work, about."""
@@ -285,3 +145,11 @@ class ExaminedFit:
 def examine(solution: Solution) -> ExaminedFit:
     """Examine a calibrated session."""
     return ExaminedFit.of(Frame.of(solution))
+
+
+def _of_robot(effect: Effect) -> bool:
+    """Whether only a robot has an effect: it is in its readings, or turns with its axes."""
+    if type(effect).reading is not Effect.reading:
+        return True
+    columns = compose(effect.spec, (effect.spec,)).hold_columns
+    return effect.part == "rig" and bool({"roll", "pitch", "yaw"} & {*columns})

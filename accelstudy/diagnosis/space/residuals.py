@@ -22,11 +22,24 @@ from accelstudy.adjustment import Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, column_basis, diagonal_blocks, whitening_of
 from accelstudy.approaches import Approach
-from accelstudy.diagnosis.space.signatures import Signature
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Derivatives of the observations by the k parameters of an effect, at zero.
+
+    Attributes
+    ----------
+    force : (n, 3, k) array, of the sensor's output
+    angles : (n, 2, k) array, of the robot's reading
+    """
+
+    force: Array
+    angles: Array
 
 
 @dataclass(frozen=True)

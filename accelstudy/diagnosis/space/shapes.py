@@ -20,9 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.examined import Frame
+from accelstudy.diagnosis.space.frame import Columns, Frame
 from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
-from accelstudy.diagnosis.space.signatures import Columns
 from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
     CYCLES,
@@ -68,7 +67,6 @@ class LearnedShapes(Shapes):
     vectors : (m, Σ k) array, eigenvectors of K, one shape beside the other
     shares : tuple of arrays (k,), eigenvalues of K of each shape, which sum to 1
     attitude : Spaces or None, everything but the differences of repeated positions, the last place
-    weight : float, prior weight of all of them together
     """
 
     places: tuple[Place, ...]
@@ -76,7 +74,6 @@ class LearnedShapes(Shapes):
     vectors: Array
     shares: tuple[Array, ...]
     attitude: Spaces | None = None
-    weight: float = RULES.prior_unknown
 
     @classmethod
     def of(cls, frame: Frame, attitude: Spaces | None = None) -> LearnedShapes:
@@ -110,15 +107,17 @@ class LearnedShapes(Shapes):
             share = 1 / (len(targets) + 1)
             prior = np.append(weights * (1 - share), share)
             shapes = replace(shapes, places=(*places, OF_ATTITUDE), prior=prior, attitude=attitude)
-        return shapes._with_unrecorded() if frame.absent else shapes
+        if frame.absent and shapes.is_slow.any():
+            # Some of what changes slowly follows what nobody recorded.
+            slow = np.where(shapes.is_slow, shapes.prior, 0.0)
+            prior = RULES.prior_unknown * shapes.prior + RULES.prior_unrecorded * slow / slow.sum()
+            return replace(shapes, prior=prior / prior.sum())
+        return shapes
 
-    def _with_unrecorded(self) -> LearnedShapes:
-        """The same shapes, where some of what changes slowly follows what nobody recorded."""
-        slow = np.where([place in SLOW_PLACES for place in self.places], self.prior, 0.0)
-        if not slow.any():
-            return self
-        prior = RULES.prior_unknown * self.prior + RULES.prior_unrecorded * slow / slow.sum()
-        return replace(self, prior=prior / prior.sum(), weight=float(prior.sum()))
+    @property
+    def is_slow(self) -> NDArray[np.bool_]:
+        """Which shapes, (s,), may be those of what nobody recorded, such as a temperature."""
+        return np.array([place in SLOW_PLACES for place in self.places], dtype=bool)
 
     @classmethod
     def _of(
@@ -146,8 +145,7 @@ class LearnedShapes(Shapes):
         roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
         seen = [i for i, root in enumerate(roots) if np.sum(root**2) > RULES.visible_shape]
         places, weights = [self.places[i] for i in seen], self.prior[seen]
-        rest = self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
-        return replace(rest, weight=self.weight)
+        return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
 
     def at(self, places: Collection[Place]) -> LearnedShapes:
         """Those of some places, whose weights sum to 1."""
@@ -158,7 +156,6 @@ class LearnedShapes(Shapes):
             weights / weights.sum(),
             np.concatenate([self.vectors[:, :0], *(vectors[i] for i in some)], axis=1),
             tuple(self.shares[i] for i in some),
-            weight=self.weight * float(weights.sum()),
         )
 
     def parts(self, errors: Array) -> Array:

@@ -48,22 +48,12 @@ class Singles:
     best: Mapping[str, Hypothesis]
 
 
-def weigh_singles(examined: ExaminedFit, field: Field, evidence: Evidence) -> Singles:
-    """Weigh each candidate by itself.
-
-    Parameters
-    ----------
-    examined : ExaminedFit
-    field : Field, all its candidates, in the shapes that are tried at first
-    evidence : Evidence
-    """
-    z = examined.frame.residuals.z
-    if not examined.candidates:
-        return Singles({}, {}, {}, {})
-    named = field.named
-    densities = named.densities(evidence, named.seen(z))
-    first = dict(zip(named.names, densities.tolist(), strict=True))
-    least = max(first.values()) - RULES.refined_within
+def weigh_singles(examined: ExaminedFit, evidence: Evidence) -> Singles:
+    """Weigh each candidate by itself."""
+    z, field = examined.frame.residuals.z, Field(examined.candidates)
+    densities = field.densities(evidence, field.seen(z))
+    first = dict(zip(field.names, densities.tolist(), strict=True))
+    least = max(first.values(), default=0.0) - RULES.refined_within
     shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
     for name, tried in examined.candidates.items():
         worth = first[name] > least

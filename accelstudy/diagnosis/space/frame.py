@@ -1,0 +1,266 @@
+"""One calibrated session, in which effects are evaluated by their one definition.
+
+The signature of an effect is what it would leave in the observations; what the model leaves of that
+in the residuals is a hypothesis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from accelstudy.adjustment.quality import Solution
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.hypotheses import Hypothesis
+from accelstudy.diagnosis.space.residuals import Residuals, Signature, ideal_residuals, spans
+from accelstudy.effects import Effect, HoldConditions
+from accelstudy.leveling.angles import angles_of
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""Share of a signature that rounding errors may leave where nothing is left."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One calibrated session, in which effects are evaluated.
+
+    Attributes
+    ----------
+    solution : Solution
+    residuals : Residuals
+    ideal : Residuals, of an ideal sensor in the same positions
+    forces : (n, 3) array, m/s², of the ideal sensor
+    sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
+    output : (n, 3) array, m/s², adjusted readings, on which effects act that act last
+    angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
+    hold : HoldConditions, completed with what is implied
+    """
+
+    solution: Solution
+    residuals: Residuals
+    ideal: Residuals
+    forces: Array
+    sensed: Array
+    output: Array
+    angles: Array
+    hold: HoldConditions
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Columns that would tell what changes slowly, and that the campaign lacks."""
+        return tuple(n for n in ("temperature", "time") if getattr(self.hold, n) is None)
+
+    @cached_property
+    def _columns(self) -> Columns:
+        """Columns of the holds beside arrays of settings and parameters."""
+        return Columns(self.hold, 2)
+
+    @classmethod
+    def of(cls, solution: Solution) -> Frame:
+        """Frame of a calibration at its solution."""
+        ideal, forces = ideal_residuals(solution)
+        observed, model = solution.observed, solution.model
+        if observed.angles is not None and solution.approach.uses_angles:
+            angles = np.asarray(observed.angles[0])
+        else:
+            angles = angles_of(forces)
+        t = model.axes_matrix(solution.parameters[: model.n_parameters])
+        return cls(
+            solution=solution,
+            residuals=Residuals.of(solution),
+            ideal=ideal,
+            forces=forces,
+            sensed=np.asarray(np.linalg.solve(t, forces.T).T),
+            output=observed.forces[0] + solution.residuals[:, :3],
+            angles=angles,
+            hold=implied_hold(solution, angles),
+        )
+
+    def signature(self, effect: Effect) -> Signature:
+        """Signature of an effect of the sensor."""
+        return self.signatures((effect,))
+
+    def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
+        """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
+        forces = self.forces if ideal else self.output if shapes[0].last else self.sensed
+        shown = signatures(shapes, forces, self.angles, self.solution.gravity, self._columns)
+        model = self.solution.model
+        if ideal or shapes[0].last or not any(effect.last for effect in model.effects):
+            return shown
+        p = self.solution.parameters[: model.n_parameters]
+        slope = model.slope_of_last(self.sensed, p, self.hold)
+        return replace(shown, force=slope @ shown.force)
+
+    def columns(self, hypotheses: Sequence[Hypothesis]) -> list[Array]:
+        """What shapes of one effect show in the conditions of unit weight, (m, l) each."""
+        effects = [one.effect for one in hypotheses if one.effect is not None]
+        shown = np.split(self.residuals.whitened(self.signatures(effects)), len(effects), axis=1)
+        return [each @ one.directions for each, one in zip(shown, hypotheses, strict=True)]
+
+    def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
+        """Return what shapes of an effect would leave in the residuals; None for nothing."""
+
+        def of_each(columns: Array) -> Array:
+            """Columns (m, s k) of all shapes as those of each, (s, m, k)."""
+            return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
+
+        shown = self.signatures(shapes, ideal=True)
+        projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
+        sizes = self.ideal.size(shown, self.solution.gravity).reshape(len(shapes), -1)
+        directions, ideal, seen = spans(projected, sizes, RULES.visible)
+        columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
+        # A force that passes a knee at the ideal sensor may not do so along the real axes.
+        sizes = np.linalg.norm(projected @ directions, axis=1)
+        also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
+        for i in np.flatnonzero(rank < seen):
+            directions[i] = directions[i] @ also[i]
+            ideal[i] = spans((projected[i] @ directions[i])[None], None, ROUNDING)[1][0]
+        found = [
+            Hypothesis(
+                name=effect.name,
+                effect=effect,
+                directions=directions[i, :, : rank[i]],
+                basis=basis[i, :, : rank[i]],
+                ideal=ideal[i, :, : rank[i]],
+            )
+            if rank[i]
+            else None
+            for i, effect in enumerate(shapes)
+        ]
+        if not np.isfinite(shapes[0].bounds).any():
+            return found
+        return [
+            None if one is None else replace(one, estimates=_estimates(one, columns[i]))
+            for i, one in enumerate(found)
+        ]
+
+
+def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
+    """Turn products of a basis with residuals into the parameters that show; columns (m, k)."""
+    from scipy.linalg import qr  # slow to import, and seldom needed
+
+    shown = hypothesis.basis.T @ columns
+    most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
+    return np.asarray(np.linalg.inv(shown[:, most]))
+
+
+def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
+    """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
+    hold = solution.observed.hold or HoldConditions()
+    yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
+    return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
+
+
+# --- signatures -----------------------------------------------------------------------------------
+
+
+class Columns:
+    """The columns of a `HoldConditions` with further axes, for arrays of parameters or settings.
+
+    A column that is absent raises `InputError` when a formula uses it. Each is computed once.
+
+    Parameters
+    ----------
+    hold : HoldConditions
+    axes : int, number of axes after that of the holds
+    """
+
+    def __init__(self, hold: HoldConditions, axes: int) -> None:
+        self._hold, self._axes = hold, axes
+        self._computed: dict[str | float, Array] = {}
+
+    def __getattr__(self, name: str) -> Array:
+        if name not in self._computed:
+            values = self._hold.column(name)
+            self._computed[name] = values.reshape(len(values), *[1] * self._axes)
+        return self._computed[name]
+
+    def lagged(self, tau: Array) -> Array:
+        """Temperature behind each of some lags (s, 1), (n, s, 1)."""
+        return np.stack([self._behind(t) for t in tau.ravel().tolist()], axis=1)[..., None]
+
+    def _behind(self, tau: float) -> Array:
+        """Temperature behind a lag, (n,)."""
+        if tau not in self._computed:
+            self._computed[tau] = self._hold.lagged(tau)
+        return self._computed[tau]
+
+
+def signature(
+    effect: Effect, forces: Array, angles: Array, g: float, hold: HoldConditions
+) -> Signature:
+    """Signature of one effect; see `signatures`."""
+    return signatures((effect,), forces, angles, g, Columns(hold, 2))
+
+
+def signatures(
+    shapes: Sequence[Effect], forces: Array, angles: Array, g: float, hold: Columns
+) -> Signature:
+    """Evaluate shapes of one effect for the unit vectors of its parameters, in which it is linear.
+
+    Parameters
+    ----------
+    shapes : s effects of one kind
+    forces : (n, 3) array, m/s², in sensor axes
+    angles : (n, 2) array, rad, attitude
+    g : float, m/s²
+    hold : Columns, with two further axes
+
+    Returns
+    -------
+    Signature
+        Of the s k parameters, shape after shape.
+
+    Raises
+    ------
+    InputError
+        If the effect needs a column that the holds lack.
+    """
+    effect = _together(shapes)
+    n, s, k = len(forces), len(shapes), len(effect.parameters)
+    p = tuple(np.eye(k))
+    f, attitude = (tuple(values.T[:, :, None, None]) for values in (forces, angles))
+
+    def filled(values: Iterable[ArrayLike], count: int) -> Array:
+        full = np.zeros((n, count, s, k))
+        for i, value in enumerate(values):
+            full[:, i] = value
+        return full.reshape(n, count, s * k)
+
+    # A formula takes the columns that it needs, and asks for nothing else of the holds.
+    columns: Any = hold
+    force = filled(effect.output(f, p, g, columns, np), 3)
+    if (axes := _axes(effect, k)).any():
+        force -= np.tile(np.einsum("nb,abk->nak", forces, axes), s)
+    turned = np.zeros((n, 2, s * k))
+    if type(effect).reading is not Effect.reading:
+        turned = filled(effect.reading(attitude, p, columns, np), 2)
+    return Signature(force, turned)
+
+
+def _axes(effect: Effect, k: int) -> Array:
+    """What an effect adds to T, for the unit vectors of its parameters, (3, 3, k)."""
+    axes = np.zeros((3, 3, k))
+    if type(effect).axes is not Effect.axes:
+        for i, row in enumerate(effect.axes(tuple(np.eye(k)), np)):
+            for j, value in enumerate(row):
+                axes[i, j] = value
+    return axes
+
+
+def _together(shapes: Sequence[Effect]) -> Effect:
+    """Shapes of one effect as one, whose settings are arrays (s, 1)."""
+    together = type(shapes[0])()
+    settings: Any = {
+        name: np.array([shape.settings[name] for shape in shapes])[:, None]
+        for name in together.settings
+    }
+    together.settings = settings
+    return together
