@@ -22,8 +22,13 @@ from accelstudy.diagnosis.prediction import relative_variance
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import Effect, HoldConditions
-from accelstudy.leveling.angles import angles_of, tilt_slope, wrapped
-from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
+from accelstudy.leveling.error import (
+    ATTITUDES,
+    MAX_TILT_GON,
+    cap_forces,
+    holds_in_use,
+    tilt_error,
+)
 
 Array = NDArray[np.float64]
 
@@ -103,25 +108,13 @@ def leveling_rms(
     hold : HoldConditions, of the campaign
     variance : float, of unit weight of the extended fit
     """
-    g = extended.gravity
+    g, model = extended.gravity, extended.model
     f_b, used = in_use(hold, g)
-    angles = np.column_stack([used.column("roll"), used.column("pitch")])
-    stays = extended.model.stays
-    truth = np.where(stays, extended.parameters[: len(stays)], 0.0)
-    output = extended.model.sense(f_b, truth, g, used)
-
+    truth = extended.parameters[: model.n_parameters]
     squares = []
-    for solution in (base, extended):
-        model = solution.model
-        kept = model.stays
-        p = np.where(kept, solution.parameters[: len(kept)], 0.0)
-        corrected = model.correct(output, p, g, used)
-        offset = wrapped(angles_of(corrected) - angles)
-        slope = tilt_slope(model, p, output, corrected, g, used)[..., kept]
-        cofactors = solution.cofactors[: len(p), : len(p)][np.ix_(kept, kept)]
-        taken = variance * relative_variance(extended, solution)
-        formal = taken * np.einsum("kau,uv,kav->ka", slope, cofactors, slope)
-        squares.append(float(np.mean(offset**2 + formal)))
-    if not np.all(np.isfinite(squares)):
-        return None
-    return float(np.sqrt(squares[0])), float(np.sqrt(squares[1]))
+    for one in (base, extended):
+        u, taken = one.model.n_parameters, variance * relative_variance(extended, one)
+        error = tilt_error(model, truth, one.model, one.parameters[:u], f_b, g, used)
+        squares.append(np.mean(error.rms_of_all(taken * one.cofactors[:u, :u]) ** 2))
+    before, after = np.sqrt(squares).tolist()
+    return (before, after) if np.isfinite([before, after]).all() else None

@@ -8,8 +8,9 @@ the forms stands any other smooth function, as probable at first as what no cata
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,9 @@ from scipy.stats import f as f_distribution
 
 from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import comma_list, estimate
+from accelstudy.diagnosis.coordinates import ANGLES, TARGETS, Coordinate, coordinate_of
 from accelstudy.diagnosis.decision.learned import coordinate_values, weighted_shapes
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
-from accelstudy.diagnosis.forms import TARGETS, Form, coordinate_of, forms
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.residuals import Residuals, spans
@@ -85,8 +86,7 @@ def ranked(
     for form in forms(effect.coordinate, functions.arguments):
         logs = functions.densities(form, evidence)
         if np.isfinite(logs).any():
-            mean = float(logsumexp(logs) - np.log(len(logs)))
-            found.append((form, float(form.settings[np.argmax(logs)]), mean))
+            found.append((form, float(form.settings[np.argmax(logs)]), float(log_mean(logs))))
     each = np.log((1 - RULES.prior_unknown) / max(len(found), 1))
     other = functions.density_of_others(place, evidence) + np.log(RULES.prior_unknown)
     posterior = softmax([*(log + each for _, _, log in found), other]).tolist()
@@ -211,3 +211,109 @@ class _Functions:
         phi = form.basis(setting, self.arguments[:, min(component, self.arguments.shape[1] - 1)])
         h = phi @ a
         return np.asarray(phi[np.argmax(h)] - phi[np.argmin(h)])
+
+
+# --- forms ---------------------------------------------------------------------------------------
+
+MAX_PLACES = 60
+"""Places of a step that are tried at most."""
+MOST_CYCLES, EACH = 10.0, 3
+"""Periods of a sine in the range of its coordinate at most; each needs as many different values."""
+DISTINCT_VALUES = 100
+"""Parts of its range in which values of a coordinate count as one."""
+PERIOD_STEP = 1 / 16
+"""Step of the number of periods that are tried."""
+TURNS = {1: "once per turn", 2: "twice per turn", 3: "three times per turn",
+         4: "four times per turn"}  # fmt: skip
+"""Harmonics of an angle."""
+POWERS = {1: "in proportion to it", 2: "with its square", 3: "with its cube"}
+"""Powers of a coordinate that has a zero."""
+POLYNOMIALS = {1: "in a straight line", 2: "as a parabola", 3: "as a cubic"}
+"""Of a coordinate that has none."""
+PARTS = np.geomspace(0.03, 1.0, 80)
+"""Constants of an exponential, in ranges of the coordinate."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of functions h(c) = Σ_j a_j φ_j(c; s).
+
+    Attributes
+    ----------
+    words : str, with a place for the setting s if it has one
+    basis : callable, φ of s and of c (...), (..., k)
+    settings : (t,) array
+    shown : callable, shows a setting
+    is_sine : bool, of which the amplitude is told; of others it is how much they go up and down
+    """
+
+    words: str
+    basis: Callable[[float, Array], Array]
+    settings: Array = field(default_factory=lambda: np.zeros(1))
+    shown: Callable[[float], str] = str
+    is_sine: bool = False
+
+    def said(self, setting: float) -> str:
+        """Say it with a setting."""
+        return self.words.format(self.shown(setting))
+
+
+def forms(coordinate: str, c: Array) -> Iterator[Form]:
+    """Forms that a function of a coordinate with the values c (n, a) may have."""
+    of, values = coordinate_of(coordinate), distinct(c)
+    low, high, length = values[0], values[-1], np.ptp(values)
+    several = len(values) > EACH  # otherwise a line or a parabola is all that shows
+    if several:
+        yield _step(of, c)
+    if several and coordinate in ANGLES:
+        for k, words in TURNS.items():
+            yield Form(words, _sine, np.array([float(k)]), is_sine=True)
+    elif several:
+        cycles = np.arange(1.0, min(MOST_CYCLES, (len(values) - 1) / EACH) + 0.1, PERIOD_STEP)
+        if len(cycles):
+            words, turns = "as a sine with a period of {}", 2 * np.pi * cycles / length
+            yield Form(words, _sine, turns, lambda turn: of.by(2 * np.pi / turn), is_sine=True)
+        if of.is_course:
+            words = "decaying with a time constant of {}"
+            yield Form(words, lambda s, x: np.exp((low - x[..., None]) / s), length * PARTS, of.by)
+    if several and of.has_zero:
+        for p, words in POWERS.items():
+            yield Form(words, partial(_powers, np.array([p]), 0.0, 1.0))
+        return
+    middle, half = (low + high) / 2, length / 2
+    for p, words in POLYNOMIALS.items():
+        if p < len(values):
+            yield Form(words, partial(_powers, np.arange(1, p + 1), middle, half))
+
+
+def distinct(c: Array) -> Array:
+    """Values of a coordinate that differ by more than a small part of its range."""
+    values = np.unique(c)
+    part = np.floor((values - values[0]) / np.ptp(values) * DISTINCT_VALUES * (1 - 1e-9))
+    chosen = values[np.diff(part, prepend=-1) > 0]
+    chosen[-1] = values[-1]
+    return chosen
+
+
+def _step(of: Coordinate, c: Array) -> Form:
+    """A step between any two values of a coordinate."""
+    values = np.unique(c)
+    between = (values[1:] + values[:-1]) / 2
+    some = np.unique(np.linspace(0, len(between) - 1, MAX_PLACES).round().astype(int))
+
+    def gap(place: float) -> str:
+        after = int(np.searchsorted(values, place))
+        return f"{of.at(values[after - 1])} and {of.at(values[after])}"
+
+    def beyond(place: float, x: Array) -> Array:
+        return np.asarray(x > place, dtype=float)[..., None]
+
+    return Form("in a step between {}", beyond, between[some], gap)
+
+
+def _powers(p: Array, middle: float, half: float, _: float, x: Array) -> Array:
+    return np.asarray(((x[..., None] - middle) / half) ** p)
+
+
+def _sine(turn: float, x: Array) -> Array:
+    return np.stack([np.sin(turn * x), np.cos(turn * x)], axis=-1)

@@ -16,8 +16,9 @@ from accelstudy.diagnosis.decision.learned import fit_of_place, most_probable_pl
 from accelstudy.diagnosis.decision.noise import exceeds_stated, unit_variance
 from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.verdict import Choice, Finding
+from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.held_out_threshold import threshold
 from accelstudy.diagnosis.prediction import (
     HeldOutGap,
@@ -83,7 +84,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
     """Choose and fit on a part of the positions, and predict the rest."""
     problem, first, place = case.problem, case.problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
-    k = sum(choice.best.dim for choice in finding.chosen)
+    k = sum(cause.shape.dim for cause in finding.chosen)
     needed = int(np.ceil((first.design.shape[1] + k + 3) / c))
     count, fewest = min(round(n * RULES.held_out), n - needed), RULES.held_out_least
     if count < fewest:
@@ -117,15 +118,15 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
     # Of what leaves more than the noise the name may be that of something that is not listed.
     if not gap.confirmed or not alone or exceeds_stated(problem, finding.frame):
         return gap
-    (choice,) = finding.chosen
+    (cause,) = finding.chosen
     # What was found, and all that could leave the same in this campaign.
-    imitators = problem.examined.imitators(choice.best)
-    names = tuple(dict.fromkeys((choice.best.name, *choice.members, *imitators)))
+    imitators = problem.examined.imitators(cause.shape)
+    names = tuple(dict.fromkeys((cause.name, *cause.members, *imitators)))
     sure = _is_of(names, problem, part.problem, finding, split)
     return replace(gap, names=names) if sure else gap
 
 
-def _chosen_alike(part: Weighing, finding: Finding) -> tuple[Sequence[Choice], bool]:
+def _chosen_alike(part: Weighing, finding: Finding) -> tuple[Sequence[Cause], bool]:
     """Effects of the credible set that a part chooses, and whether it would choose something else.
 
     Of a learned function they are what is certain beside it.
@@ -139,20 +140,14 @@ def _chosen_alike(part: Weighing, finding: Finding) -> tuple[Sequence[Choice], b
         same = [one for one in credible if best and _same(one.classes, best.names)]
         if best is None or not same:
             return chosen, True
-        p = same[0].posterior
-        return [Choice(h, m, p) for h, m in zip(best.best, best.classes, strict=True)], False
-    wanted = {
-        name: members
-        for one in credible
-        if len(one.names) == 1
-        for members in one.classes
-        for name in members
-    }
+        return best.causes, False
+    alone = [one.causes[0] for one in credible if len(one.causes) == 1]
+    wanted = {name: cause.members for cause in alone for name in cause.members}
     densities = part.singles.densities
     name = max(densities, key=densities.__getitem__, default="")
     if name not in wanted:
         return chosen, True
-    return [Choice(part.singles.best[name], wanted[name], chosen[0].probability)], False
+    return [Cause(name, wanted[name], part.singles.best[name])], False
 
 
 def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
@@ -163,16 +158,16 @@ def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     )
 
 
-def _refitted(part: Weighing, chosen: Sequence[Choice], place: Place | None) -> Solution | str:
+def _refitted(part: Weighing, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
     """Fit to a part with what was chosen, and a function of a place; or say why that cannot be."""
     alternatives = []
-    for choice in chosen:
-        shown = tuple(m for m in choice.members if m in part.singles.best)
+    for cause in chosen:
+        shown = tuple(m for m in cause.members if m in part.singles.best)
         if not shown:
-            return f"the fitted positions alone cannot show {choice.best.name}"
-        alternatives.append((part.singles.best[shown[0]], shown))
+            return f"the fitted positions alone cannot show {cause.name}"
+        alternatives.append(Cause(shown[0], shown, part.singles.best[shown[0]]))
     if place is not None:
-        learned = fit_of_place(part.problem, place, [best for best, _ in alternatives])
+        learned = fit_of_place(part.problem, place, [cause.shape for cause in alternatives])
         reason = "the fitted positions alone cannot show such a function"
         return reason if learned is None else learned[1]
     fit = part.refit(alternatives)

@@ -23,7 +23,7 @@ from accelstudy.diagnosis.decision.posterior import Weighing
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.evidence.detection import log_ratio, simulated, total_odds
 from accelstudy.diagnosis.evidence.field import Seen
-from accelstudy.diagnosis.evidence.singles import Class
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.prediction import Group, LinearSplit
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
@@ -83,9 +83,10 @@ def threshold(
     return max(RULES.z_significant, float(values[order[at]]))
 
 
-def labels(classes: Sequence[Class]) -> dict[str, int]:
+def labels(classes: Sequence[Cause]) -> dict[str, int]:
     """Number of the class of each candidate; a bumped position has none."""
-    return {name: i for i, (_, alike) in enumerate(classes) for name in alike if name != OUTLIER}
+    each = ((name, i) for i, one in enumerate(classes) for name in one.members)
+    return {name: i for name, i in each if name != OUTLIER}
 
 
 def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:

@@ -22,7 +22,6 @@ from accelstudy.diagnosis.consequences import in_use
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session, with_angle_errors
 
 Array = NDArray[np.float64]
@@ -78,8 +77,7 @@ class Loop:
                 }
             )
         replicates = int(self.sessions["replicate"].max()) + 1
-        measured = dict(self.measured)
-        return {"replicates": replicates, "measured_sigma0_squared": measured, "cases": cases}
+        return {"replicates": replicates, "measured_sigma0_squared": self.measured, "cases": cases}
 
 
 def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1) -> Loop | None:
@@ -151,19 +149,15 @@ def _session_table(
     simulated: Solution, estimated: Solution, observed: Observations, hold: HoldConditions
 ) -> pd.DataFrame | None:
     """Calibrate simulated sessions; None if readings that were corrected so have no tilt."""
-    result = _calibrated(estimated, observed)
-    errors = _tilt_errors(
-        simulated.model,
-        simulated.parameters[: simulated.model.n_parameters],
-        estimated.model,
-        result.parameters[result.converged, : estimated.model.n_parameters],
-        simulated.gravity,
-        hold,
-    )
-    if np.isnan(errors).any():
-        return None
+    result, g = _calibrated(estimated, observed), simulated.gravity
+    truth = simulated.parameters[: simulated.model.n_parameters]
+    estimates = result.parameters[result.converged, : estimated.model.n_parameters]
+    f_b, used = in_use(hold, g)
+    error = leveling_error(simulated.model, truth, estimated.model, estimates, f_b, g, used)
     tilt = np.full(len(result.converged), np.nan)
-    tilt[result.converged] = errors
+    tilt[result.converged] = np.sqrt(np.mean(error.per_replicate**2, axis=1))
+    if np.isnan(tilt[result.converged]).any():
+        return None
     return pd.DataFrame(
         {
             "sigma0_squared": result.variance_posteriori,
@@ -177,17 +171,3 @@ def _calibrated(fit: Solution, observed: Observations) -> Adjustment:
     """Calibrate sessions with the model of a fit, from its estimates on."""
     initial = fit.parameters[: fit.model.n_parameters]
     return calibrate(fit.model, fit.approach, replace(observed, initial=initial))
-
-
-def _tilt_errors(
-    simulated: SensorModel,
-    truth: Array,
-    estimated: SensorModel,
-    estimates: Array,
-    g: float,
-    hold: HoldConditions,
-) -> Array:
-    """Rms of roll and pitch that each calibration leaves, in the holds of the campaign, rad."""
-    f_b, used = in_use(hold, g)
-    error = leveling_error(simulated, truth, estimated, estimates, f_b, g, used)
-    return np.sqrt(np.mean(error.per_replicate**2, axis=1))

@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +44,10 @@ MIN_EVEN_RATIO = 0.7
 MIN_FORCE_CHANGE = 0.5
 """Change of force, in parts of gravity, beyond which attitudes clearly differ."""
 
-Explanation = Sequence[Hypothesis]
+Explanation: TypeAlias = Sequence[Hypothesis]
 """Effects that may be missing: one, or several together."""
+Fit: TypeAlias = tuple[Array, Array]
+"""Design (m, p) of the positions so far, in conditions of unit weight, and what they show, (m,)."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +100,15 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     attitudes = np.concatenate([repeated, -g * get_scheme(CANDIDATE_SCHEME).directions])
     forces, hold = _grid(frame, attitudes, needed, frame.forces[-1])
     rivals = [_fitted(frame, one) for one in (first, second)]
-    told = [one.values for one in rivals]
+    values = [np.linalg.pinv(design, rcond=1e-10) @ observed for design, observed in rivals]
     alone, chosen, anywhere, free = np.zeros(0), list[int](), False, np.ones(len(forces), bool)
     while len(chosen) < COUNT and free.any():
         # Steps are those from the position before.
         before = forces[chosen[-1]] if chosen else frame.forces[-1]
         forces, hold_then = _grid(frame, attitudes, needed, before)
         rows = [_rows(frame, forces, hold_then, one) for one in (first, second)]
-        seen = [a @ values for a, values in zip(rows, told, strict=True)]
-        gains = (rivals[1].growth(rows[1], seen[0]) + rivals[0].growth(rows[0], seen[1])) / 2
+        seen = [a @ x for a, x in zip(rows, values, strict=True)]
+        gains = (_growth(rivals[1], rows[1], seen[0]) + _growth(rivals[0], rows[0], seen[1])) / 2
         if not chosen:
             alone = np.sqrt(gains)
             start = (
@@ -123,23 +124,20 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
         i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
         chosen.append(i)
         free &= np.linalg.norm(forces - forces[i], axis=1) > MIN_FORCE_CHANGE * g
-        rivals = [one.after(rows[k][i], seen[1 - k][i]) for k, one in enumerate(rivals)]
+        rivals = [
+            (np.concatenate([design, rows[k][i]]), np.append(observed, seen[1 - k][i]))
+            for k, (design, observed) in enumerate(rivals)
+        ]
     names = [[one.name for one in explanation] for explanation in (first, second)]
-    only = [tuple(n for n in a if n not in b) for a, b in (names, names[::-1])]
+    only = tuple(tuple(n for n in a if n not in b) for a, b in (names, names[::-1]))
+    more = {"anywhere": anywhere, "separates": only}
     return [
-        _position(frame, hold, i, needed - {"yaw"}, alone[i], anywhere, (only[0], only[1]))
-        for i in chosen
+        _position(frame, hold, i, needed - {"yaw"}, gain=float(alone[i]), **more) for i in chosen
     ]
 
 
 def _position(
-    frame: Frame,
-    hold: HoldConditions,
-    i: int,
-    needed: set[str],
-    gain: float,
-    anywhere: bool,
-    separates: tuple[tuple[str, ...], tuple[str, ...]],
+    frame: Frame, hold: HoldConditions, i: int, needed: set[str], **more: Any
 ) -> NextPosition:
     """Position of the candidates, with what matters of its conditions."""
 
@@ -153,10 +151,8 @@ def _position(
         pitch=float(hold.column("pitch")[i]),
         temperature=shown("temperature"),
         later=None if time is None or measured is None else time - float(measured[-1]),
-        anywhere=anywhere,
-        separates=separates,
-        gain=float(gain),
         yaw=shown("yaw"),
+        **more,
     )
 
 
@@ -194,8 +190,11 @@ def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
         rows = _rows(frame, forces, hold)
         gains = known.gain(rows, weights)
         i = first_best(-gains, CRITERION_TOLERANCE * gains.max())
-        gain, of = np.sqrt(gains[i] / whole), ((learned.name,), ())
-        chosen.append(_position(frame, hold, i, needed - {"time"}, gain, False, of))
+        gain, of = float(np.sqrt(gains[i] / whole)), ((learned.name,), ())
+        position = _position(
+            frame, hold, i, needed - {"time"}, anywhere=False, separates=of, gain=gain
+        )
+        chosen.append(position)
         known, before = Information.of(known.rows, rows[i]), forces[i]
     return chosen
 
@@ -270,48 +269,20 @@ def _grid(
     return forces, hold
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A fit to the positions so far, m conditions of unit weight by p parameters.
-
-    Attributes
-    ----------
-    design : (m, p) array
-    observed : (m,) array
-    """
-
-    design: Array
-    observed: Array
-
-    @cached_property
-    def inverse(self) -> Array:
-        """What turns observations into parameters, (p, m); with its transpose Q."""
-        return np.asarray(np.linalg.pinv(self.design, rcond=1e-10), dtype=float)
-
-    @property
-    def values(self) -> Array:
-        """Parameters, (p,)."""
-        return np.asarray(self.inverse @ self.observed)
-
-    def growth(self, rows: Array, seen: Array) -> Array:
-        """How much the sum of squares grows, (k,), if candidates (k, c, p) show `seen` (k, c)."""
-        missed = (seen - rows @ self.values)[..., None]
-        shown = rows @ self.inverse
-        noise = np.eye(rows.shape[-2]) + shown @ np.swapaxes(shown, -1, -2)
-        return np.asarray(np.sum(missed * np.linalg.solve(noise, missed), axis=(1, 2)))
-
-    def after(self, rows: Array, seen: Array) -> Fit:
-        """Fit a position (c, p) that shows `seen` (c,), too."""
-        return Fit(np.concatenate([self.design, rows]), np.append(self.observed, seen))
+def _growth(fit: Fit, rows: Array, seen: Array) -> Array:
+    """How much the sum of squares of a fit grows, (k,), if candidates (k, c, p) show `seen`."""
+    design, observed = fit
+    inverse = np.linalg.pinv(design, rcond=1e-10)
+    missed, shown = (seen - rows @ (inverse @ observed))[..., None], rows @ inverse
+    noise = np.eye(rows.shape[-2]) + shown @ np.swapaxes(shown, -1, -2)
+    return np.asarray(np.sum(missed * np.linalg.solve(noise, missed), axis=(1, 2)))
 
 
 def _fitted(frame: Frame, explanation: Explanation) -> Fit:
     """Fit an explanation to all positions, together with the parameters of the model."""
-    residuals, columns = frame.residuals, [frame.residuals.design]
-    for one in explanation:
-        assert one.effect is not None
-        columns.append(-residuals.whitened(frame.signature(one.effect)) @ one.directions)
-    return Fit(np.concatenate(columns, axis=1), residuals.errors)
+    shown = [-columns for one in explanation for columns in frame.columns([one])]
+    residuals = frame.residuals
+    return np.concatenate([residuals.design, *shown], axis=1), residuals.errors
 
 
 def _rows(

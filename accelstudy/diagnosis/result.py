@@ -32,7 +32,6 @@ from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.decision.refits import with_settings
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import (
-    Choice,
     Finding,
     Reason,
     coloured,
@@ -41,6 +40,7 @@ from accelstudy.diagnosis.decision.verdict import (
 from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL, NoiseTest
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
 from accelstudy.diagnosis.rules import RULES
@@ -263,22 +263,22 @@ class Diagnosis:
     def _chosen(self) -> list[Named]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
-        cofactors = with_settings(self.problem.examined, solution, [one.best for one in chosen])
+        cofactors = with_settings(self.problem.examined, solution, [one.shape for one in chosen])
         sigma = np.sqrt(np.diag(cofactors) * self.unit_variance).tolist()
         each = zip(solution.parameters.tolist(), sigma, strict=False)
         values = dict(zip(solution.model.parameter_names, each, strict=False))
         searched = iter(sigma[len(solution.parameters) :])
-        return [self._named(choice, values, searched) for choice in chosen]
+        return [self._named(cause, values, searched) for cause in chosen]
 
     def _named(
-        self, choice: Choice, values: dict[str, tuple[float, float]], searched: Iterator[float]
+        self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
     ) -> Named:
-        """Describe a choice by the values of all parameters, and sigmas of the log settings."""
-        best, members, examined = choice.best, choice.members, self.problem.examined
+        """Describe a cause by the values of all parameters, and sigmas of the log settings."""
+        best, members, examined = cause.shape, cause.members, self.problem.examined
         p = self.detection.p_family[UNKNOWN if best.name == LEARNED else best.name]
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
-            return Named(OUTLIER, OUTLIER, at, (OUTLIER,), p, choice.probability)
+            return Named(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
         assert best.effect is not None
         assert best.shown is not None
         # What is beside a large effect was found in what its refit leaves.
@@ -293,7 +293,7 @@ class Diagnosis:
             None,
             members,
             p,
-            choice.probability,
+            cause.posterior,
             tuple(Estimate(q.name, *values[q.name], q.unit) for q in best.shown.parameters),
             tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
             tuple(other for other in like if other not in members),
@@ -315,8 +315,8 @@ class Diagnosis:
         total: dict[str, float] = defaultdict(float)
         for one in self.finding.posterior.all:
             # Two bumped positions have one name.
-            named = zip(one.classes, one.names, strict=True)
-            for name in {first.setdefault(members, name): None for members, name in named}:
+            names = {first.setdefault(cause.members, cause.name): None for cause in one.causes}
+            for name in names:
                 total[name] += one.posterior
         return dict(sorted(total.items(), key=lambda item: -item[1]))
 
@@ -412,7 +412,7 @@ class Diagnosis:
     @cached_property
     def changes(self) -> tuple[Change, ...]:
         """Changes of the parameters of the base model; none if a position was left out."""
-        effects = [one.best.shown for one in self.finding.chosen if one.best.shown is not None]
+        effects = [one.shape.shown for one in self.finding.chosen if one.shape.shown is not None]
         if not effects or len(effects) < len(self.finding.chosen):
             return ()
         final, variance = self.final.solution, self.unit_variance
@@ -422,7 +422,7 @@ class Diagnosis:
     def upper_limits(self) -> tuple[UpperLimit, ...]:
         """Limits of the effects that were neither found nor left open."""
         finding = self.finding
-        names = [choice.best.name for choice in finding.chosen]
+        names = [cause.name for cause in finding.chosen]
         if finding.verdict == "narrowed":
             classes = [alike for one in finding.credible_set for alike in one.classes]
             names += [name for alike in classes for name in alike]
@@ -435,7 +435,7 @@ class Diagnosis:
         """Positions that tell the two most probable explanations apart, or that show a function."""
         finding = self.finding
         if finding.place is not None:
-            learned = finding.chosen[0].best.effect
+            learned = finding.chosen[0].shape.effect
             assert isinstance(learned, Learned)
             with stage("next positions"):
                 return tuple(positions_to_learn(self.final, learned))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.learned import space_of
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.forms import TARGETS
 from accelstudy.diagnosis.formulas import Ranking, argument, ranked
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.shapes import function_rows
@@ -69,7 +69,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     """
     if finding.place is None:
         return None
-    learned, *others = (choice.best for choice in finding.chosen)
+    learned, *others = (cause.shape for cause in finding.chosen)
     effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, Learned)
     beside = space_of(others, len(problem.residuals.z))

@@ -205,7 +205,7 @@ def sensor_evidence(
         p_value=detection.p_value,
         odds=odds,
         pairs=pairs,
-        classes=tuple(members for _, members in case.classes),
+        classes=tuple(one.members for one in case.classes),
         specs={
             name: best.effect.spec
             for name, best in case.singles.best.items()

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis_helpers import explanation
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
@@ -11,10 +12,10 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.certain import withdraw_refuted
-from accelstudy.diagnosis.decision.posterior import Case, Explanation, Posterior
+from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, Reason
+from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
@@ -103,11 +104,10 @@ def test_the_held_out_positions_refute_an_effect_that_is_not_there():
     assert gap.refutes
     problem = pose(fit_base(campaign, NINE, GRAVITY))
     best = problem.examined.candidates["quadratic_scale"][0]
-    weighed = Explanation((best.name,), ((best.name,),), 0.0, (best,))
+    weighed = explanation("quadratic_scale", 0.0, best=[best])
     finding = Finding(
-        "named", problem.frame, chosen=(Choice(best, (best.name,), 1.0),),
-        posterior=Posterior.of([weighed]),
-    )  # fmt: skip
+        "named", problem.frame, chosen=weighed.causes, posterior=Posterior.of([weighed])
+    )
     case = Case(problem, campaign, Chance(np.random.SeedSequence(1), len(problem.residuals.z)))
     said = withdraw_refuted(case, finding, gap)
     assert said.verdict == "unknown"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled
+from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, explanation, posed, shuffled
 from scipy import stats
 
 from accelstudy.diagnosis.decision.noise import misfit
@@ -12,6 +12,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, cred
 from accelstudy.diagnosis.evidence.detection import log_ratio, simulated
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.evidence.size import (
     SHAPE_SIZES,
     SHAPE_WEIGHTS,
@@ -133,15 +134,10 @@ def test_a_p_value_means_no_more_than_it_can():
 
 
 def test_the_posterior_merges_what_means_the_same():
-    a, b, c = ("a", "z"), ("b",), ("c",)
-    weighed = [
-        Explanation(("a",), (a,), np.log(0.3)),
-        Explanation(("z",), (a,), np.log(0.3)),
-        Explanation(("b", "c"), (b, c), np.log(0.1)),
-        Explanation(("c", "b"), (c, b), np.log(0.1)),
-        Explanation(("b",), (b,), np.log(0.2)),
-    ]
-    posterior = Posterior.of(weighed)
+    given = {"a=z": 0.3, "b+c": 0.1, "c+b": 0.1, "b": 0.2}
+    weighed = [explanation(text, np.log(p)) for text, p in given.items()]
+    same = Cause("z", weighed[0].classes[0])
+    posterior = Posterior.of([*weighed, Explanation((same,), np.log(0.3))])
     assert tuple(one.posterior for one in posterior.all) == pytest.approx((0.6, 0.2, 0.2))
     assert posterior.told[0].names == ("a",)
     assert sum(one.posterior for one in posterior.credible_set) == pytest.approx(1.0)
@@ -149,10 +145,9 @@ def test_the_posterior_merges_what_means_the_same():
 
 def weighed(*names_and_probabilities):
     """Explanations with a shape for each effect, as a search would give them."""
-    shape = object()
     return [
-        Explanation(
-            names, tuple((n,) for n in names), np.log(p), (shape,) * (names[0] not in NOISES)
+        explanation(
+            "+".join(names), np.log(p), best=[object()] * len(names) * (names[0] not in NOISES)
         )
         for names, p in names_and_probabilities
     ]
@@ -187,7 +182,7 @@ def test_wrong_noise_of_all_kinds_is_one_explanation():
 
 def test_a_credible_set_is_the_smallest():
     p = [0.05, 0.5, 0.1, 0.35]
-    found = credible_set(Explanation((str(x),), ((str(x),),), posterior=x) for x in p)
+    found = credible_set(explanation(str(x), posterior=x) for x in p)
     assert [one.posterior for one in found] == [0.5, 0.35, 0.1]
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 import yaml
 from calling import call
-from diagnosis_helpers import otherwise
+from diagnosis_helpers import explanation, otherwise
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
@@ -30,7 +30,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
@@ -158,7 +158,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     shapes = examined.candidates
     thermal, drift = (shapes[name][0] for name in ("thermal_bias", "thermal_curve"))
     weighed = [
-        Explanation((name,), ((name,),), np.log(p), best)
+        explanation(name, np.log(p), best=best)
         for name, p, best in (
             ("thermal_bias", 0.55, (thermal,)),
             ("thermal_curve", 0.4, (drift,)),
@@ -190,10 +190,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
 def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path):
     """With its parameters, as the headline, in the calibration; the verdict has no effects."""
     others = ("hysteresis", "settling", "saturation", "cubic_scale", "quadratic_scale")
-    weighed = [
-        Explanation(("thermal_bias", name), (("thermal_bias",), (name,)), np.log(0.19))
-        for name in others
-    ]
+    weighed = [explanation(f"thermal_bias+{name}", np.log(0.19)) for name in others]
     posterior = Posterior.of(weighed)
     finding = Finding(
         "unknown", named.final, Reason.of("not in the catalogue"), named.finding.chosen, posterior,

@@ -1,8 +1,8 @@
 """What a credible set leaves no doubt of, on sets made by hand."""
 
 import pytest
+from diagnosis_helpers import explanation
 
-from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import family_of, statement
 from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 
@@ -31,11 +31,7 @@ def cosine(one, other):
 
 def made(*explanations):
     """Explanations, each "one+two" with its posterior; = joins names that mean the same."""
-    found = []
-    for text, p in explanations:
-        classes = tuple(tuple(part.split("=")) for part in text.split("+"))
-        found.append(Explanation(tuple(c[0] for c in classes), classes, posterior=p))
-    return tuple(found)
+    return tuple(explanation(text, posterior=p) for text, p in explanations)
 
 
 @pytest.mark.parametrize(("explanations", "certain", "beside"), [

@@ -56,7 +56,7 @@ def truths(campaign, f, rng):
         (np.sin(2 * np.pi * t / rng.uniform(500, 1100) + phase), time, "sine with a period"),
         (c > rng.uniform(16, 34), temperature, "in a step between"),
         (c, temperature, "in a straight line,"),
-        (np.sign(f) * np.maximum(np.abs(f) - rng.uniform(2, 6), 0), force, "beyond ±"),
+        (f**3, force, "with its cube"),
     ]
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G, posed, shuffled
+from diagnosis_helpers import GRAVITY, NINE, G, explanation, posed, shuffled
 from scipy import stats
 
 from accelstudy.diagnosis.decision import verdict
@@ -15,7 +15,7 @@ from accelstudy.diagnosis.decision.noise import (
     unit_variance,
     worst_of,
 )
-from accelstudy.diagnosis.decision.posterior import Explanation, Posterior
+from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.verdict import judge_noise
 from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.size import Level
@@ -83,8 +83,8 @@ def test_where_sigma_is_not_given_the_holds_say_how_large_the_noise_is():
 def judged(monkeypatch, name, factor=1.5, of_noise=0.5, fit=0.5):
     """The finding where a test is significant, and so much of the posterior is of the noise."""
     weighed = [
-        Explanation((LEVEL,), ((LEVEL,),), np.log(of_noise)),
-        Explanation(("hysteresis",), (("hysteresis",),), np.log1p(-of_noise)),
+        explanation(LEVEL, np.log(of_noise)),
+        explanation("hysteresis", np.log1p(-of_noise)),
     ]
     monkeypatch.setattr(verdict, "lack_of_fit", lambda one: fit)
     test = NoiseTest(name, 1.0, 1e-6, (factor,), "what it says")

@@ -9,7 +9,9 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
+from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
@@ -72,6 +74,14 @@ def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=N
 def posed(approach, observed, level=None):
     """The problem of a session, whose sigma is known or of a given level of knowledge."""
     return pose(BaseFit(solve(NINE, approach, observed), level or Level.given(), None))
+
+
+def explanation(text, log_weight=np.nan, posterior=np.nan, best=()):
+    """Explanation by "one+two", where = joins names that mean the same; it may have shapes."""
+    members = [tuple(part.split("=")) for part in text.split("+")]
+    shapes = best or [None] * len(members)
+    causes = tuple(Cause(m[0], m, shape) for m, shape in zip(members, shapes, strict=True))
+    return Explanation(causes, log_weight, posterior)
 
 
 def otherwise(diagnosis, finding=None, **told):

@@ -16,8 +16,9 @@ import numpy as np
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, Reason
+from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
@@ -36,26 +37,27 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
         posterior = posterior.doubting(_perhaps_imitations(case, posterior))
     says = statement(posterior.all, case.cosine)
     finding = replace(finding, posterior=posterior, says=says)
-    chosen = [choice for _, choice in _certain_effects(case, posterior, says)]
+    chosen = [cause for _, cause in _certain_effects(case, posterior, says)]
     if not chosen:
         return finding
     fit = _fit_of(case, chosen)
     if fit is None:
         return replace(finding, says=Statement((), ()))
-    added = tuple(replace(c, best=best) for c, best in zip(chosen, fit[0], strict=True))
+    added = tuple(
+        Cause(best.name, one.members, best, one.posterior)
+        for one, best in zip(chosen, fit[0], strict=True)
+    )
     return replace(finding, frame=Frame.of(fit[1]), chosen=added)
 
 
-def _certain_effects(
-    case: Case, posterior: Posterior, says: Statement
-) -> list[tuple[Part, Choice]]:
+def _certain_effects(case: Case, posterior: Posterior, says: Statement) -> list[tuple[Part, Cause]]:
     """Components that are certain and effects, each with its most probable name."""
     chosen = []
     for part in says.certain:
         if (name := part.names[0]).name in effect_names():
             shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
             best = next(shapes, case.singles.best[name.name])
-            chosen.append((part, Choice(best, name.members, part.posterior)))
+            chosen.append((part, replace(name, best=best, posterior=part.posterior)))
     return chosen
 
 
@@ -66,7 +68,7 @@ def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     hardly ever nearly all of that.
     """
     seeming = _certain_effects(case, posterior, statement(posterior.all, case.cosine))
-    chosen, names = [choice for _, choice in seeming], set[str]()
+    chosen, names = [cause for _, cause in seeming], set[str]()
     after = _disagreement(case, chosen)
     for i, (part, _) in enumerate(seeming):
         without = _disagreement(case, [*chosen[:i], *chosen[i + 1 :]])
@@ -75,14 +77,14 @@ def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     return names
 
 
-def _fit_of(case: Case, chosen: Sequence[Choice]) -> tuple[list[Hypothesis], Solution] | None:
+def _fit_of(case: Case, chosen: Sequence[Cause]) -> tuple[list[Hypothesis], Solution] | None:
     """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
     if not chosen:
         return [], case.problem.frame.solution
-    return case.refit([(choice.best, choice.members) for choice in chosen])
+    return case.refit(chosen)
 
 
-def _disagreement(case: Case, chosen: Sequence[Choice]) -> float:
+def _disagreement(case: Case, chosen: Sequence[Cause]) -> float:
     """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
     fit = _fit_of(case, chosen)
     if fit is None:
@@ -102,10 +104,10 @@ def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
     """
     reason = finding.reason
     if finding.verdict != "unknown":
-        names = [choice.best.name for choice in finding.chosen]
+        names = [cause.name for cause in finding.chosen]
         reason = Reason.of("refuted", names=names, before=held.before, after=held.after)
     assert finding.posterior is not None
-    doubted = [name for choice in finding.chosen for name in choice.members]
+    doubted = [name for cause in finding.chosen for name in cause.members]
     posterior = finding.posterior.doubting(doubted)
     says = Statement((), statement(posterior.all, case.cosine).open)
     return Finding("unknown", case.problem.frame, reason, posterior=posterior, says=says)

@@ -19,8 +19,9 @@ from accelstudy.diagnosis.decision.noise import misfit
 from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Choice, Finding, impossible
+from accelstudy.diagnosis.decision.verdict import Finding, impossible
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
@@ -57,13 +58,13 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
     found = most_probable_place(problem, posterior)
     if found is None or found.probability < RULES.sure:
         return None
-    certain = [choice for choice in finding.chosen if choice.best.name not in found.names]
-    doubted = [_choice(case, posterior, name) for name in found.names]
+    certain = [cause for cause in finding.chosen if cause.name not in found.names]
+    doubted = [_cause(case, posterior, name) for name in found.names]
     # What is doubted may be the mean of what the function changes, or a part of the function.
     for beside in (finding.chosen, (*certain, *doubted)):
-        fitted = fit_of_place(problem, found.place, [choice.best for choice in beside])
+        fitted = fit_of_place(problem, found.place, [cause.shape for cause in beside])
         if fitted is not None and not misfit(problem, fitted[1]) and not impossible(fitted[1]):
-            chosen = (Choice(fitted[0], (LEARNED,), found.probability), *beside)
+            chosen = (Cause(LEARNED, (LEARNED,), fitted[0], found.probability), *beside)
             return replace(
                 finding,
                 verdict=LEARNED,
@@ -107,11 +108,11 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
     return FoundPlace(place, totals[place], beside[place][1])
 
 
-def _choice(case: Case, posterior: Posterior, name: str) -> Choice:
+def _cause(case: Case, posterior: Posterior, name: str) -> Cause:
     """Effect that an explanation has beside a function, with its probability."""
     having = [one.posterior for one in posterior.all if name in one.names]
     best = case.problem.examined.candidates[name].strongest(case.problem.residuals.z)
-    return Choice(best, case.members[name], min(sum(having), 1.0))
+    return Cause(name, case.members[name], best, min(sum(having), 1.0))
 
 
 def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, float]:

@@ -36,7 +36,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
 )
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
 from accelstudy.diagnosis.evidence.singles import (
-    Class,
+    Cause,
     Singles,
     classes_of,
     equivalents,
@@ -55,18 +55,30 @@ class Explanation:
 
     Attributes
     ----------
-    names : tuple of str: effects, or a noise effect, "outlier_position" or "unknown"
-    classes : tuple of tuple of str, the names that mean the same in this campaign, for each name
+    causes : tuple of Cause
     log_weight : float, log of density times prior weight
-    best : tuple of Hypothesis, shapes that explain most; empty for noise and for the unknown
     posterior : float, probability given that something is missing, among those that are compared
     """
 
-    names: tuple[str, ...]
-    classes: tuple[tuple[str, ...], ...]
+    causes: tuple[Cause, ...]
     log_weight: float = np.nan
-    best: tuple[Hypothesis, ...] = ()
     posterior: float = np.nan
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(one.name for one in self.causes)
+
+    @property
+    def classes(self) -> tuple[tuple[str, ...], ...]:
+        """The names that mean the same in this campaign, for each name."""
+        return tuple(one.members for one in self.causes)
+
+    @property
+    def best(self) -> tuple[Hypothesis, ...]:
+        """Shapes that explain most; empty if noise or something unknown is among them."""
+        shapes = tuple(one.best for one in self.causes if one.best is not None)
+        return shapes if len(shapes) == len(self.causes) else ()
 
     @property
     def of_effects(self) -> bool:
@@ -77,6 +89,10 @@ class Explanation:
     def of_noise(self) -> bool:
         """Whether nothing is wrong but the noise."""
         return self.names[0] in NOISES
+
+
+NOT_LISTED = Cause(UNKNOWN, (UNKNOWN,))
+"""Something unknown."""
 
 
 def ranked(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
@@ -161,15 +177,14 @@ class Posterior:
         """Share what has some names with something unknown that they may only imitate."""
         shared: list[Explanation] = []
         for one in self.all:
-            others = [members for members in one.classes if members != (UNKNOWN,)]
-            kept = [members for members in others if not {*members} & {*names}]
+            others = [cause for cause in one.causes if cause != NOT_LISTED]
+            kept = [cause for cause in others if not {*cause.members} & {*names}]
             if len(kept) == len(others):
                 shared.append(one)
                 continue
             imitated = one.log_weight + np.log(RULES.prior_imitated)
             real = one.log_weight + np.log(1 - RULES.prior_imitated)
-            named = tuple(n for n, c in zip(one.names, one.classes, strict=True) if c in kept)
-            unknown = Explanation((*named, UNKNOWN), (*kept, (UNKNOWN,)), float(imitated))
+            unknown = Explanation((*kept, NOT_LISTED), float(imitated))
             shared += [replace(one, log_weight=float(real)), unknown]
         return Posterior.of(shared)
 
@@ -199,7 +214,7 @@ class Weighing:
         return equivalents(self.problem.examined, self.singles)
 
     @cached_property
-    def classes(self) -> list[Class]:
+    def classes(self) -> list[Cause]:
         """Candidates with those that mean the same, strongest evidence first."""
         return classes_of(self.singles, self.members)
 
@@ -207,15 +222,13 @@ class Weighing:
     def alone(self) -> list[Explanation]:
         """Explanations by one effect, one outlying position, or something unknown."""
         each, unknown = -np.log(max(len(self.classes), 1)), self.problem.unknown
-        alone = [
-            Explanation((best.name,), (names,), self.singles.densities[best.name] + each, (best,))
-            for best, names in self.classes
-        ]
+        densities = self.singles.densities
+        alone = [Explanation((one,), densities[one.name] + each) for one in self.classes]
         if unknown is not None:
             z = self.problem.residuals.z
             density = unknown.log_density(self.problem.evidence, unknown.parts(z), z @ z)
             log = float(density + np.log(self.problem.prior_unknown))
-            alone.append(Explanation((UNKNOWN,), ((UNKNOWN,),), log))
+            alone.append(Explanation((NOT_LISTED,), log))
         return alone
 
     @cached_property
@@ -227,17 +240,16 @@ class Weighing:
         sets = weigh_sets(self.singles.shapes, problem.residuals, problem.evidence)
         logs = [one.log_density + set_prior(len(one.best), k) for one in sets]
         least = max(logs, default=0.0) - RULES.negligible
-        called = {name: best.name for best, names in self.classes for name in names}
+        called = {name: one.name for one in self.classes for name in one.members}
         strength = self.singles.densities
         for one, log in zip(sets, logs, strict=True):
             if log < least:
                 continue
-            best = tuple(sorted(one.best, key=lambda h: -strength[h.name]))
-            classes = tuple(self.members[h.name] for h in best)
-            effects = [c for c, h in zip(classes, best, strict=True) if h.effect is not None]
+            best = sorted(one.best, key=lambda h: -strength[h.name])
+            effects = [self.members[h.name] for h in best if h.effect is not None]
             if len(set(effects)) == len(effects):
-                names = tuple(called.get(h.name, h.name) for h in best)
-                weighed.append(Explanation(names, classes, log, best))
+                named = (Cause(called.get(h.name, h.name), self.members[h.name], h) for h in best)
+                weighed.append(Explanation(tuple(named), log))
         return weighed
 
     @cached_property
@@ -256,12 +268,11 @@ class Weighing:
             basis = column_basis(np.concatenate([h.basis for h in one.best], axis=1))
             log = unknown_beside(basis, unknown, problem.residuals, problem.evidence)
             if log is not None:
-                names, classes = (*one.names, UNKNOWN), (*one.classes, (UNKNOWN,))
-                weighed.append(Explanation(names, classes, one.log_weight + log + prior))
+                weighed.append(Explanation((*one.causes, NOT_LISTED), one.log_weight + log + prior))
         return weighed
 
-    def refit(self, chosen: Iterable[Class]) -> tuple[list[Hypothesis], Solution] | None:
-        """Fit with the members of classes that fit best; None if none has a solution."""
+    def refit(self, chosen: Iterable[Cause]) -> tuple[list[Hypothesis], Solution] | None:
+        """Fit with those that mean the same as causes and fit best; None without a solution."""
         return best_refit(self.problem.examined, self.singles, chosen)
 
     def cosine(self, name: str, other: str) -> float:
@@ -313,7 +324,7 @@ class Case(Weighing):
             # More noise than within the holds is an offset from hold to hold.
             name = LEVEL if problem.evidence.level.known else COLOUR
             logs[name] = np.logaddexp(logs.get(name, -np.inf), by_level[1])
-        return [Explanation((name,), ((name,),), float(log)) for name, log in logs.items()]
+        return [Explanation((Cause(name, (name,)),), float(log)) for name, log in logs.items()]
 
     @property
     def slow(self) -> float:

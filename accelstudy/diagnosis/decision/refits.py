@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.singles import Class, Singles, shaped
+from accelstudy.diagnosis.evidence.singles import Cause, Singles, shaped
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
@@ -53,7 +53,7 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
 
 
 def best_refit(
-    examined: ExaminedFit, singles: Singles, chosen: Iterable[Class]
+    examined: ExaminedFit, singles: Singles, chosen: Iterable[Cause]
 ) -> tuple[list[Hypothesis], Solution] | None:
     """Fit with the members of classes that fit best; None if none has a solution.
 
@@ -63,15 +63,15 @@ def best_refit(
     ----------
     examined : ExaminedFit, of the base fit
     singles : Singles, of the same
-    chosen : hypotheses, each with the names of its class
+    chosen : causes, each with a shape
     """
     alternatives = [
         [
-            best if name == best.name else singles.best[name]
-            for name in members
+            one.shape if name == one.shape.name else singles.best[name]
+            for name in one.members
             if name in singles.best
         ]
-        for best, members in chosen
+        for one in chosen
     ]
     sharp = [_sharpened(examined, one) for one in product(*alternatives)]
     base = examined.frame.solution

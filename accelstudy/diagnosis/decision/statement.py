@@ -19,6 +19,7 @@ from typing import TypeAlias
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
@@ -49,35 +50,19 @@ def _family(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Name:
-    """A name that something missing may have.
-
-    Attributes
-    ----------
-    name : str
-    members : tuple of str, the names that mean the same in this campaign, itself included
-    posterior : float, that what is missing is this
-    """
-
-    name: str
-    members: Names
-    posterior: float
-
-
-@dataclass(frozen=True)
 class Part:
     """One thing that is missing for certain, by the names that it may have.
 
     Attributes
     ----------
     family : str, what its names have in common in plain words; "" if they have nothing
-    names : tuple of Name, most probable first: its credible set
+    names : tuple of Cause, most probable first: its credible set
     posterior : float, that it is missing, whatever its name is
     purity : float, smallest canonical cosine of two of its names; None if it has one name
     """
 
     family: str
-    names: tuple[Name, ...]
+    names: tuple[Cause, ...]
     posterior: float
     purity: float | None
 
@@ -138,11 +123,8 @@ def _match(top: Explanation, one: Explanation, cosine: Cosine) -> dict[int, int]
     if one.of_noise:
         return {}
     alike = [
-        [
-            1.0 if own == other else cosine(name, rival)
-            for rival, other in zip(one.names, one.classes, strict=True)
-        ]
-        for name, own in zip(top.names, top.classes, strict=True)
+        [1.0 if a.members == b.members else cosine(a.name, b.name) for b in one.causes]
+        for a in top.causes
     ]
     count = len(one.names)
     # Places beyond those of the explanation stand for nothing.
@@ -160,10 +142,11 @@ def _component(
 ) -> Part | None:
     """What explanations have in common, each at a place; None if that is not certain."""
     names: dict[str, float] = defaultdict(float)
-    members: dict[str, Names] = {}
+    causes: dict[str, Cause] = {}
     for one, place in having:
-        names[one.names[place]] += one.posterior
-        members[one.names[place]] = one.classes[place]
+        cause = one.causes[place]
+        names[cause.name] += one.posterior
+        causes[cause.name] = cause
     total = sum(names.values())
     if round(total, DIGITS) < round(probability, DIGITS):
         return None
@@ -176,8 +159,8 @@ def _component(
     if purity is not None and purity < RULES.rival:
         return None
     return Part(
-        family=family_of(*(each for name in held for each in members[name])),
-        names=tuple(Name(name, members[name], names[name]) for name in held),
+        family=family_of(*(each for name in held for each in causes[name].members)),
+        names=tuple(replace(causes[name], posterior=names[name]) for name in held),
         posterior=total,
         purity=purity,
     )
@@ -190,11 +173,10 @@ def _open(
     rest: dict[Names, Explanation] = {}
     for one, places in zip(explanations, taken, strict=True):
         certain = {one.names[i] for i in places}
-        left = [i for i, name in enumerate(one.names) if name not in certain]
-        names = tuple(one.names[i] for i in left)
+        left = tuple(cause for cause in one.causes if cause.name not in certain)
+        names = tuple(cause.name for cause in left)
         p = one.posterior + (rest[names].posterior if names in rest else 0.0)
-        classes = tuple(one.classes[i] for i in left)
-        rest[names] = replace(one, names=names, classes=classes, posterior=p)
+        rest[names] = replace(one, causes=left, posterior=p)
     return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
 
 

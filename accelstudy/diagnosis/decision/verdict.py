@@ -12,12 +12,19 @@ import numpy as np
 from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
-from accelstudy.diagnosis.decision.posterior import Case, Explanation, Posterior, Weighing
+from accelstudy.diagnosis.decision.posterior import (
+    NOT_LISTED,
+    Case,
+    Explanation,
+    Posterior,
+    Weighing,
+)
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.statement import Statement
 from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
@@ -45,22 +52,6 @@ class Reason(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A hypothesis that was chosen.
-
-    Attributes
-    ----------
-    best : Hypothesis
-    members : tuple of str, names that mean the same in this campaign
-    probability : float, posterior
-    """
-
-    best: Hypothesis
-    members: tuple[str, ...]
-    probability: float
-
-
-@dataclass(frozen=True)
 class Finding:
     """What is said of a problem, with the hypotheses and the fit that it is said by.
 
@@ -70,7 +61,7 @@ class Finding:
         "unknown"
     frame : Frame, of the fit with what was chosen, or of the base fit
     reason : Reason or None
-    chosen : tuple of Choice; of the unknown, what is certain
+    chosen : tuple of Cause; of the unknown, what is certain
     posterior : Posterior or None, where something is missing
     says : Statement, what is missing whatever else is open, and what may be missing beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
@@ -80,7 +71,7 @@ class Finding:
     verdict: str
     frame: Frame
     reason: Reason | None = None
-    chosen: tuple[Choice, ...] = ()
+    chosen: tuple[Cause, ...] = ()
     posterior: Posterior | None = None
     says: Statement = field(default=Statement((), ()))
     place: Place | None = None
@@ -98,14 +89,8 @@ class Finding:
             return self.credible_set
         added = {choice.members for choice in self.chosen}
         parts = [part for part in self.says.certain if part.names[0].members in added]
-        return tuple(
-            Explanation(
-                tuple(n.name for n in one),
-                tuple(n.members for n in one),
-                posterior=parts[0].posterior,
-            )
-            for one in product(*(part.names for part in parts))
-        )
+        alternatives = product(*(part.names for part in parts))
+        return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)
 
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
@@ -134,17 +119,19 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
     """Judge the explanations of a posterior: the first rule that matches."""
     frame, top = case.problem.frame, posterior.told[0]
     if top.best:
-        chosen = zip(top.best, top.classes, strict=True)
-        fit = case.refit(chosen)
+        fit = case.refit(top.causes)
         reason = _against(case.problem, top, fit)
         if fit is None or reason is not None:
             return Finding("unknown", frame, reason, posterior=posterior)
-        found = [Choice(h, m, top.posterior) for h, m in zip(fit[0], top.classes, strict=True)]
-        found.sort(key=lambda choice: choice.best.effect is not None)
+        found = [
+            Cause(best.name, members, best, top.posterior)
+            for best, members in zip(fit[0], top.classes, strict=True)
+        ]
+        found.sort(key=lambda one: one.shape.effect is not None)
         credible, verdict = posterior.credible_set, ""
         of_effects = sum(one.posterior for one in credible if one.of_effects)
         sure = top.posterior >= RULES.sure
-        if sure and found[0].best.effect is None:
+        if sure and found[0].shape.effect is None:
             verdict = "gross_error"
         elif top.posterior >= RULES.named:
             verdict = "named"
@@ -296,7 +283,7 @@ def _posterior_by_refits(case: Case, single: Explanation, count: int) -> Posteri
 
 def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
     """Weigh an explanation by its refit instead of by first order."""
-    fit = case.refit(zip(one.best, one.classes, strict=True))
+    fit = case.refit(one.causes)
     if fit is None:
         return one, None
     best, solution = fit
@@ -306,7 +293,8 @@ def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | Non
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
     first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
-    return replace(one, log_weight=weight, best=tuple(best)), solution
+    causes = tuple(replace(c, best=h) for c, h in zip(one.causes, best, strict=True))
+    return Explanation(causes, weight), solution
 
 
 def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
@@ -315,14 +303,11 @@ def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanat
     problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
     odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
     for name, log in zip(problem.field.names, odds.tolist(), strict=True):
-        if name == UNKNOWN:
-            members: tuple[str, ...] = (UNKNOWN,)
-            best, more = alone.best[:0], np.log(problem.prior_unknown)
-        else:
+        cause, more = NOT_LISTED, np.log(problem.prior_unknown)
+        if name != UNKNOWN:
             other = problem.examined.candidates[name].strongest(z)
-            members, best = inner.members[name], (*alone.best, other)
+            cause = Cause(name, inner.members[name], other)
             more = within_bounds((other,), z, problem.evidence)[0] - np.log(len(case.classes))
         weight = log + float(more + np.log(RULES.prior_two))
-        classes = (*alone.classes, members)
-        weighed.append(Explanation((*alone.names, name), classes, weight, best))
+        weighed.append(Explanation((*alone.causes, cause), weight))
     return weighed

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,29 @@ from accelstudy.diagnosis.space.shapes import LearnedShapes
 
 Array = NDArray[np.float64]
 
-Class: TypeAlias = tuple[Hypothesis, tuple[str, ...]]
-"""A hypothesis, and all names that mean the same in this campaign."""
+
+@dataclass(frozen=True)
+class Cause:
+    """One thing that may be missing or wrong.
+
+    Attributes
+    ----------
+    name : str: an effect, a noise effect, "outlier_position", "learned" or "unknown"
+    members : tuple of str, the names that mean the same in this campaign, itself included
+    best : Hypothesis, the shape that explains most; None of noise and of the unknown
+    posterior : float, that what is missing is this, where that is asked
+    """
+
+    name: str
+    members: tuple[str, ...]
+    best: Hypothesis | None = None
+    posterior: float = np.nan
+
+    @property
+    def shape(self) -> Hypothesis:
+        """The shape that explains most, where there is one."""
+        assert self.best is not None
+        return self.best
 
 
 @dataclass(frozen=True)
@@ -85,7 +105,7 @@ def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str,
     return members
 
 
-def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list[Class]:
+def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list[Cause]:
     """Candidates with those that mean the same, strongest evidence first."""
     densities = singles.densities
     left = sorted(densities, key=lambda name: -densities[name])
@@ -98,7 +118,7 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
         # Rounding errors must not choose among equally good names: the first one is taken.
         least = densities[name] - RULES.same_evidence
         name = min(other for other in (name, *alike) if densities[other] >= least)
-        classes.append((singles.best[name], same))
+        classes.append(Cause(name, same, singles.best[name]))
     return classes
 
 

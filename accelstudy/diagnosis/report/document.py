@@ -23,8 +23,8 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.forms import TARGETS
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.report.words import reason, warnings
 from accelstudy.diagnosis.result import Diagnosis, Named

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import number, words
+from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.forms import TARGETS, coordinate_of
 from accelstudy.diagnosis.report.document import condition_sigma
-from accelstudy.diagnosis.report.words import COORDINATES as IN_WORDS
+from accelstudy.diagnosis.report.words import as_place
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
@@ -224,7 +224,8 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Posterior of the places where what is missing may live, and residuals over the best one."""
     d, best = diagnosis, diagnosis.like[0]
     bars = {
-        f"{o.target} over\n{_coordinate(o.coordinate)}": o.posterior for o in d.like[:MAX_PLACES]
+        f"{o.target} over\n{_axis(as_place(o.coordinate))}": o.posterior
+        for o in d.like[:MAX_PLACES]
     }
     if len(d.like) > MAX_PLACES:
         bars["all others"] = sum(one.posterior for one in d.like[MAX_PLACES:])
@@ -238,12 +239,15 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     _draw_shares(left, [*bars], [*bars.values()], AFTER)
     left.set(xlim=(0, 118), xlabel="posterior probability / %")
     left.invert_yaxis()
-    words, size, unit = _shown_coordinate(best.coordinate, d.frame.hold.time is None)
+    # Without times that of the time is the order.
+    ordered = best.coordinate == "time" and d.frame.hold.time is None
+    of = coordinate_of("order" if ordered else best.coordinate)
+    label = _axis(of.words if best.coordinate == "time" else as_place(best.coordinate))
     when = "after" if d.verdict == "unknown" and d.found else "before"
     for k, ax in enumerate(axes):
         ax.axhline(0, color=INK, linewidth=0.6)
         for i, name in enumerate(names):
-            x = values[:, min(i, values.shape[1] - 1) if together else k] / size
+            x = values[:, min(i, values.shape[1] - 1) if together else k] / of.size
             x = _abreast(x, len(names))[:, i]
             _draw_component(ax, positions, name, when, x, False)
         ax.set_title("" if together else ("roll", "pitch")[k] if panels == 2 else "xyz"[k])
@@ -251,23 +255,10 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
         ax.sharey(axes[0])
         ax.tick_params(labelleft=k == 0)
     same = "\nof the same axis" if together and values.shape[1] > 1 else ""
-    axes[panels // 2].set_xlabel(_per_unit(f"{words}{same}", unit))
+    axes[panels // 2].set_xlabel(_per_unit(f"{label}{same}", of.unit))
     axes[0].set_ylabel("residual / (mm/s²)")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
     return figure
-
-
-def _coordinate(name: str) -> str:
-    """Name a coordinate of a place without its article."""
-    return IN_WORDS.get(name, f"the {name}").removeprefix("the ")
-
-
-def _shown_coordinate(name: str, ordered: bool) -> tuple[str, float, str]:
-    """Words, SI size and unit of a coordinate; without times that of the time is the order."""
-    known = {"dT/dt": "temperature rate", "next": "previous", "move": "angle"}
-    of = coordinate_of("order" if name == "time" and ordered else known.get(name, name))
-    words = of.words.removeprefix("the ") if name == "time" else _coordinate(name)
-    return words, of.size, of.unit
 
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
@@ -368,13 +359,18 @@ def shape_figure(shape: LearnedShape) -> Figure:
     for ax, x, points in hardly:
         ax.plot(x, points, ".", color=OTHER_COLOUR, markersize=2.5)
     panels[0].set_ylim(limits)
-    panels[-1].set_xlabel(_per_unit(of.words.removeprefix("the "), of.unit))
+    panels[-1].set_xlabel(_per_unit(_axis(of.words), of.unit))
     return figure
 
 
 def hardly_shown(shape: LearnedShape) -> NDArray[np.bool_]:
     """Which residuals, (n, c), have so much noise that they are drawn small."""
     return np.asarray(shape.spreads > MAX_NOISE_RATIO * np.nanmin(shape.spreads, axis=0))
+
+
+def _axis(words: str) -> str:
+    """Words of a coordinate, as an axis has them."""
+    return words.removeprefix("the ")
 
 
 def _per_unit(what: str, unit: str) -> str:

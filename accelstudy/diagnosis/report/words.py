@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.basics.wording import comma_list, grouped, probability, words
+from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
     Cosine,
-    Name,
     Part,
     Statement,
     effects_and_others,
@@ -23,7 +23,7 @@ from accelstudy.diagnosis.decision.statement import (
     statement,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
-from accelstudy.diagnosis.forms import coordinate_of
+from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.formulas import OTHER_FORM
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.diagnosis.rules import RULES
@@ -37,25 +37,6 @@ TEMPLATE = "diagnosis/report/words.txt.j2"
 MAX_TILT = MAX_TILT_GON * GON
 """rad, up to which tilt errors are compared."""
 
-COORDINATES = {
-    "dT/dt": "the rate of the temperature",
-    "force": "the force",
-    "previous": "the force in the position before",
-    "next": "the step to the next position",
-    "angle": "roll and pitch",
-    "yaw": "the yaw",
-    "move": "the last move of the robot",
-}
-"""Coordinates of a function without a name; others are called as they are."""
-TARGETS = {
-    "bias": "a bias",
-    "scale": "a scale",
-    "nonorthogonality": "a non-orthogonality",
-    "mounting": "a rotation of the sensor on its mounting",
-    "reading": "an error of the robot's readings",
-    "tilt": "a tilt of the base",
-}
-"""What may be such a function."""
 FAMILIES = {
     "": "an effect",
     "alignment of the axes": "a misalignment of the axes",
@@ -194,9 +175,17 @@ def like(diagnosis: Diagnosis) -> str:
     named = diagnosis.verdict not in ("unknown", LEARNED)
     if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
-    places = [(COORDINATES.get(one.coordinate, one.coordinate), one) for one in worth]
-    return _listed([(f"{TARGETS[o.target]} that varies with {c}", o.posterior) for c, o in places],
-                   "or")  # fmt: skip
+    places = [
+        (f"{TARGETS[one.target].alone} that varies with {as_place(one.coordinate)}", one.posterior)
+        for one in worth
+    ]
+    return _listed(places, "or")
+
+
+def as_place(coordinate: str) -> str:
+    """Say a coordinate without regard to the axes."""
+    of = coordinate_of(coordinate)
+    return of.place or of.words
 
 
 def formulas(diagnosis: Diagnosis) -> str:
@@ -299,8 +288,7 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
     certain = any(part.is_effect for part in set_says.certain)
     kinds: dict[str, float] = defaultdict(float)
     for one in set_says.open if certain else credible_set:
-        named = zip(one.names, one.classes, strict=True)
-        for kind in dict.fromkeys(_kind(name, members) for name, members in named):
+        for kind in dict.fromkeys(map(_kind, one.causes)):
             kinds[kind] += one.posterior
     worth = sorted(((k, p) for k, p in kinds.items() if p >= MIN_SAID), key=lambda item: -item[1])
     return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
@@ -317,9 +305,9 @@ def stands_for(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def _kind(name: str, members: tuple[str, ...]) -> str:
-    family = family_of(*members)
-    return family_words(family) if family else name_words(name)
+def _kind(cause: Cause) -> str:
+    family = family_of(*cause.members)
+    return family_words(family) if family else name_words(cause.name)
 
 
 def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
@@ -370,7 +358,7 @@ def _part(part: Part, pattern: str = "{family} ({names})") -> str:
     return pattern.format(family=family_words(part.family), names=names)
 
 
-def _names(names: Sequence[Name]) -> str:
+def _names(names: Sequence[Cause]) -> str:
     """All names, with those that mean the same."""
     same = [other for name in names for other in (name.name, *name.members)]
     return comma_list(list(dict.fromkeys(map(name_words, same))), "or")
