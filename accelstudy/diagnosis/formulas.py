@@ -311,7 +311,7 @@ def _step(of: Coordinate, c: Array) -> Form:
     return Form("in a step between {}", beyond, between[some], gap)
 
 
-def _powers(p: Array, middle: float, half: float, _: float, x: Array) -> Array:
+def _powers(p: NDArray[np.int_], middle: float, half: float, _: float, x: Array) -> Array:
     return np.asarray(((x[..., None] - middle) / half) ** p)
 
 
