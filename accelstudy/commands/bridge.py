@@ -12,24 +12,50 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property, partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
 
-from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import OPTIONS, InputError
-from accelstudy.basics.names import check_file_name
 from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
 from accelstudy.files.outputs import Kind, result_folder
 from accelstudy.verbs import kinds
-from accelstudy.verbs.kinds import Names
+from accelstudy.verbs.kinds import PATH, Names
 
 Place = Callable[..., AbstractContextManager[Path]]
 """Where a result is written: called with the path, and with `inputs` and `force`."""
+
+
+def _load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -> None:
+    """Load files of plug-ins, before anything else of the command is looked at."""
+    if paths and not ctx.resilient_parsing:
+        from accelstudy.basics.plugins import load_files
+
+        load_files(paths)
+
+
+PLUGIN: dict[str, Any] = {
+    "type": PATH,
+    "multiple": True,
+    "expose_value": False,
+    "callback": _load,
+    "help": "Python file with effects, schemes and the like of your own; it may also be named "
+    "after the command.",
+}
+"""The option of all commands, before their name and after it."""
+ANGLE_UNITS = Names("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS")
+ANGLE_UNIT = click.Option(
+    ["--angle-unit"],
+    type=ANGLE_UNITS,
+    metavar="[gon|deg]",
+    help=f"Unit in which angles are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
+)
+QUIET = click.Option(["--quiet"], is_flag=True, help="Print only the result and warnings.")
+FORCE = click.Option(
+    ["--force"], is_flag=True, help="Overwrite files of the same names, but never an input."
+)
 
 
 class Command(click.Command):
@@ -38,25 +64,26 @@ class Command(click.Command):
     Parameters
     ----------
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
+    run : function that does all of it, with the verb's parameters, which are checked, and with
+        those of further options; by default the verb, whose result is written to --out if it has
+        files
     name : str, of the command; that of the verb if omitted
-    writes : Kind of the folder that --out names, if the verb returns a result with files; of a
-        result that is a file, a context manager as `accelstudy.files.outputs.new_file`
+    writes : Kind of the folder that --out names; of a result that is a file, a context manager as
+        `accelstudy.files.outputs.new_file`
     out : str, help of --out
     optional : bool, whether nothing is written without --out
     more : str, what its help says of `options` and of files, beside the docstring
     sections : mapping of a title of the help to names of options, in the order of the help
     reads : function, what else is read of a path that is given, such as those of a pattern
-    show : function that prints what the verb returns, where this is not a result with files
-    run : function that does all of it, with the verb's parameters, --out and --force, and with
-        those of `options`
     options : further options, which come after that of --out
-    retired : mapping of an option of earlier versions to what to do instead; of a flag it ends in !
-    angles, quiet : bool, whether it shows angles, and more than its result
+    retired : mapping of an option of earlier versions to what to do instead
+    shared : options of many commands, which come last
     """
 
     def __init__(
         self,
         verb: Callable[..., Any],
+        run: Callable[..., None] | None = None,
         *,
         name: str = "",
         writes: Kind | Place | None = None,
@@ -65,15 +92,13 @@ class Command(click.Command):
         more: str = "",
         sections: Mapping[str, str] | None = None,
         reads: Callable[[Any], Iterable[Any]] = lambda given: (),
-        show: Callable[[Any], None] = click.echo,
-        run: Callable[..., None] | None = None,
         options: Iterable[click.Option] = (),
         retired: Mapping[str, str] | None = None,
-        angles: bool = True,
-        quiet: bool = True,
+        shared: Iterable[click.Option] = (ANGLE_UNIT, QUIET),
     ) -> None:
-        self.verb, self.writes, self.reads, self.show, self.run = verb, writes, reads, show, run
-        self.place = partial(result_folder, kind=writes) if isinstance(writes, Kind) else writes
+        self.verb, self.writes, self.reads = verb, writes, reads
+        place = partial(result_folder, kind=writes) if isinstance(writes, Kind) else writes
+        self.run = run or (partial(self._save, place) if place else inspect.unwrap(verb))
         self.sections = {title: names.split() for title, names in (sections or {}).items()}
         signature = inspect.signature(verb).parameters.values()
         self.arguments = [p for p in signature if p.kind is p.POSITIONAL_OR_KEYWORD]
@@ -84,7 +109,8 @@ class Command(click.Command):
             epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in kinds.examples(verb))]),
         )
         del self.params  # the list of all commands does without them
-        self._options = optional, out, [*options], dict(retired or {}), angles, quiet
+        self._options = optional, out, [*options], [*shared]
+        self._retired = retired or {}
 
     @cached_property
     def params(self) -> list[click.Parameter]:  # type: ignore[override]
@@ -92,34 +118,23 @@ class Command(click.Command):
         return [*self._params()]
 
     def _params(self) -> Iterator[click.Parameter]:
-        optional, out, options, retired, angles, quiet = self._options
-        keywords = kinds.keywords(self.verb)
-        place = click.Option(["--out"], type=PATH, required=not optional, help=out)
-        renamed = {
-            f"--{old.replace('_', '-')}": f"{keywords[new].option} takes it"
-            for old, new in kinds.RENAMED.items()
-            if new in keywords
-        }
+        optional, out, options, shared = self._options
+        place = [click.Option(["--out"], type=PATH, required=not optional, help=out), FORCE]
+        place = [] if self.writes is None else place
+        first = 0 if optional else 1
         yield from map(self._argument, self.arguments)
-        if self.writes is not None and not optional:
-            yield place
-        yield from options
-        yield from map(self._option, keywords.values())
-        if self.writes is not None:
-            yield from (place, _FORCE) if optional else (_FORCE,)
-        yield from (one for one, wanted in ((_ANGLE_UNIT, angles), (_QUIET, quiet)) if wanted)
-        yield from (_retired(*item) for item in (renamed | retired).items())
+        yield from (*place[:first], *options)
+        yield from map(self._option, kinds.keywords(self.verb).values())
+        yield from (*place[first:], *shared)
         # It stands in the help of all commands together.
         yield click.Option(["--plugin"], hidden=True, **PLUGIN)
 
     def _argument(self, parameter: inspect.Parameter) -> click.Argument:
         """Argument of a positional parameter: a path or a name."""
-        many = "Sequence" in parameter.annotation
+        path, many = (word in parameter.annotation for word in ("Path", "Sequence"))
         return click.Argument(
             [parameter.name],
-            type=PATH
-            if "Path" in parameter.annotation
-            else _type(kinds.Keyword.of(self.verb, parameter).kind),
+            type=PATH if path else kinds.Keyword.of(self.verb, parameter).kind,
             nargs=-1 if many else 1,
             required=parameter.default is parameter.empty,
             metavar=f"{_metavar(parameter)}..." if many else None,
@@ -130,10 +145,11 @@ class Command(click.Command):
         needed = keyword.default is inspect.Parameter.empty
         default = None if needed else keyword.default
         name, meaning = keyword.option, kinds.meanings(self.verb)[keyword.name]
+        flag = keyword.kind is kinds.FLAG
         return click.Option(
             [f"{name}/--no-{name[2:]}" if default is True else name, keyword.name],
-            type=_type(keyword.kind),
-            is_flag=keyword.kind is kinds.FLAG,
+            type=bool if flag else keyword.kind,
+            is_flag=flag,
             nargs=2 if keyword.ends else 1,
             multiple=keyword.many,
             required=needed,
@@ -150,39 +166,35 @@ class Command(click.Command):
         options = {name: one.option for name, one in keywords.items()}
         return re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), text)
 
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; messages call keywords by its options."""
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the options, as which messages call keywords from now on."""
         options = (p for p in self.params if isinstance(p, click.Option))
-        token = OPTIONS.set({str(p.name): p.opts[0] for p in options})
+        OPTIONS.set({str(p.name): p.opts[0] for p in options})
         try:
-            return super().invoke(ctx)
-        finally:
-            OPTIONS.reset(token)
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            name = error.option_name
+            keyword = kinds.keywords(self.verb).get(
+                kinds.RENAMED.get(name[2:].replace("-", "_"), "")
+            )
+            instead = self._retired.get(name, keyword and f"{keyword.option} takes it")
+            if instead is None:
+                raise
+            raise InputError(f"{name}: no longer an option; {instead}") from None
 
     def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
         with feedback(quiet), angles_in(angle_unit):
-            if self.run is not None:
-                self.run(**given)
-            elif self.place is not None:
-                self._save(self.place, given.pop("out"), given.pop("force"), given)
-            elif (result := self._call(given)) is not None:
-                self.show(result)
+            self.run(**kinds.check(self.verb, given))
 
-    def _call(self, given: dict[str, Any]) -> Any:
-        values = [given.pop(one.name) for one in self.arguments]
-        return self.verb(*values, **given)
-
-    def _save(self, place: Place, out: Path | None, force: bool, given: dict[str, Any]) -> None:
+    def _save(self, place: Place, *, out: Path | None, force: bool, **given: Any) -> None:
         """Write the result to --out, and print what it says."""
         named = [path for one in self.arguments for path in _paths(given[one.name])]
-        inputs = [
-            *inputs_of(self.verb, given),
-            *(one for path in named for one in self.reads(path)),
-        ]
+        read = [one for path in named for one in self.reads(path)]
+        inputs = [*inputs_of(self.verb, given), *read]
         opened = nullcontext() if out is None else place(out, inputs=inputs, force=force)
         work = stage(self.writes.name) if isinstance(self.writes, Kind) else nullcontext()
         with opened as part, work:
-            result = self._call(given)
+            result = inspect.unwrap(self.verb)(**given)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)
@@ -218,108 +230,6 @@ def _paths(value: Any) -> list[Path]:
     return [value] if isinstance(value, Path) else []
 
 
-# --- what click is told ---------------------------------------------------------------------------
-
-
-class Text(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5 on
-    """A text that the verb checks; the shell completes names, and files where one may stand."""
-
-    def __init__(self, kind: Any) -> None:
-        self.kind, self.name = kind, getattr(kind, "metavar", "quantity")
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Names that begin with what was typed; files, if none does."""
-        if not isinstance(self.kind, Names):
-            return []
-        before, plus, last = incomplete.rpartition("+" if self.kind.parts else "\0")
-        found = [*_names(self.kind), *(_names(self.kind.parts) if plus and self.kind.parts else ())]
-        items = [CompletionItem(f"{before}{plus}{one}") for one in found if one.startswith(last)]
-        if items or not self.kind.files:
-            return items
-        return [CompletionItem(incomplete, type="file")]
-
-
-def _names(kind: Names) -> Iterable[str]:
-    names = getattr(import_module(kind.module), kind.names)
-    return names() if callable(names) else names
-
-
-class Whole(click.IntRange):
-    """A whole number, whose range stands in the help; the verb checks it."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number, or what is none."""
-        try:
-            return int(value)
-        except ValueError:
-            return value
-
-
-class FilePath(click.Path):
-    """A path that a file can have."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Check the name."""
-        check_file_name(value)
-        return super().convert(value, param, ctx)
-
-
-def _type(kind: Any) -> Any:
-    match kind:
-        case Range(least=least, most=most):
-            return Whole(int(least), int(most) if most <= 1e6 else None)
-        case kinds.PATH:
-            return PATH
-        case kinds.FLAG:
-            return bool
-    return Text(kind)
-
-
 def _metavar(parameter: inspect.Parameter) -> str:
     many = "Sequence" in parameter.annotation
     return (parameter.name.removesuffix("s") if many else parameter.name).upper()
-
-
-def _load(ctx: click.Context, param: click.Parameter, paths: tuple[Path, ...]) -> None:
-    """Load files of plug-ins, before anything else of the command is looked at."""
-    if paths and not ctx.resilient_parsing:
-        from accelstudy.basics.plugins import load_files
-
-        load_files(paths)
-
-
-def _retired(name: str, instead: str) -> click.Option:
-    """Option of earlier versions, which ends in a line that says what to do instead."""
-    name, flag, _ = name.partition("!")
-
-    def refuse(context: click.Context, option: click.Parameter, value: Any) -> None:
-        if value:
-            raise InputError(f"{name}: no longer an option; {instead}")
-
-    hidden: Any = {"hidden": True, "expose_value": False, "help": "Retired."}
-    return click.Option([name], is_flag=bool(flag), callback=refuse, **hidden)
-
-
-PATH = FilePath(path_type=Path)
-_QUIET = click.Option(["--quiet"], is_flag=True, help="Print only the result and warnings.")
-_FORCE = click.Option(
-    ["--force"], is_flag=True, help="Overwrite files of the same names, but never an input."
-)
-ANGLE_UNITS = Text(Names("angle_unit", "accelstudy.basics.units", "ANGLE_UNITS"))
-_ANGLE_UNIT = click.Option(
-    ["--angle-unit"],
-    type=ANGLE_UNITS,
-    metavar="[gon|deg]",
-    help=f"Unit in which angles are shown.  [default: gon, or {ANGLE_UNIT_VARIABLE}]",
-)
-PLUGIN: dict[str, Any] = {
-    "type": PATH,
-    "multiple": True,
-    "expose_value": False,
-    "callback": _load,
-    "help": "Python file with effects, schemes and the like of your own; it may also be named "
-    "after the command.",
-}
-"""The option of all commands, before their name and after it."""

@@ -12,11 +12,11 @@ import click
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.basics.wording import counted
-from accelstudy.commands.bridge import PATH, Command, inputs_of
+from accelstudy.commands.bridge import QUIET, Command, inputs_of
 from accelstudy.files import outputs
 from accelstudy.files.outputs import new_file, result_folder
 from accelstudy.verbs import calibrations, campaigns, planning
-from accelstudy.verbs.kinds import File, Force, check, verb
+from accelstudy.verbs.kinds import PATH, File, Force, verb
 
 if TYPE_CHECKING:
     from accelstudy.campaign.importing.detection import Holds
@@ -39,7 +39,7 @@ def run_import(
     from accelstudy.campaign.importing.logs import import_sensors, write_imported
 
     columns = dict(_sensor(text) for text in sensors)
-    logs = Import.of(log, check(campaigns.find_holds, given), columns)
+    logs = Import.of(log, given, columns)
     folders = {name: out / name for name in logs.settings.sensors} or {"": out}
     inputs = [*map(Path, map(str, logs.files)), *inputs_of(campaigns.find_holds, given)]
     with ExitStack() as stack:
@@ -77,13 +77,13 @@ def show_import(campaign: Campaign, holds: Holds | None, out: Path, figure: bool
 
 IMPORT = Command(
     campaigns.find_holds,
+    run_import,
     name="import",
     writes=outputs.CAMPAIGN,
     out="Folder of the campaign.",
     more="segmentation.png in the folder shows the holds with their numbers. With --sensor, which "
     "may be repeated as --exclude and --join may, each sensor has a campaign of its own in the "
     "folder, which is named after the log and the sensor.",
-    run=run_import,
     options=(
         click.Option(
             ["--sensor", "sensors"],
@@ -128,10 +128,10 @@ def run_simulate_campaign(
 
 SIMULATE_CAMPAIGN = Command(
     campaigns.simulate_campaign,
+    run_simulate_campaign,
     writes=outputs.CAMPAIGN,
     out="Folder of the campaign.",
     more="The truth goes to --truth and nowhere else.",
-    run=run_simulate_campaign,
     options=(click.Option(["--truth"], type=PATH, help="YAML file for the truth."),),
     sections={
         "What is written": "out truth name seed",
@@ -142,13 +142,13 @@ SIMULATE_CAMPAIGN = Command(
     },
     retired={
         "--gross": "--gross-error takes it",
-        "--sigma-unknown!": "--no-sigma-known says it",
+        "--sigma-unknown": "--no-sigma-known says it",
         "--robot-sigma-mgon": "--robot-sigma takes it with its unit, as 5mgon",
         "--samples-per-hold": "--n-samples takes it",
-        "--no-time!": "--interval none says it",
+        "--no-time": "--interval none says it",
         "--hold": "campaigns have no slopes within holds",
     },
-    angles=False,
+    shared=[QUIET],
 )
 
 
@@ -158,7 +158,6 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
     from accelstudy.campaign.calibration.applying import read_calibration
     from accelstudy.campaign.calibration.leveling import level
 
-    given = check(calibrations.apply, given)
     layout = layout_of(given)
     with new_file(out, [calibration, log], force) as path:
         read = read_calibration(calibration)
@@ -169,12 +168,12 @@ def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any
     click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
 
 
-APPLY = Command(
-    calibrations.apply, writes=new_file, out="CSV or Parquet file to write.", run=run_apply
+APPLY = Command(calibrations.apply, run_apply, writes=new_file, out="CSV or Parquet file to write.")
+
+
+DATA_SHEET = Command(
+    planning.data_sheet, writes=new_file, out="YAML file to write.", shared=[QUIET]
 )
-
-
-DATA_SHEET = Command(planning.data_sheet, writes=new_file, out="YAML file to write.", angles=False)
 
 
 @verb
@@ -228,7 +227,7 @@ def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
     from accelstudy.api.advice import Adviser
     from accelstudy.sequential.running import Watch, read_as_it_is
 
-    given, session = check(planning.advise, given), Watch(campaign)
+    session = Watch(campaign)
     if watch:
         now = next(session.look())
     else:
@@ -261,7 +260,7 @@ def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
 
 ADVISE = Command(
     planning.advise,
-    run=run_advise,
+    run_advise,
     options=(
         click.Option(["--watch"], is_flag=True, help="Wait for further positions until Ctrl-C."),
     ),

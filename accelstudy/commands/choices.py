@@ -9,7 +9,7 @@ import click
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, track
-from accelstudy.commands.bridge import Command
+from accelstudy.commands.bridge import ANGLE_UNIT, Command
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
@@ -225,7 +225,7 @@ def scheme(name: kinds.SchemeName) -> None:
     click.echo(table.to_csv(index_label="position", float_format="%.6f"), nl=False)
 
 
-MODELS = Command(models, angles=False, quiet=False)
+MODELS = Command(models, shared=())
 EFFECTS = Command(effects)
 SCHEMES = Command(schemes)
-SCHEME = Command(scheme, quiet=False)
+SCHEME = Command(scheme, shared=[ANGLE_UNIT])

@@ -177,7 +177,7 @@ def config_schema() -> None:
     click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-INIT = Command(init, angles=False, quiet=False)
-CELLS = Command(cells, angles=False, quiet=False)
-CLAIMS = Command(claims, angles=False, quiet=False)
-CONFIG_SCHEMA = Command(config_schema, angles=False, quiet=False)
+INIT = Command(init, shared=())
+CELLS = Command(cells, shared=())
+CLAIMS = Command(claims, shared=())
+CONFIG_SCHEMA = Command(config_schema, shared=())

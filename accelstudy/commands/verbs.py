@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 from accelstudy.basics.progress import say, warn
-from accelstudy.commands.bridge import Command
+from accelstudy.commands.bridge import QUIET, Command
 from accelstudy.files import outputs
 from accelstudy.verbs import calibrations, planning, sensors
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LEVELED = (
     "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the calibrated force in "
@@ -22,8 +19,9 @@ LEVELED = (
 """What to do instead of `--level`."""
 
 
-def show_sigmas(table: pd.DataFrame) -> None:
-    """Print the check of sigmas."""
+def run_check_sigmas(**given: Any) -> None:
+    """Print the check of sigmas, and what it can find."""
+    table = calibrations.check_sigmas(**given)
     click.echo(table.to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     say("sigma: as the adjustment claims it; ratio: sigma / sd_empirical.")
     click.echo(table.attrs["finds"])
@@ -45,8 +43,8 @@ def run_export(calibration: Path, form: str) -> None:
 CALIBRATE = Command(calibrations.calibrate, writes=outputs.CALIBRATION)
 DIAGNOSE = Command(calibrations.diagnose, writes=outputs.DIAGNOSIS)
 LOT = Command(sensors.lot, writes=outputs.LOT, reads=sensors.folders_of)
-CHECK_SIGMAS = Command(calibrations.check_sigmas, show=show_sigmas)
-EXPORT = Command(calibrations.export, run=run_export, retired={"--level!": LEVELED}, angles=False)
+CHECK_SIGMAS = Command(calibrations.check_sigmas, run_check_sigmas)
+EXPORT = Command(calibrations.export, run_export, retired={"--level": LEVELED}, shared=[QUIET])
 COMPARE = Command(sensors.compare, writes=outputs.COMPARISON)
 HISTORY = Command(sensors.history, writes=outputs.HISTORY)
 PLAN = Command(

@@ -9,65 +9,128 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, wraps
+from importlib import import_module
 from os import PathLike
+from pathlib import Path
 from textwrap import fill
 from typing import Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
+
+import click
+from click.shell_completion import CompletionItem
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError, key, shown
 from accelstudy.basics.given import each, of_type, path_of, quantity, whole
+from accelstudy.basics.names import check_file_name
 from accelstudy.basics.units import Given, unit_label
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What a keyword may be.
+class Kind(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5 on
+    """What a keyword may be; a command takes any text for it, which the verb reads.
 
-    Attributes
+    Parameters
     ----------
     read : function of the name of a keyword and of what was given, which returns what the verb
         works with, and raises `InputError` if it is wrong
-    type : str, in a docstring
-    metavar : str, in the help of a command
+    doc_type : str, its type in a docstring
+    name : str, in the help of a command
     """
 
-    read: Callable[[str, Any], Any]
-    type: str = "str"
-    metavar: str = "text"
+    def __init__(
+        self, read: Callable[[str, Any], Any], doc_type: str = "str", name: str = "text"
+    ) -> None:
+        self.read, self.doc_type, self.name = read, doc_type, name
 
 
-@dataclass(frozen=True)
-class Names:
+class Names(Kind):
     """A name that a registry knows; whether there is such a thing, the registry says.
 
-    Attributes
+    Parameters
     ----------
-    metavar : str, what is named
+    name : str, what is named
     module, names : str, where the names are: a collection, or a function that returns one
     files : bool, whether a file may stand for a name
     parts : Names, optional, what may be joined to a name by +
     """
 
-    metavar: str
-    module: str
-    names: str
-    files: bool = False
-    parts: Names | None = None
-    type = "str"
+    def __init__(
+        self, name: str, module: str, names: str, files: bool = False, parts: Names | None = None
+    ) -> None:
+        super().__init__(self._read, name=name)
+        self.place, self.files, self.parts = (module, names), files, parts
 
-    def read(self, name: str, value: Any) -> str:
+    def _read(self, name: str, value: Any) -> str:
         """Name, or path of a file as text."""
-        article, what = "an" if self.metavar[0] in "aeiou" else "a", self.metavar.replace("_", " ")
+        article, what = "an" if self.name[0] in "aeiou" else "a", self.name.replace("_", " ")
         value = str(value) if self.files and isinstance(value, PathLike) else value
         of_type(name, value, str, expected=f"the name of {article} {what}")
         return str(value)
+
+    def known(self) -> Iterable[str]:
+        """Names that there are."""
+        module, names = self.place
+        known = getattr(import_module(module), names)
+        return known() if callable(known) else known
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Names that begin with what was typed; files, if none does."""
+        before, plus, last = incomplete.rpartition("+" if self.parts else "\0")
+        known = [*self.known(), *(self.parts.known() if plus and self.parts else ())]
+        items = [CompletionItem(f"{before}{plus}{one}") for one in known if one.startswith(last)]
+        return items or ([CompletionItem(incomplete, type="file")] if self.files else [])
+
+
+class Whole(click.IntRange):
+    """A whole number, whose range stands in the help of a command; the verb checks it."""
+
+    doc_type = "int"
+
+    def __init__(self, allowed: Range) -> None:
+        super().__init__(int(allowed.least), int(allowed.most) if allowed.most <= 1e6 else None)
+        self.allowed = allowed
+
+    def read(self, name: str, value: Any) -> int:
+        """Whole number within the range."""
+        return whole(name, value, self.allowed)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or what is none."""
+        try:
+            return int(value)
+        except ValueError:
+            return value
+
+
+class FilePath(click.Path):
+    """A path that a file can have."""
+
+    doc_type = "path"
+    read = staticmethod(path_of)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Check the name."""
+        check_file_name(value)
+        return super().convert(value, param, ctx)
+
+
+def kind_of(said: Any) -> Any:
+    """Kind that stands in an annotation; a `Range` is one of whole numbers, `Given` a quantity."""
+    if isinstance(said, Range):
+        return Whole(said)
+    if not isinstance(said, Given):
+        return said
+    unit = unit_label(said.unit)
+    words = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
+    return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
 
 
 def _text(name: str, value: Any) -> str:
@@ -150,7 +213,7 @@ RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
 """Keywords of earlier versions, and what takes their place."""
 
 TEXT, FLAG, NUMBER = Kind(_text), Kind(_flag, "bool"), Kind(_number, "float or str")
-PATH = Kind(path_of, "path", "path")
+PATH = FilePath(path_type=Path)
 SHARE_OR_RMS = Kind(_share, "float or str", "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
 File = Annotated[str | PathLike[str], PATH]
@@ -240,7 +303,7 @@ class Keyword:
     Attributes
     ----------
     name : str
-    kind : what checks it: a quantity, a range of whole numbers, names or another kind
+    kind : Kind, or a type of click with the same attributes
     many : bool, whether it takes several
     ends : bool, whether it takes two values of its kind
     default : of the signature; `inspect.Parameter.empty` if it must be given
@@ -249,7 +312,7 @@ class Keyword:
     """
 
     name: str
-    kind: Given | Range | Names | Kind
+    kind: Kind | Whole | FilePath
     many: bool
     ends: bool
     default: Any
@@ -259,20 +322,14 @@ class Keyword:
     @classmethod
     def of(cls, function: Callable[..., Any], parameter: inspect.Parameter) -> Keyword:
         """Keyword of a parameter, with the kind of its annotation; without one it is a text."""
-        said = parameter.annotation
+        said, default = parameter.annotation, parameter.default
         # Not by `get_type_hints`, which takes all parameters: that of a positional one may name a
         # result, which is not imported for a help text.
         hint = eval(said, getattr(inspect.unwrap(function), "__globals__", {}))
         kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
-        return cls(
-            parameter.name,
-            kind,
-            "Sequence" in said,
-            said.startswith("tuple"),
-            parameter.default,
-            parameter.default is None or "None" in said,
-            "".join(meaning),
-        )
+        many, ends = "Sequence" in said, said.startswith("tuple")
+        optional = default is None or "None" in said
+        return cls(parameter.name, kind_of(kind), many, ends, default, optional, "".join(meaning))
 
     @property
     def option(self) -> str:
@@ -282,30 +339,19 @@ class Keyword:
     @property
     def type(self) -> str:
         """Type in words, as a docstring has it."""
-        word = "int" if isinstance(self.kind, Range) else getattr(self.kind, "type", "")
-        if isinstance(self.kind, Given):
-            unit = unit_label(self.kind.unit)
-            word = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
+        word = self.kind.doc_type
         return f"{word}, or several" if self.many else f"two of {word}" if self.ends else word
 
     def check(self, value: Any) -> Any:
         """Value as the verb works with it, quantities in SI; raises `InputError` if it is wrong."""
-        if self.optional and (value is None or (isinstance(self.kind, Given) and value == "none")):
+        if self.optional and (value is None or (self.kind.name == "quantity" and value == "none")):
             return None
         if not (self.many or self.ends):
-            return self._one(value)
+            return self.kind.read(key(self.name), value)
         values = each(value)
         if self.ends and len(values) != 2:
             raise InputError(f"{key(self.name)}: expected two values, not {shown(value)}")
-        return tuple(map(self._one, values))
-
-    def _one(self, value: Any) -> Any:
-        match self.kind:
-            case Given():
-                return quantity(key(self.name), value, self.kind)
-            case Range():
-                return whole(key(self.name), value, self.kind)
-        return self.kind.read(key(self.name), value)
+        return tuple(self.kind.read(key(self.name), one) for one in values)
 
 
 def _metadata(hint: Any) -> tuple[Any, ...]:
