@@ -6,100 +6,64 @@ What a program needs stands here, and is imported when it is first asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from accelstudy.api.advice import SessionAdvice
-    from accelstudy.api.calibrations import Calibration
-    from accelstudy.api.catalogues import catalogue
-    from accelstudy.api.designs import Design
-    from accelstudy.api.diagnoses import Diagnosis
-    from accelstudy.api.logs import Log
-    from accelstudy.api.lots import Lot
-    from accelstudy.api.plans import Plan
-    from accelstudy.api.simulations import Simulation
-    from accelstudy.basics.errors import InputError
-    from accelstudy.campaign.session import Campaign
-    from accelstudy.epochs.output import Comparison, History
-    from accelstudy.study.run import run_study
-    from accelstudy.verbs.calibrations import (
-        apply,
-        calibrate,
-        check_sigmas,
-        diagnose,
-        export,
-        read_calibration,
-    )
-    from accelstudy.verbs.campaigns import (
-        find_holds,
-        read_campaign,
-        read_log,
-        simulate_campaign,
-        write_campaign,
-    )
-    from accelstudy.verbs.planning import advise, data_sheet, find_positions, plan, simulate
-    from accelstudy.verbs.sensors import compare, history, lot
+if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it is for users
+    from accelstudy.api.advice import SessionAdvice as SessionAdvice
+    from accelstudy.api.calibrations import Calibration as Calibration
+    from accelstudy.api.catalogues import catalogue as catalogue
+    from accelstudy.api.designs import Design as Design
+    from accelstudy.api.diagnoses import Diagnosis as Diagnosis
+    from accelstudy.api.logs import Log as Log
+    from accelstudy.api.lots import Lot as Lot
+    from accelstudy.api.plans import Plan as Plan
+    from accelstudy.api.simulations import Simulation as Simulation
+    from accelstudy.basics.errors import InputError as InputError
+    from accelstudy.campaign.session import Campaign as Campaign
+    from accelstudy.epochs.output import Comparison as Comparison
+    from accelstudy.epochs.output import History as History
+    from accelstudy.study.run import run_study as run_study
+    from accelstudy.verbs.calibrations import apply as apply
+    from accelstudy.verbs.calibrations import calibrate as calibrate
+    from accelstudy.verbs.calibrations import check_sigmas as check_sigmas
+    from accelstudy.verbs.calibrations import diagnose as diagnose
+    from accelstudy.verbs.calibrations import export as export
+    from accelstudy.verbs.calibrations import read_calibration as read_calibration
+    from accelstudy.verbs.campaigns import find_holds as find_holds
+    from accelstudy.verbs.campaigns import read_campaign as read_campaign
+    from accelstudy.verbs.campaigns import read_log as read_log
+    from accelstudy.verbs.campaigns import simulate_campaign as simulate_campaign
+    from accelstudy.verbs.campaigns import write_campaign as write_campaign
+    from accelstudy.verbs.planning import advise as advise
+    from accelstudy.verbs.planning import data_sheet as data_sheet
+    from accelstudy.verbs.planning import find_positions as find_positions
+    from accelstudy.verbs.planning import plan as plan
+    from accelstudy.verbs.planning import simulate as simulate
+    from accelstudy.verbs.sensors import compare as compare
+    from accelstudy.verbs.sensors import history as history
+    from accelstudy.verbs.sensors import lot as lot
 
     __version__: str
 
-_PLACES = {
-    "api.advice": ("SessionAdvice",),
-    "api.calibrations": ("Calibration",),
-    "api.catalogues": ("catalogue",),
-    "api.designs": ("Design",),
-    "api.diagnoses": ("Diagnosis",),
-    "api.logs": ("Log",),
-    "api.lots": ("Lot",),
-    "api.plans": ("Plan",),
-    "api.simulations": ("Simulation",),
-    "basics.errors": ("InputError",),
-    "campaign.session": ("Campaign",),
-    "epochs.output": ("Comparison", "History"),
-    "study.run": ("run_study",),
-    "verbs.calibrations": (
-        *("apply", "calibrate", "check_sigmas", "diagnose", "export", "read_calibration"),
-    ),
-    "verbs.campaigns": (
-        *("find_holds", "read_campaign", "read_log", "simulate_campaign", "write_campaign"),
-    ),
-    "verbs.planning": ("advise", "data_sheet", "find_positions", "plan", "simulate"),
-    "verbs.sensors": ("compare", "history", "lot"),
+_NAMES = {
+    "api.advice": "SessionAdvice",
+    "api.calibrations": "Calibration",
+    "api.catalogues": "catalogue",
+    "api.designs": "Design",
+    "api.diagnoses": "Diagnosis",
+    "api.logs": "Log",
+    "api.lots": "Lot",
+    "api.plans": "Plan",
+    "api.simulations": "Simulation",
+    "basics.errors": "InputError",
+    "campaign.session": "Campaign",
+    "epochs.output": "Comparison History",
+    "study.run": "run_study",
+    "verbs.calibrations": "apply calibrate check_sigmas diagnose export read_calibration",
+    "verbs.campaigns": "find_holds read_campaign read_log simulate_campaign write_campaign",
+    "verbs.planning": "advise data_sheet find_positions plan simulate",
+    "verbs.sensors": "compare history lot",
 }
-_MODULES = {name: module for module, names in _PLACES.items() for name in names}
-
-__all__ = [
-    "Calibration",
-    "Campaign",
-    "Comparison",
-    "Design",
-    "Diagnosis",
-    "History",
-    "InputError",
-    "Log",
-    "Lot",
-    "Plan",
-    "SessionAdvice",
-    "Simulation",
-    "advise",
-    "apply",
-    "calibrate",
-    "catalogue",
-    "check_sigmas",
-    "compare",
-    "data_sheet",
-    "diagnose",
-    "export",
-    "find_holds",
-    "find_positions",
-    "history",
-    "lot",
-    "plan",
-    "read_calibration",
-    "read_campaign",
-    "read_log",
-    "run_study",
-    "simulate",
-    "simulate_campaign",
-    "write_campaign",
-]
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_MODULES)
 
 
 def __getattr__(name: str) -> object:

@@ -10,10 +10,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
-from accelstudy.api.calibrations import Calibration, place_of, resolve
+from accelstudy.api.calibrations import Calibration
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
-from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.report import document
 from accelstudy.diagnosis.report.figures import draw_explanations
@@ -44,14 +43,6 @@ class Diagnosis(Result):
         self.name = result.campaign.name
         self.source = Path("CAMPAIGN") if source is None else source
         self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
-
-    @classmethod
-    def of(cls, campaign: Any, *, seed: int, replicates: int, **names: Any) -> Diagnosis:
-        """Diagnose by the keywords of `accelstudy.diagnose`, checked."""
-        # The diagnosis, not the reader, looks for wrong units and axes.
-        given = resolve(campaign, **names, plausible=False)
-        with stage("search for what is missing"):
-            return cls(pipeline.diagnose(*given, seed=seed), seed, replicates, place_of(campaign))
 
     @cached_property
     def content(self) -> dict[str, Any]:

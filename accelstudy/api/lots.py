@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,14 +9,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import Calibration, as_campaign, chosen
+from accelstudy.api.calibrations import Calibration
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.given import check_once
 from accelstudy.basics.progress import say, show
 from accelstudy.files.outputs import LOT
 from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.output import draw_sensors, lot_document, write_lot
-from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
 from accelstudy.pages.result import Result
 
 
@@ -33,15 +30,6 @@ class Lot(Result):
 
     def __init__(self, report: CalibratedLot) -> None:
         self.report, self.name = report, f"{len(report.lot.sensors)} sensors"
-
-    @classmethod
-    def of(cls, campaigns: Sequence[Any], *, seed: int, cores: int, **names: Any) -> Lot:
-        """Judge a lot by the keywords of `accelstudy.lot`, checked."""
-        check_once(campaigns, "sensor")
-        if len(campaigns) < MIN_SENSORS:
-            raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
-        measured = [as_campaign(one) for one in campaigns]
-        return cls(evaluate_lot(measured, *chosen(**names), seed, cores))
 
     @cached_property
     def content(self) -> dict[str, Any]:

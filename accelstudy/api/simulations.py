@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf
@@ -34,6 +34,12 @@ from accelstudy.study.tables import tables_of
 if TYPE_CHECKING:
     import xarray as xr
 
+GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
+    "model": ("models", get_model),
+    "scheme": ("schemes", get_scheme),
+    "approach": ("approaches", get_approach),
+}
+"""What there may be several of: its key in a grid of a study, and what a name stands for."""
 LEVELING = LevelingConfig().model_dump()
 """Where the tilt error is evaluated, as in a study by default."""
 
@@ -68,32 +74,20 @@ class Simulation(Result):
         **names: Any,
     ) -> Simulation:
         """Simulate every combination of models, schemes and approaches of `accelstudy.simulate`."""
-        chosen = {}
-        for name, get in (("model", get_model), ("scheme", get_scheme), ("approach", get_approach)):
+        grid: dict[str, Any] = {"sensor_sigma_mps2": [*map(tidy, sigma)], "replicates": replicates}
+        for name, (several, get) in GRID.items():
             for one in each(names[name]):
                 of_type(name, one, str, expected="a name, or several")
-            chosen[name] = [get(one).name for one in each(names[name])]
-        for name, values in {**chosen, "sigma": sigma}.items():
-            if not values:
+            grid[several] = [get(one).name for one in each(names[name])]
+        for name, given in {**names, "sigma": sigma}.items():
+            if not each(given):
                 raise InputError(f"{name}: none is given")
         noise = {
-            "sensor": {"sigma_mps2": tidy(sigma[0])},
+            "sensor": {"sigma_mps2": grid["sensor_sigma_mps2"][0]},
             "robot": {"sigma_mgon": tidy(robot_sigma / MGON)},
         }
-        grid = {
-            "models": chosen["model"],
-            "schemes": chosen["scheme"],
-            "approaches": chosen["approach"],
-            "sensor_sigma_mps2": [*map(tidy, sigma)],
-            "replicates": replicates,
-        }
-        content = {
-            "study": "python",
-            "seed": seed,
-            "gravity_mps2": tidy(gravity),
-            "noise": noise,
-            "grids": [grid],
-        }
+        content = {"study": "python", "seed": seed, "gravity_mps2": tidy(gravity)}
+        content |= {"noise": noise, "grids": [grid]}
         cells = _with_truth(parse_study(content, "simulate").cells, truth)
         if not any(cell.estimability.estimable for cell in cells):
             raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
@@ -195,6 +189,14 @@ class Simulation(Result):
         table.attrs["units"] = dict.fromkeys(table, "rad")
         return table
 
+    def _joined(self, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+        """Table of all cells, whose last column is its index; of several, their names are, too."""
+        tables = [pd.DataFrame(one) for one in rows]
+        tables = [table.set_index(table.columns[-1]) for table in tables]
+        if len(tables) == 1:
+            return tables[0]
+        return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
+
     @cached_property
     def estimates(self) -> xr.Dataset:
         """Every calibration, SI: an `xarray.Dataset` of cell × replicate × parameter.
@@ -205,55 +207,41 @@ class Simulation(Result):
         """
         import xarray as xr
 
-        units = {name: u for cell in self.cells for name, u in cell.parameter_units.items()}
-        count = max(cell.replicates for cell in self.cells)
-        whole = {"replicate": np.arange(1, count + 1), "parameter": [*units]}
-        parts = [_estimates_of(one).reindex(whole) for one in self.statistics]
-        sigmas = [cell.noise.sigma_force for cell in self.cells]
-        set_up = {
-            key: ("cell", [getattr(cell, key) for cell in self.cells])
-            for key in ("model", "scheme", "approach")
-        }
-        return xr.concat(parts, "cell").assign_coords(
+        cells, count = self.cells, max(cell.replicates for cell in self.cells)
+        units = {name: u for cell in cells for name, u in cell.parameter_units.items()}
+        truth = np.full((len(cells), len(units)), np.nan)
+        estimate, sigma = np.full((2, len(cells), count, len(units)), np.nan)
+        tilt = np.full((len(cells), count, len(ANGLES)), np.nan)
+        for i, one in enumerate(self.statistics):
+            own = [[*units].index(name) for name in one.cell.parameter_units]
+            truth[i, own] = one.cell.true_values
+            if one.replicates is not None:
+                block = one.replicates.simulated
+                rows = np.flatnonzero(block.converged)
+                of_tilt = of_cells.cell_tilt_error(one.cell, LEVELING)
+                numbers = of_cells.calibrations(one.cell, block, of_tilt)
+                estimate[i, rows[:, None], own] = block.estimates[rows]
+                sigma[i, rows[:, None], own] = numbers["sigma_posteriori"]
+                tilt[i, rows] = numbers["tilt"][:, : len(ANGLES)]
+        each, noted = ("cell", "replicate", "parameter"), {"units": "SI, as `unit` says"}
+        set_up = ("model", "scheme", "approach")
+        return xr.Dataset(
             {
-                "cell": [cell.name for cell in self.cells],
+                "estimate": (each, estimate, noted),
+                "sigma": (each, sigma, noted),
+                "truth": (("cell", "parameter"), truth, noted),
+                "tilt": (("cell", "replicate", "angle"), tilt, {"units": "rad"}),
+            },
+            {
+                "cell": [cell.name for cell in cells],
+                "replicate": np.arange(1, count + 1),
+                "parameter": [*units],
                 "unit": ("parameter", [*units.values()]),
-                **set_up,
-                "sensor_sigma": ("cell", sigmas, {"units": "m/s^2"}),
-            }
+                "angle": [*ANGLES],
+                **{key: ("cell", [getattr(cell, key) for cell in cells]) for key in set_up},
+                "sensor_sigma": ("cell", [c.noise.sigma_force for c in cells], {"units": "m/s^2"}),
+            },
         )
-
-    def _joined(self, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
-        """Table of all cells, whose last column is its index; of several, their names are, too."""
-        tables = [pd.DataFrame(one) for one in rows]
-        tables = [table.set_index(table.columns[-1]) for table in tables]
-        if len(tables) == 1:
-            return tables[0]
-        return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
-
-
-def _estimates_of(one: CellStatistics) -> xr.Dataset:
-    """Calibrations of a cell that converged, by the number of the replicate."""
-    import xarray as xr
-
-    cell, names = one.cell, [*one.cell.parameter_units]
-    rows, estimate = np.zeros(0, int), np.zeros((0, len(names)))
-    sigma, tilt = estimate, np.zeros((0, len(ANGLES)))
-    if one.replicates is not None:
-        block = one.replicates.simulated
-        rows = np.flatnonzero(block.converged)
-        numbers = of_cells.calibrations(cell, block, of_cells.cell_tilt_error(cell, LEVELING))
-        estimate, sigma, tilt = block.estimates[rows], numbers["sigma_posteriori"], numbers["tilt"]
-    each, noted = ("replicate", "parameter"), {"units": "SI, as `unit` says"}
-    return xr.Dataset(
-        {
-            "estimate": (each, estimate, noted),
-            "sigma": (each, sigma, noted),
-            "truth": ("parameter", cell.true_values, noted),
-            "tilt": (("replicate", "angle"), tilt[:, : len(ANGLES)], {"units": "rad"}),
-        },
-        {"replicate": rows + 1, "parameter": names, "angle": [*ANGLES]},
-    )
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:

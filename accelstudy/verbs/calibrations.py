@@ -6,6 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.basics.bounds import SIGMA_READING, TIME, Range
+from accelstudy.basics.progress import stage
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Quantity, si, verb
 
@@ -243,7 +244,12 @@ def diagnose(
     --------
         accelstudy diagnose my-campaign --out diagnosed
     """
-    given = {**locals()}
+    from accelstudy.api.calibrations import place_of, resolve
     from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.diagnosis import pipeline
 
-    return Diagnosis.of(**given)
+    # The diagnosis, not the reader, looks for wrong units and axes.
+    given = resolve(campaign, model, approach, prior, plausible=False)
+    with stage("search for what is missing"):
+        result = pipeline.diagnose(*given, seed=seed)
+    return Diagnosis(result, seed, replicates, place_of(campaign))

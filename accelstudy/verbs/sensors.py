@@ -159,11 +159,16 @@ def lot(
     --------
         accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
-    given = {**locals()}
+    from accelstudy.api.calibrations import as_campaign, chosen
     from accelstudy.api.lots import Lot
+    from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
 
-    folders = [one for each in campaigns for one in folders_of(each)]
-    return Lot.of(**{**given, "campaigns": folders})
+    given = [one for each in campaigns for one in folders_of(each)]
+    check_once(given, "sensor")
+    if len(given) < MIN_SENSORS:
+        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+    measured = [as_campaign(one) for one in given]
+    return Lot(evaluate_lot(measured, *chosen(model, approach), seed, cores))
 
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
