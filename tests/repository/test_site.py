@@ -107,6 +107,7 @@ def test_each_key_and_column_of_a_calibration_is_described():
         said = [error.message for error in schema.iter_errors(json.loads(json_text(content)))]
         assert said == [], name
     advice = accelstudy.advise(campaign, tilt_accuracy="1gon", model="bias-scale")
+    simulation = accelstudy.simulate("bias", ["faces-6", "mclaren-24"], "robot", sigma=1e-3).content
     assert described("file-formats") == {
         "positions.csv": [],
         "positions.parquet": list(assessed_positions(assessment)),
@@ -114,9 +115,14 @@ def test_each_key_and_column_of_a_calibration_is_described():
         "calibration.params": ANY,
         "history.parquet": list(history.values),
         "advice.json": list(advice.content),
+        "simulation.json": list(simulation),
         "campaigns.parquet": list(CAMPAIGN_COLUMNS),
         "parameters.parquet": list(PARAMETER_COLUMNS),
     }
+    page = (ROOT / "docs/reference/file-formats.md").read_text(encoding="utf-8")
+    section = page.partition("`simulation.json`")[2].partition("\n## ")[0]
+    rows = [one for key in ("parameters", "tilt") for one in simulation[key][0]]
+    assert {*rows} - {"angle"} <= {*re.findall(r"`(\w+)`", section)}
 
 
 def test_each_name_of_an_exported_calibration_is_described():
