@@ -13,29 +13,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Undefined
 
+from accelstudy.basics import units, wording
 from accelstudy.basics.progress import failure
-from accelstudy.basics.units import (
-    GON,
-    MGON,
-    angle_note,
-    attitude_unit,
-    display_unit,
-    shown_unit,
-    to_attitude,
-)
-from accelstudy.basics.wording import (
-    amount,
-    comma_list,
-    counted,
-    estimate,
-    interval,
-    number,
-    p_value,
-    probability,
-    quantity_text,
-    short_list,
-    words,
-)
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages.glossary import explained
 from accelstudy.sensors.frames import axes_note
@@ -65,6 +44,8 @@ BADGES = {
     "not decided": ("? not decided", "open"),
 }
 """Word and colour class of each verdict; none rests on the colour alone."""
+WORDS = ("amount", "counted", "number", "p_value", "short_list", "words")
+"""Functions of `accelstudy.basics.wording` that templates use as filters of the same name."""
 
 
 def render(template: str, **content: Any) -> str:
@@ -80,12 +61,12 @@ def render(template: str, **content: Any) -> str:
     content : what the template shows. `next_steps`, pairs of what for and a command, stand at the
         end of the page
     """
-    units = {
-        "angle_unit": display_unit("rad"),
-        "attitude_unit": attitude_unit(),
-        "angle_note": angle_note(),
+    of_angles = {
+        "angle_unit": units.display_unit("rad"),
+        "attitude_unit": units.attitude_unit(),
+        "angle_note": units.angle_note(),
     }
-    page = explained(_environment(True).get_template(template).render({**units, **content}))
+    page = explained(_environment(True).get_template(template).render(of_angles | content))
     return _CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode("ascii"), page)
 
 
@@ -143,26 +124,21 @@ def _environment(markup: bool) -> Environment:
         undefined=Undefined if markup else StrictUndefined,
     )
     environment.filters.update(
-        angle=lambda mgon: amount(mgon * MGON, "rad"),
+        {name: getattr(wording, name) for name in WORDS},
+        angle=lambda mgon: wording.amount(mgon * units.MGON, "rad"),
+        attitude=lambda gon: units.to_attitude(gon * units.GON).item(),
         axes=axes_note,
-        attitude=lambda gon: to_attitude(gon * GON).item(),
         badge=lambda verdict: BADGES[verdict][0],
         colour=lambda verdict: BADGES[verdict][1],
-        amount=amount,
-        comma_list=lambda items, last="and": comma_list(list(items), last),
-        counted=counted,
+        comma_list=lambda items, last="and": wording.comma_list(list(items), last),
         each=lambda items, function: [function(item) for item in items],
-        number=number,
-        p=probability,
-        p_value=p_value,
-        quantity=quantity_text,
-        short_list=short_list,
-        words=words,
+        p=wording.probability,
+        quantity=wording.quantity_text,
     )
     environment.globals.update(
-        amount=amount,
-        estimate=estimate,
-        interval=interval,
-        unit=shown_unit,
+        amount=wording.amount,
+        estimate=wording.estimate,
+        interval=wording.interval,
+        unit=units.shown_unit,
     )
     return environment

@@ -16,7 +16,6 @@ TERMS = {
     "control variate": "a number whose mean is known, drawn with the same noise as one whose mean "
     "is wanted; only their difference is left to chance",
     "credible set": "the most probable explanations, as many as it takes for a probability of 0.9",
-    "excess χ²": "sum of the squared residuals beyond what the noise explains",
     "family": "effects that act alike and are easily confused",
     "global test": "whether the residuals together are as large as the stated noise says (χ² test "
     "of the whole model)",
@@ -54,7 +53,6 @@ FORMS = {
     "redundant": "redundancy",
     "residuals": "residual",
     "signatures": "signature",
-    "variances of unit weight": "variance of unit weight",
 }
 """Other forms of the terms."""
 
