@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.api.logs import Log, keys_of, log_of, names_of
+from accelstudy.api.logs import Log, keys_of, log_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.given import each, path_of
 from accelstudy.basics.names import natural
@@ -79,11 +79,9 @@ def settings_of(
     given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
 ) -> ImportSettings:
     """Settings of a file, overlaid with those that were given as keywords."""
-    path = given["settings"]
-    own = {name: value for name, value in given.items() if name not in (*OTHERS, "range")}
-    own = {name: value for name, value in own.items() if value is not False}
-    own["sensors"] = sensors or None
-    names, content = names_of(own), keys_of(own)
+    path, apart = given["settings"], (*OTHERS, "range")
+    own = {name: value for name, value in given.items() if name not in apart and value is not False}
+    content, names = keys_of({**own, "sensors": sensors or None})
     settings = read_settings(path, content, names)
     if given.get("range") is None:
         return settings

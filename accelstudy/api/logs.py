@@ -49,9 +49,14 @@ class Log:
         return notebook_html("Log", self.name, given)
 
 
-def open_log(log: Any, given: Mapping[str, Any]) -> Log:
-    """Return a log, which is looked at, with the keywords that say how it is read."""
+def log_of(log: Any, given: Mapping[str, Any]) -> Log:
+    """Return a log, which is looked at, with the keywords that say how it is read.
+
+    They go before what a `Log` has already.
+    """
     layout = layout_of(given)
+    if isinstance(log, Log):
+        return replace(log, layout=log.layout | layout)
     if not isinstance(log, pd.DataFrame):
         path = path_of("log", log, "a path or a DataFrame")
         open_source(path, layout.get("variable"), layout.get("delimiter"))
@@ -79,19 +84,11 @@ def _with_time(log: pd.DataFrame, given: dict[str, Any]) -> tuple[pd.DataFrame, 
     return log.assign(**{name: times}), {**given, "time": name}
 
 
-def log_of(log: Any, given: Mapping[str, Any] | None = None) -> Log:
-    """Return a log as such, whatever way it was given; keywords go before its own."""
-    if not isinstance(log, Log):
-        return open_log(log, given or {})
-    return replace(log, layout=log.layout | layout_of(given or {}))
-
-
 def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a layout that keywords say, checked; other keywords do not count."""
     fields = LogLayout.model_fields
-    given = {name: given[name] for name in given if KEYS.get(name, name) in fields}
-    layout = checked(LogLayout, keys_of(given), "log", names=names_of(given))
-    return layout.model_dump(exclude_unset=True)
+    content, names = keys_of({k: given[k] for k in given if KEYS.get(k, k) in fields})
+    return checked(LogLayout, content, "log", names=names).model_dump(exclude_unset=True)
 
 
 KEYS = {
@@ -108,20 +105,17 @@ KEYS = {
 """Keywords whose keys in a file have other names, of which some say a unit."""
 
 
-def keys_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of a file of settings that says the same as keywords."""
+def keys_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Content of a file of settings that says the same as keywords; its keys, and their names."""
     content: dict[str, Any] = {}
+    names = {}
     for name, value in given.items():
         if value is None or value == ():
             continue
-        if name == "robot_sigma":
-            value = tidy(value / MGON)
-        block, _, inner = KEYS.get(name, name).rpartition(".")
+        place = KEYS.get(name, name)
+        names[place] = key(name)
+        block, _, inner = place.rpartition(".")
         part = content.setdefault(block, {}) if block else content
+        value = tidy(value / MGON) if name == "robot_sigma" else value
         part[inner] = list(value) if isinstance(value, tuple) else value
-    return content
-
-
-def names_of(given: Mapping[str, Any]) -> dict[str, str]:
-    """Keys of keywords that are given, and what their user calls them."""
-    return {KEYS.get(name, name): key(name) for name, value in given.items() if value is not None}
+    return content, names

@@ -19,7 +19,6 @@ from accelstudy.pages.result import Result
 from accelstudy.planning import question, wording
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.output import plan_files, plan_table
-from accelstudy.planning.quantities import EQUIPMENT
 from accelstudy.planning.question import Equipment, Question
 
 if TYPE_CHECKING:
@@ -45,29 +44,29 @@ class Plan(Result):
     @classmethod
     def of(cls, **given: Any) -> Plan:
         """Plan by the keywords of `accelstudy.plan`, checked."""
-        sensor, sigma, history = given["sensor"], given["sigma"], given["history"]
-        equipment, max_time = given["equipment"], given["max_time"]
-        if equipment not in EQUIPMENT:
-            raise UnknownNameError("equipment", equipment, EQUIPMENT)
+        sensor, sigma, max_time = given["sensor"], given["sigma"], given["max_time"]
+        by_hand = Equipment("gravity", given["moving_time"], 0.0)
+        robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
+        equipment = {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}
+        if given["equipment"] not in equipment:
+            raise UnknownNameError("equipment", given["equipment"], equipment)
         if (sensor is None) == (sigma is None):
             both = ", not both" if sensor else ""
             raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
         sheet = question.get_sensor(sensor) if sigma is None else of_sigma(sigma)
-        by_hand = Equipment("gravity", given["moving_time"], 0.0)
-        robot = Equipment("robot", given["robot_moving_time"], given["robot_setup_time"])
         beside = None
         if given["reference"] is not None:
             planned = question.planned_reference(str(given["reference"]), sheet)
             beside = Equipment("reference", by_hand.moving, question.MOUNTING, planned)
-        if history is not None:
+        if given["history"] is not None:
             from accelstudy.data_sheets.measured import with_history  # slow to import
 
-            sheet = with_history(sheet, history)
+            sheet = with_history(sheet, given["history"])
         asked = Question(
             given["tilt_accuracy"],
             given["tilt_range"],
             sheet,
-            {"gravity": (by_hand,), "robot": (robot,), "both": (by_hand, robot)}[equipment],
+            equipment[given["equipment"]],
             given["confidence"],
             tuple(sorted({*given["holds"]})),
             given["robot_sigma"],
@@ -131,18 +130,16 @@ class Plan(Result):
         if not self.answer.ranked:
             show(self.verdict)
             return
-        told = {
-            part: "\n".join(wording.part_lines(part, self.answer))
+        answer, how_to, reasons, assumptions = (
+            "\n".join(wording.part_lines(part, self.answer))
             for part in ("answer", "how_to", "reasons", "assumptions")
-        }
-        show(f"{told['answer']}\n\n{told['how_to']}")
-        say("\n".join(["", *wording.table_lines(self.answer), "", told["reasons"]]))
-        say(f"\n{told['assumptions']}")
+        )
+        show(f"{answer}\n\n{how_to}")
+        say("\n".join(["", *wording.table_lines(self.answer), "", reasons]))
+        say(f"\n{assumptions}\n")
         if place is None:
-            say(
-                "\n--out FOLDER keeps the table, the figure, and a study that makes the numbers "
-                "again."
-            )
-            return
-        say(f"\nplan, table and figure: {place}")
-        say(f"the same numbers again: {study_again(place / 'study.yaml')}")
+            study = "a study that makes the numbers again"
+            say(f"--out FOLDER keeps the table, the figure, and {study}.")
+        else:
+            say(f"plan, table and figure: {place}")
+            say(f"the same numbers again: {study_again(place / 'study.yaml')}")

@@ -6,7 +6,6 @@ from accelstudy.basics.units import GON, MGON, Given
 
 DAY = 86400.0
 
-EQUIPMENT = ("gravity", "robot", "both")
 MOST_POSITIONS = (4, 400)
 REPLICATES = (20, 1_000_000)
 """From how many to how many positions may be the most, and candidates may be simulated."""

@@ -54,10 +54,10 @@ def read_log(
     InputError
         If there is no such file, or a value is wrong.
     """
-    layout = {**locals()}
-    from accelstudy.api.logs import open_log
+    given = {**locals()}
+    from accelstudy.api.logs import log_of
 
-    return open_log(layout.pop("log"), layout)
+    return log_of(log, given)
 
 
 @verb
