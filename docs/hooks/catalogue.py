@@ -6,6 +6,7 @@ import re
 
 from markdown_text import code, page, plain, table
 
+import accelstudy
 from accelstudy.api.catalogues import plain as number
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
@@ -16,17 +17,16 @@ from accelstudy.data_sheets.sheet import QUANTITIES
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
-from accelstudy.sensors.models import MODELS, PRESETS, compose, get_model
-from accelstudy.simulation.hold_plan import PROVIDES
+from accelstudy.sensors.models import MODELS, PRESETS, get_model
 
 
 def _unit(unit):
     return "" if unit == "1" else unit_label(unit)
 
 
-def _equation(text):
+def _equation(thing):
     """An equation as it is printed, with its indices set low."""
-    return re.sub(r"_([^\W_²³]+(?:,\w)?)", r"<sub>\1</sub>", text.replace("<", "&lt;"))
+    return re.sub(r"_([^\W_²³]+(?:,\w)?)", r"<sub>\1</sub>", thing.equation.replace("<", "&lt;"))
 
 
 def _entry(thing, facts):
@@ -46,31 +46,27 @@ def _entry(thing, facts):
     )
 
 
-def _of_part(part):
-    return [e for e in map(get_effect, effect_names()) if e.part == part]
-
-
 def effects(part):
     """Effects of a part, sensor or rig, one a line."""
     rows = [
-        (f"[`{e.name}`](#{e.name})", _equation(e.equation), len(e.parameters), e.family)
-        for e in _of_part(part)
+        (f"[`{e.name}`](#{e.name})", _equation(e), len(e.parameters), e.family)
+        for e in map(get_effect, effect_names())
+        if e.part == part
     ]
     return table(("effect", "what it adds", "parameters", "family"), rows)
 
 
 def each_effect():
-    """All effects, one after the other."""
-    parts = []
-    for effect in (*_of_part("sensor"), *_of_part("rig")):
-        unit = effect.parameters[0].unit
-        low, high = map(number, to_display(effect.typical, unit))
-        columns = compose(effect.spec, (effect.spec,)).hold_columns
+    """All effects, one after the other: those of the sensor, then those of the rig."""
+    parts, known = [], accelstudy.catalogue("effects")
+    for name, row in known.sort_values("part", ascending=False, kind="stable").iterrows():
+        effect = get_effect(name)
+        low, high = map(number, to_display(effect.typical, row["unit"]))
         facts = {
-            "Adds": _equation(effect.equation),
+            "Adds": _equation(effect),
             "Parameters": ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters),
-            "Typical size": f"{low} … {high} {unit_label(display_unit(unit))}",
-            "Needs of each hold": ", ".join(column for column in columns if column in PROVIDES),
+            "Typical size": f"{low} … {high} {unit_label(display_unit(row['unit']))}",
+            "Needs of each hold": row["needs"].replace(" and the ", ", "),
             "Family": effect.family,
         }
         parts.append(_entry(effect, facts))
@@ -84,24 +80,24 @@ def noise_effects():
         low, high = map(number, effect.typical)
         first = effect.takes[0]
         typical = f"{code(first.name)} is typically {low} … {high} {_unit(first.unit)}".strip()
-        parts.append(_entry(effect, {"Noise": _equation(effect.equation), "Typical size": typical}))
+        parts.append(_entry(effect, {"Noise": _equation(effect), "Typical size": typical}))
     return page(*parts)
 
 
 def gross_errors():
     """Gross errors."""
     errors = map(get_gross_error, gross_error_names())
-    return page(*(_entry(error, {"Data": _equation(error.equation)}) for error in errors))
+    return page(*(_entry(error, {"Data": _equation(error)}) for error in errors))
 
 
 def approaches():
     """Approaches."""
-    parts = []
-    for approach in map(get_approach, approach_names()):
-        outside = "roll and pitch" if approach.uses_angles else "none"
-        facts = {"Conditions per position": approach.n_conditions, "Angles from outside": outside}
-        parts.append(_entry(approach, facts))
-    return page(*parts)
+    outside = {True: "roll and pitch", False: "none"}
+    return page(*(
+        _entry(one, {"Conditions per position": one.n_conditions,
+                     "Angles from outside": outside[one.uses_angles]})
+        for one in map(get_approach, approach_names())
+    ))  # fmt: skip
 
 
 def models():

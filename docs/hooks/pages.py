@@ -1,56 +1,21 @@
-"""What pages take from the code, where they have a comment of its name, while the site is built."""
+"""What pages take from the code: the comment <!-- catalogue.schemes() --> gives way to its text."""
 
 import re
-from functools import partial
+from ast import literal_eval
 
 import catalogue
-import command_pages
-import configuration_page
 import drawings
 import file_formats
 import gallery
+import help_texts
 import quotes
-from markdown_text import table
+import schemas
 from mkdocs.structure.files import File
 
-from accelstudy.pages.glossary import TERMS
-
-
-def terms():
-    """The terms that reports explain."""
-    return table(("", ""), [(f"**{term}**", meaning) for term, meaning in TERMS.items()])
-
-
-PARTS = {
-    "effects of the sensor": partial(catalogue.effects, "sensor"),
-    "effects of the rig": partial(catalogue.effects, "rig"),
-    "each effect": catalogue.each_effect,
-    "noise effects": catalogue.noise_effects,
-    "gross errors": catalogue.gross_errors,
-    "models": catalogue.models,
-    "published calibrations": catalogue.presets,
-    "schemes": catalogue.schemes,
-    "families of schemes": catalogue.families,
-    "approaches": catalogue.approaches,
-    "data sheets": catalogue.data_sheets,
-    "public data": catalogue.public,
-    "commands": command_pages.commands,
-    "configuration": configuration_page.configuration,
-    "header of a campaign": file_formats.header,
-    "positions of a campaign": file_formats.positions,
-    "keys of a calibration": partial(file_formats.document, "Calibration", "calibration"),
-    "keys of a comparison": partial(file_formats.document, "Two calibrations", "comparison"),
-    "keys of a history": partial(file_formats.document, "Several calibrations", "history"),
-    "keys of a lot": partial(file_formats.document, "Lot", "lot"),
-    "keys of a type": file_formats.of_type,
-    "keys of a diagnosis": partial(file_formats.document, "Diagnosis", "diagnosis"),
-    "priors of a diagnosis": partial(file_formats.rules, priors=True),
-    "other rules of a diagnosis": partial(file_formats.rules, priors=False),
-    "claims of the paper": quotes.claims,
-    "terms": terms,
-    "figures of a study": gallery.study_figures,
-}
-PLACE = re.compile(rf"^<!-- ({'|'.join(PARTS)}) -->$", re.MULTILINE)
+MODULES = (catalogue, file_formats, gallery, help_texts, quotes, schemas)
+CALL = re.compile(
+    rf"^<!-- ({'|'.join(module.__name__ for module in MODULES)})\.(\w+)\((.*)\) -->$", re.MULTILINE
+)
 
 
 def on_files(files, config):
@@ -60,5 +25,11 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, **_):
-    """Put the parts where a page has their names, and the numbers that it quotes."""
-    return quotes.fill(PLACE.sub(lambda place: PARTS[place[1]]().strip("\n"), markdown))
+    """Put in what the code says where a page calls for it, and the numbers that the page quotes."""
+    return quotes.fill(CALL.sub(_called, markdown))
+
+
+def _called(call):
+    module, function, arguments = call.groups()
+    (module,) = (each for each in MODULES if each.__name__ == module)
+    return getattr(module, function)(*literal_eval(f"[{arguments}]")).strip("\n")

@@ -1,8 +1,8 @@
 """Numbers that pages quote from the score of the hidden effects, put in while the site is built.
 
-A page says ``{score: figure; campaigns; what}``: what was measured in the row with this figure and
-these campaigns, or with %, n, interval, oracle, oracle % or target that of it; or of an effect by
-its size, as in ``{score: found; λ = 25}``.
+A page says ``{score: figure; campaigns}`` for what was measured in the row with this figure and
+these campaigns, ``{score: figure; campaigns; %}`` for the same in percent, and n or oracle % for
+their number and what the oracle reaches; ``{score: found; λ = 25; %}`` is of an effect by its size.
 """
 
 import re
@@ -23,23 +23,19 @@ def rows(text):
         yield from (dict(zip(heads, row, strict=True)) for row in cells)
 
 
-def quoted(figure, campaigns, what="measured", score=None):
+def quoted(figure, campaigns, what="", score=None):
     """A number of the score as a sentence has it."""
     for row in rows(SCORE.read_text(encoding="utf-8") if score is None else score):
         if row.get("figure") == figure and row["campaigns"] == campaigns:
-            if what.startswith("oracle"):
-                oracle = re.search(r"oracle ([\d.]+)", row["target"])[1]
-                return percent(oracle) + " %" if what == "oracle %" else oracle
-            if what == "target":
-                return re.search(r"[\d.]+", row["target"])[0]
             if what == "n":
                 return f"{int(row['n']):,}".replace(",", " ")
-            if what == "interval":
-                low, high = map(percent, row["95 % interval"].split(" … "))
-                return f"{low} to {high} %"
-            return percent(row["measured"]) + " %" if what == "%" else row["measured"]
-        if figure in row and f"λ = {row.get('λ')}" == campaigns:
-            return percent(row[figure]) + " %" if what == "%" else row[figure]
+            oracle = what == "oracle %"
+            number = re.search(r"oracle ([\d.]+)", row["target"])[1] if oracle else row["measured"]
+        elif figure in row and f"λ = {row.get('λ')}" == campaigns:
+            number = row[figure]
+        else:
+            continue
+        return f"{Decimal(number).scaleb(2):f} %" if what.endswith("%") else number
     raise ValueError(f"{SCORE.name} has no {figure!r} of {campaigns!r}")
 
 
@@ -47,11 +43,6 @@ def claims():
     """The claims of the paper, as the golden set has them."""
     table = CLAIMS.read_text(encoding="utf-8").partition("> |")[2].partition("\n>\n")[0]
     return "|" + table.replace("\n> ", "\n")
-
-
-def percent(share):
-    """A share as a percentage with as many digits."""
-    return f"{Decimal(share).scaleb(2):f}"
 
 
 def fill(markdown):

@@ -3,80 +3,90 @@
 import json
 import math
 import re
+from pathlib import Path
+from pkgutil import resolve_name
 
+import yaml
 from markdown_text import code, page, plain, table
 
+REFERENCE = Path(__file__).parents[1] / "reference"
 HEADS = ("key", "type", "default", "meaning")
 PLAIN = {"number": "number", "integer": "integer", "string": "text", "boolean": "true or false"}
+ENDS = {
+    "minimum": "from",
+    "exclusiveMinimum": "above",
+    "maximum": "to",
+    "exclusiveMaximum": "below",
+}
 
 
-def blocks(schema, title, before=""):
-    """Describe a schema block by block, each under a heading.
+def keys(source, before=""):
+    """Describe the keys of a file block by block, each under a heading.
 
     Parameters
     ----------
-    schema : dict, JSON schema with its `$defs`
-    title : str, of the outermost block
+    source : str, a YAML file beside the page, or a model of pydantic or a function that returns its
+        schema, as ``module:name``
     before : str, what the headings begin with, so that no two of a page are alike
     """
-    known = schema.get("$defs", {})
-    parts = [f"## {title}" if title else "", _sentence(schema.get("description", ""))]
-    places = {}
+    if source.endswith(".yaml"):
+        schema = yaml.safe_load((REFERENCE / source).read_text(encoding="utf-8"))
+    else:
+        made = resolve_name(source)
+        schema = getattr(made, "model_json_schema", made)()
+    known, places = schema.get("$defs", {}), {}
 
-    def add(block, name):
+    def described(block, path):
+        """A block, and those that are first named in it."""
         rows, inner = [], []
         for key, value in block.get("properties", {}).items():
             links = []
-            text, path = _type(value, known, links), f"{before}{name}{key}"
+            text = _type(value, known, links)
             for link in links:
                 if link not in places:
-                    places[link] = path
-                    inner.append((path, known[link]))
-                text = text.replace("block", f"[block](#{_anchor(places[link])})")
-            meaning = plain(value.get("description", "")) or _about(links, known)
+                    places[link] = f"{path}{key}"
+                    inner.append(link)
+                text = text.replace("block", f"[block](#{_anchor(before + places[link])})")
+            meaning = plain(value.get("description", "")) or "".join(
+                _sentence(known[link]) for link in links[:1]
+            )
             default = _default(value, key in block.get("required", ()))
             rows.append((code(key), text, default, meaning))
-        parts.append(table(HEADS, rows))
-        for path, own in inner:
-            parts.append(f"### `{path}` {{ #{_anchor(path)} }}")
-            parts.append(_sentence(own.get("description", "")))
-            add(own, f"{path.removeprefix(before)}.")
+        yield from (_sentence(block), table(HEADS, rows))
+        for name in inner:
+            heading = before + places[name]
+            yield f"### `{heading}` {{ #{_anchor(heading)} }}"
+            yield from described(known[name], f"{places[name]}.")
 
-    add(schema, "")
-    return page(*parts)
+    return page(*described(schema, ""))
 
 
 def _anchor(path):
     return re.sub(r"[^a-z0-9]+", "-", path.lower()).strip("-")
 
 
-def _about(links, known):
-    return _sentence(known[links[0]].get("description", "")) if links else ""
-
-
-def _sentence(text):
-    for heading in ("Parameters", "Attributes"):
-        text = text.partition(f"\n\n{heading}\n")[0]
+def _sentence(block):
+    """What a block says of itself, without the sections of a docstring."""
+    text = re.split(r"\n\n(?:Parameters|Attributes)\n", block.get("description", ""))[0]
     return plain(" ".join(text.split()))
 
 
 def _default(value, required):
-    if required:
-        return "*required*"
-    if "default" not in value or isinstance(value["default"], dict):
-        return ""
-    default = value["default"]
-    return "" if default is None or default == [] else code(json.dumps(default, ensure_ascii=False))
+    default = value.get("default")
+    if required or default in (None, []) or isinstance(default, dict):
+        return "*required*" if required else ""
+    return code(json.dumps(default, ensure_ascii=False))
 
 
 def _type(value, known, links):
     """What a value may be; blocks of their own are added to `links`."""
+    kind = value.get("type", "")
     if "$ref" in value:
         name = value["$ref"].rpartition("/")[2]
-        if "properties" in known[name]:
-            links.append(name)
-            return "block"
-        return _type(known[name], known, links)
+        if "properties" not in known[name]:
+            return _type(known[name], known, links)
+        links.append(name)
+        return "block"
     if "const" in value:
         return code(json.dumps(value["const"]))
     if "enum" in value:
@@ -87,32 +97,19 @@ def _type(value, known, links):
         if len(ones) < len(kinds):  # one, or a list of such
             return " or ".join(kind.replace("list of", "one or more of", 1) for kind in ones)
         return " or ".join(dict.fromkeys(kinds))
-    if value.get("type") == "array":
-        if "prefixItems" in value:
-            return f"{len(value['prefixItems'])} numbers"
-        inner = _type(value.get("items", {}), known, links)
-        return f"list of {inner}" if inner else "list"
-    if value.get("type") == "object" or "properties" in value:
+    if "prefixItems" in value:
+        return f"{len(value['prefixItems'])} numbers"
+    if kind == "array":
+        return f"list of {_type(value.get('items', {}), known, links)}".removesuffix(" of ")
+    if kind == "object" or "properties" in value:
         inner = value.get("additionalProperties")
-        kind = _type(inner, known, links) if isinstance(inner, dict) else ""
-        return f"{kind} for each name" if kind else "block"
-    kind = value.get("type", "")
+        inner = _type(inner, known, links) if isinstance(inner, dict) else ""
+        return f"{inner} for each name" if inner else "block"
     if isinstance(kind, list):
         kind = next(k for k in kind if k != "null")
-    return f"{PLAIN.get(kind, kind)}{_range(value)}"
-
-
-def _range(value):
-    low = value.get("minimum", value.get("exclusiveMinimum"))
-    high = value.get("maximum", value.get("exclusiveMaximum"))
-    if low is None and high is None:
-        return ""
     ends = [
-        f"{word} {end:.6g}"
-        for word, end in (
-            ("above" if "exclusiveMinimum" in value else "from", low),
-            ("below" if "exclusiveMaximum" in value else "to", high),
-        )
-        if end is not None and math.isfinite(end)
+        f"{word} {value[key]:.6g}"
+        for key, word in ENDS.items()
+        if math.isfinite(value.get(key, math.inf))
     ]
-    return f" {', '.join(ends).replace(', to', ' to')}"
+    return f"{PLAIN.get(kind, kind)} {', '.join(ends).replace(', to', ' to')}".strip()

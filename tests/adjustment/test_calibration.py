@@ -22,9 +22,7 @@ from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.design.closed_forms import (
-    perfect_robot_ratio,
-)
+from accelstudy.design.closed_forms import perfect_robot_ratio
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
@@ -101,59 +99,15 @@ def wrapped(angle):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-def paper_equations(g):
-    """Eq. (10) with the sign of eq. (6) and wrapped roll residuals, for the 9-parameter model."""
-    positions = {(0, 1): (6, -1), (0, 2): (7, 1), (1, 2): (8, -1)}  # of the angles in T, eq. (4)
-
-    def matrices(x):
-        t_matrix = np.broadcast_to(np.eye(3), (len(x), 3, 3)).copy()
-        for (row, column), (k, sign) in positions.items():
-            t_matrix[:, row, column] = sign * x[:, k]
-        return t_matrix, 1 / (1 + x[:, None, 3:6])
-
-    def forces(x, l):
-        t_matrix, gain = matrices(x)
-        f_a = (l[..., :3] - x[:, None, :3]) * gain
-        return np.einsum("rij,rnj->rni", t_matrix, f_a), f_a
-
-    def of_force(f):
-        """Derivatives of roll, pitch (eq. 7) and norm by the force, (R, n, 3, 3)."""
-        x, y, z = np.moveaxis(f, -1, 0)
-        yz2, xyz2 = y**2 + z**2, x**2 + y**2 + z**2
-        yz, xyz = np.sqrt(yz2), np.sqrt(xyz2)
-        rows = [
-            [0 * x, z / yz2, -y / yz2],
-            [yz / xyz2, -x * y / (xyz2 * yz), -x * z / (xyz2 * yz)],
-            [x / xyz, y / xyz, z / xyz],
-        ]
-        return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-
-    def psi(x, l):
-        f = forces(x, l)[0]
-        roll = np.arctan2(-f[..., 1], -f[..., 2])
-        pitch = np.arctan(f[..., 0] / np.hypot(f[..., 1], f[..., 2]))
-        norm_of_f = np.linalg.norm(f, axis=-1)
-        return np.stack([wrapped(roll - l[..., 3]), pitch - l[..., 4], norm_of_f - g], axis=-1)
-
-    def jac_parameters(x, l):
-        f, f_a = forces(x, l)
-        t_matrix, gain = matrices(x)
-        by_bias = np.repeat((-t_matrix * gain)[:, None], f.shape[1], axis=1)
-        by_scale = by_bias * f_a[:, :, None]
-        by_angle = np.zeros_like(by_bias)
-        for (row, column), (k, sign) in positions.items():
-            by_angle[..., row, k - 6] = sign * f_a[..., column]
-        return of_force(f) @ np.concatenate([by_bias, by_scale, by_angle], axis=-1)
-
-    def jac_observations(x, l):
-        f = forces(x, l)[0]
-        t_matrix, gain = matrices(x)
-        by_force = of_force(f) @ (t_matrix * gain)[:, None]
-        by_reading = np.zeros((*f.shape[:2], 3, 2))
-        by_reading[..., 0, 0] = by_reading[..., 1, 1] = -1
-        return np.concatenate([by_force, by_reading], axis=-1)
-
-    return FunctionConditions(psi, jac_parameters, jac_observations)
+def paper_conditions(x, l):
+    """Eq. (10) with the sign of eq. (6), for the 9-parameter model; roll residuals are small."""
+    f_x, f_y, f_z = np.moveaxis((l[..., :3] - x[:, None, :3]) / (1 + x[:, None, 3:6]), -1, 0)
+    yz, zy, zx = np.moveaxis(x[:, None, 6:], -1, 0)
+    x, y, z = f_x - yz * f_y + zy * f_z, f_y - zx * f_z, f_z  # by T of eq. (4)
+    sin, cos = np.sin(l[..., 3]), np.cos(l[..., 3])
+    roll = np.arctan((z * sin - y * cos) / (-z * cos - y * sin))  # of the force, less that read
+    pitch = np.arctan(x / np.sqrt(y**2 + z**2))
+    return np.stack([roll, pitch - l[..., 4], np.sqrt(x**2 + y**2 + z**2) - G], axis=-1)
 
 
 def test_robot_adjustment_is_that_of_the_papers_equations():
@@ -169,7 +123,7 @@ def test_robot_adjustment_is_that_of_the_papers_equations():
     components = calibrate(NINE, ROBOT, observed)
     l = np.concatenate([observed.forces, observed.angles], axis=-1)
     q = np.tile(np.r_[np.full(3, noise.sigma_force), np.full(2, noise.sigma_angle)] ** 2, (24, 1))
-    paper = adjust(paper_equations(G), l, q, np.zeros(9))
+    paper = adjust(FunctionConditions(paper_conditions), l, q, np.zeros(9))
 
     assert components.converged.all()
     assert paper.converged.all()
@@ -323,9 +277,6 @@ def test_gravity_that_is_held_fixed_is_one_number():
     observed = replace(noisy(0), gravity=np.array([9.80, 9.81]))
     with pytest.raises(InputError, match="gravity differs between the sessions"):
         calibrate(NINE, GRAVITY, observed)
-
-
-# --- effects that see more than the force --------------------------------------------------------
 
 
 # --- invariances ---------------------------------------------------------------------------------

@@ -35,40 +35,16 @@ YORK = [5.479910224, -0.480533407]
 YORK_OMEGA = 11.866353194
 
 # a + b x - y = 0, a block for each point
-LINE = FunctionConditions(
-    psi=lambda x, l: x[:, None, :1] + x[:, None, 1:] * l[..., :1] - l[..., 1:],
-    jac_parameters=lambda x, l: np.stack([np.ones_like(l[..., 0]), l[..., 0]], -1)[:, :, None],
-    jac_observations=lambda x, l: np.stack(
-        [np.broadcast_to(x[:, 1:], l.shape[:2]), -np.ones(l.shape[:2])], -1
-    )[:, :, None],
-)
+LINE = FunctionConditions(lambda x, l: x[:, None, :1] + x[:, None, 1:] * l[..., :1] - l[..., 1:])
 
 
 def york(observations=PEARSON[None], cofactors=YORK_COFACTORS, initial=(5.0, -0.5), **more):
     return adjust(LINE, observations, cofactors, initial, **more)
 
 
-def as_one_block(equations, n_blocks):
-    """The same conditions with all observations in a single block, (R, 1, n o)."""
-
-    def split(l):
-        return l.reshape(len(l), n_blocks, -1)
-
-    def jac_observations(x, l):
-        b = equations.jac_observations(x, split(l))
-        eye = np.eye(n_blocks)
-        c, o = b.shape[2:]
-        return np.einsum("rnco,nm->rncmo", b, eye).reshape(len(l), 1, n_blocks * c, n_blocks * o)
-
-    def jac_parameters(x, l):
-        a = equations.jac_parameters(x, split(l))
-        return a.reshape(len(l), 1, -1, a.shape[-1])
-
-    return FunctionConditions(
-        psi=lambda x, l: equations.psi(x, split(l)).reshape(len(l), 1, -1),
-        jac_parameters=jac_parameters,
-        jac_observations=jac_observations,
-    )
+def line_as_one_block(x, l):
+    """The conditions of the line with all observations in a single block, (R, 1, 20)."""
+    return LINE.psi(x, l.reshape(len(l), 10, 2)).reshape(len(l), 1, -1)
 
 
 @pytest.mark.usefixtures("all_digits")
@@ -99,11 +75,7 @@ def test_adjusted_observations_fulfil_the_conditions():
 def test_residuals_converge_even_where_the_parameters_are_found_at_once():
     """x = l₁ needs no iteration; the foot of the perpendicular of (l₂, l₃) on a circle does."""
     circle = FunctionConditions(
-        psi=lambda x, l: np.stack([x[:, :1] - l[..., 0], l[..., 1] ** 2 + l[..., 2] ** 2 - 1], -1),
-        jac_parameters=lambda x, l: np.broadcast_to([[1.0], [0.0]], (len(l), 1, 2, 1)),
-        jac_observations=lambda x, l: np.stack(
-            [np.broadcast_to([-1.0, 0, 0], l.shape), 2 * l * [0, 1, 1]], axis=-2
-        ),
+        lambda x, l: np.stack([x[:, :1] - l[..., 0], l[..., 1] ** 2 + l[..., 2] ** 2 - 1], -1)
     )
     l = np.array([[[5.0, 3.0, 4.0]]])
     result = adjust(circle, l, np.ones((1, 3)), [0.0])
@@ -123,12 +95,8 @@ def test_correlated_observations_equal_transformed_uncorrelated_ones():
     """With l = C z and uncorrelated z, the conditions in z have the cofactors C Cᵀ in l."""
     rng = np.random.default_rng(1)
     c = np.diag(np.sqrt(YORK_COFACTORS.ravel())) @ (np.eye(20) + rng.uniform(-0.2, 0.2, (20, 20)))
-    in_l = as_one_block(LINE, 10)
-    in_z = FunctionConditions(
-        psi=lambda x, z: in_l.psi(x, z @ c.T),
-        jac_parameters=lambda x, z: in_l.jac_parameters(x, z @ c.T),
-        jac_observations=lambda x, z: in_l.jac_observations(x, z @ c.T) @ c,
-    )
+    in_l = FunctionConditions(line_as_one_block)
+    in_z = FunctionConditions(lambda x, z: line_as_one_block(x, z @ c.T))
     l = PEARSON.reshape(1, 1, 20)
     correlated = adjust(in_l, l, (c @ c.T)[None], [5.0, -0.5])
     transformed = adjust(in_z, l @ np.linalg.inv(c).T, np.ones((1, 20)), [5.0, -0.5])
@@ -149,25 +117,10 @@ def test_an_observed_parameter_equals_an_added_condition():
     direct = york(
         parameter_observations=[[0.0, slope]], parameter_weights=np.array([0.0, 1 / variance])
     )
-
-    points = as_one_block(LINE, 10)
-
-    def jac_observations(x, l):
-        b = np.zeros((len(l), 1, 11, 21))
-        b[..., :10, :20] = points.jac_observations(x, l[..., :20])
-        b[..., 10, 20] = -1
-        return b
-
-    def jac_parameters(x, l):
-        extra = np.broadcast_to([0.0, 1.0], (len(l), 1, 1, 2))
-        return np.concatenate([points.jac_parameters(x, l[..., :20]), extra], axis=2)
-
     added = FunctionConditions(
-        psi=lambda x, l: np.concatenate(
-            [points.psi(x, l[..., :20]), x[:, None, 1:] - l[..., 20:]], axis=2
-        ),
-        jac_parameters=jac_parameters,
-        jac_observations=jac_observations,
+        lambda x, l: np.concatenate(
+            [line_as_one_block(x, l[..., :20]), x[:, None, 1:] - l[..., 20:]], axis=2
+        )
     )
     l = np.append(PEARSON.ravel(), slope).reshape(1, 1, 21)
     q = np.diag(np.append(YORK_COFACTORS.ravel(), variance))[None]
@@ -275,32 +228,15 @@ ELLIPSE_POINTS = np.array([
 ELLIPSE_START = [-1.0, -3.0, 0.09, 0.02, 0.08]
 
 
-def ellipse_terms(x, l):
+def ellipse(x, l):
     b0, b1, b2, b3, b4 = (column[:, None] for column in x.T)
-    return l[..., 0] - b0, l[..., 1] - b1, b2, b3, b4
-
-
-def ellipse_psi(x, l):
-    dx, dy, b2, b3, b4 = ellipse_terms(x, l)
+    dx, dy = l[..., 0] - b0, l[..., 1] - b1
     return (b2 * dx**2 + 2 * b3 * dx * dy + b4 * dy**2 - 1)[..., None]
 
 
-def ellipse_by_point(x, l):
-    dx, dy, b2, b3, b4 = ellipse_terms(x, l)
-    return np.stack([2 * (b2 * dx + b3 * dy), 2 * (b3 * dx + b4 * dy)], -1)[:, :, None]
-
-
-def ellipse_by_parameters(x, l):
-    dx, dy, *_ = ellipse_terms(x, l)
-    squares = np.stack([dx**2, 2 * dx * dy, dy**2], -1)[:, :, None]
-    return np.concatenate([-ellipse_by_point(x, l), squares], axis=-1)
-
-
-ELLIPSE = FunctionConditions(ellipse_psi, ellipse_by_parameters, ellipse_by_point)
-
-
 def test_implicit_ellipse_of_odrpack():
-    result = adjust(ELLIPSE, ELLIPSE_POINTS[None], np.ones((20, 2)), ELLIPSE_START)
+    conditions = FunctionConditions(ellipse)
+    result = adjust(conditions, ELLIPSE_POINTS[None], np.ones((20, 2)), ELLIPSE_START)
     assert result.redundancy == 15
     np.testing.assert_allclose(
         result.parameters[0],
@@ -328,16 +264,9 @@ MISRA1A = np.array([
 # fmt: on
 
 
-def misra1a_by_parameters(b, y):
-    e = np.exp(-b[:, 1:] * MISRA1A[1])
-    return -np.stack([1 - e, b[:, :1] * MISRA1A[1] * e], -1)[:, :, None]
-
-
 # y − b1 (1 − exp(−b2 t)) = 0, where only y is observed and t is fixed: B = I.
 REGRESSION = FunctionConditions(
-    psi=lambda b, y: y - (b[:, :1] * (1 - np.exp(-b[:, 1:] * MISRA1A[1])))[..., None],
-    jac_parameters=misra1a_by_parameters,
-    jac_observations=lambda b, y: np.ones((*y.shape[:2], 1, 1)),
+    lambda b, y: y - (b[:, :1] * (1 - np.exp(-b[:, 1:] * MISRA1A[1])))[..., None]
 )
 
 

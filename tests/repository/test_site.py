@@ -54,7 +54,8 @@ def described(page):
     text = (ROOT / f"docs/reference/{page}.md").read_text(encoding="utf-8")
     for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
         cells = re.findall(r"^\| (`.+?`) \|", section, re.MULTILINE)
-        names = re.findall("`([^`]+)`", " ".join(cells))
+        if not (names := re.findall("`([^`]+)`", " ".join(cells))):
+            continue  # a hook makes this table
         if first := re.search("first columns are those of `(.+)` up to `(.+)`", section):
             shared = files[first[1]]
             names = [*shared[: shared.index(first[2]) + 1], *names]
@@ -109,7 +110,6 @@ def test_each_key_and_column_of_a_calibration_is_described():
     advice = accelstudy.advise(campaign, tilt_accuracy="1gon", model="bias-scale")
     simulation = accelstudy.simulate("bias", ["faces-6", "mclaren-24"], "robot", sigma=1e-3).content
     assert described("file-formats") == {
-        "positions.csv": [],
         "positions.parquet": list(assessed_positions(assessment)),
         "calibration.h": ANY,
         "calibration.params": ANY,

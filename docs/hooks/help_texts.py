@@ -1,9 +1,10 @@
-"""The page of all commands: what `--help` says of each."""
+"""What the commands and the reports say of themselves: helps, and the terms that are explained."""
 
 import click
-from markdown_text import page
+from markdown_text import page, table
 
 from accelstudy.commands.main import SECTIONS, main
+from accelstudy.pages.glossary import TERMS
 
 WIDTH = 100
 """Of the help, letters."""
@@ -21,3 +22,8 @@ def commands():
 
 def _help(command, context):
     return f"```text\n{command.get_help(context)}\n```"
+
+
+def terms():
+    """The terms that reports explain."""
+    return table(("", ""), [(f"**{term}**", meaning) for term, meaning in TERMS.items()])
