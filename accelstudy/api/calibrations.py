@@ -149,7 +149,7 @@ class Calibration(Result):
         tilt_range : float in rad or str with a unit, largest tilt
         """
         left = tilt_left(self._fitted("tilt_error"), quantity("tilt_range", tilt_range, TILT))
-        return pd.Series(left, index=["roll", "pitch"], name="tilt_error_rad")
+        return pd.Series(left.total, index=["roll", "pitch"], name="tilt_error_rad")
 
     def _fitted(self, what: str) -> CampaignFit:
         if self.fit is None:

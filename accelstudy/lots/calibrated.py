@@ -14,7 +14,7 @@ from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.assessment import tilt_shares
+from accelstudy.campaign.calibration.assessment import tilt_left
 from accelstudy.campaign.calibration.fit import (
     CampaignFit,
     JudgedNoise,
@@ -200,5 +200,5 @@ def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
     error = tilt_error(
         fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
     ).constant
-    by_noise = tilt_shares(fit)["all"] ** 2 - tilt_shares(base)["all"] ** 2
+    by_noise = tilt_left(fit).parameters ** 2 - tilt_left(base).parameters ** 2
     return np.asarray(error - by_noise)

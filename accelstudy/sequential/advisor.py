@@ -173,7 +173,9 @@ def advise(
         known_variance if trusted else bound,
         typical_sizes(model, known.information.rows.shape[1]),
     )
-    rms = chooser.rms(known) if fit is None or not stated else tilt_left(fit, promise.tilt_range)
+    rms = chooser.rms(known)
+    if fit is not None and stated:
+        rms = tilt_left(fit, promise.tilt_range).total
     enough = bool(promise.reached(rms)) and not wrong
 
     last = None

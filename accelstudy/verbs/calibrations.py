@@ -101,11 +101,12 @@ def check_sigmas(
         accelstudy check-sigmas my-campaign --replicates 500
     """
     from accelstudy.api.calibrations import fit_of
-    from accelstudy.campaign.calibration import sigma_check
+    from accelstudy.campaign.calibration.sigma_check import check_sigmas as check
+    from accelstudy.campaign.calibration.wording import what_a_check_finds
 
     fit = fit_of(campaign, model, approach)
-    table = sigma_check.check_sigmas(fit, replicates, seed)
-    table.attrs["finds"] = sigma_check.what_it_finds(fit)
+    table = check(fit, replicates, seed)
+    table.attrs["finds"] = what_a_check_finds(fit)
     return table
 
 

@@ -15,8 +15,8 @@ from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
-from accelstudy.campaign.calibration.sigma_check import check_sigmas, what_it_finds
-from accelstudy.campaign.calibration.wording import interval_words
+from accelstudy.campaign.calibration.sigma_check import check_sigmas
+from accelstudy.campaign.calibration.wording import interval_words, what_a_check_finds
 from accelstudy.campaign.session import Campaign
 from accelstudy.simulation.sessions import Noise
 
@@ -90,13 +90,13 @@ def test_a_wrong_noise_does_not_show_in_simulation_and_is_said():
     assert (fooled.sigma < 0.8 * honest.sigma).all()
     table = check_sigmas(fooled, replicates=1000, seed=3)
     assert np.abs(table["ratio"] - 1).max() < 4.5 / math.sqrt(2 * 1000)
-    assert "No noise is stated" in what_it_finds(fooled)
-    assert "no ratio can show" in what_it_finds(fooled)
-    assert "the global test tells" in what_it_finds(honest)
+    assert "No noise is stated" in what_a_check_finds(fooled)
+    assert "no ratio can show" in what_a_check_finds(fooled)
+    assert "the global test tells" in what_a_check_finds(honest)
     refuted = replace(once, sigma_force=1e-4)
-    assert "refute the stated noise" in what_it_finds(fit_campaign(refuted, NINE, GRAVITY))
+    assert "refute the stated noise" in what_a_check_finds(fit_campaign(refuted, NINE, GRAVITY))
     few = simulated_campaign({"b_x": 0.1}, scheme="d-optimal-9", noise=Noise(0.002))
-    assert "nothing tells" in what_it_finds(fit_campaign(few, NINE, GRAVITY))
+    assert "nothing tells" in what_a_check_finds(fit_campaign(few, NINE, GRAVITY))
     with pytest.raises(InputError, match="no sigma to check"):
         check_sigmas(fit_campaign(replace(few, sigma_force=None), NINE, GRAVITY))
 
@@ -105,7 +105,9 @@ def test_the_interval_of_the_noise_holds():
     """Variances of r = 15 residuals, drawn: the interval of the noise holds 95 %."""
     fit = fit_campaign(replace(simulated_campaign({}), sigma_force=None), NINE, GRAVITY)
     assert fit.adjustment.redundancy == 15
-    low, high = re.search(r"from ([\d.]+) mm/s\^2 to ([\d.]+) mm/s\^2", what_it_finds(fit)).groups()
+    low, high = re.search(
+        r"from ([\d.]+) mm/s\^2 to ([\d.]+) mm/s\^2", what_a_check_finds(fit)
+    ).groups()
     sigma = 1e3 * fit.sigma_position
     drawn = np.random.default_rng(6).standard_normal((40_000, 15))
     estimate = np.sqrt(np.mean(drawn**2, axis=1))  # of a noise of 1

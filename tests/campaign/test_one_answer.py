@@ -135,7 +135,7 @@ def test_without_angles_between_the_axes_the_tilt_error_has_a_condition(tmp_path
         forces = g * faces @ sensor.T + bias + 0.002 * rng.standard_normal(faces.shape)
         read = Campaign("six", np.arange(len(forces)), forces, g, sigma_force=0.002)
         assessed = assess(fit_campaign(read, get_model("bias-scale")))
-        promised.append(assessed.tilt)
+        promised.append(assessed.tilt.total)
         says = " ".join(verdict_lines(assessed))
         assert "if the axes of the sensor are at right angles, as the model bias-scale" in says
         b, s = np.split(assessed.fit.parameters, 2)

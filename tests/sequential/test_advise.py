@@ -193,7 +193,7 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
         == calibrated.state
         == ("rejected" if bumped else "accepted" if n > 11 else "cannot tell")
     )
-    np.testing.assert_allclose(advice.rms, calibrated.tilt, rtol=1e-12)
+    np.testing.assert_allclose(advice.rms, calibrated.tilt.total, rtol=1e-12)
     suspects = [int(measured.positions[s.position]) for s in calibrated.suspects]
     assert list(advice.suspects) == sorted(suspects)
     assert advice.enough == (not bumped)

@@ -14,16 +14,42 @@ from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
-from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
-from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 OUTLIER_LEVEL = 0.05
 """Family-wise level of the tests of single positions."""
+
+
+@dataclass(frozen=True)
+class TiltLeft:
+    """Rms tilt error that a calibration leaves, without the noise of a reading.
+
+    Each is a (2,) array, rad, of roll and of pitch, over all tilts up to a largest one. Effects
+    that depend on temperature or time have those of the campaign. Effects of the rig have no share:
+    the sensor in use has left the rig.
+
+    Attributes
+    ----------
+    shares : mapping of effect to what the uncertainty of its parameters leaves
+    parameters : of all parameters together
+    reference : the part of it that the calibration of a reference causes; None without one
+    missing : of a reading that is wrong by as much as the residuals exceed the stated noise; 0
+        where they do not refute it
+    """
+
+    shares: Mapping[str, Array]
+    parameters: Array
+    reference: Array | None
+    missing: Array
+
+    @property
+    def total(self) -> Array:
+        """By the parameters, and by what the model lacks."""
+        return np.hypot(self.parameters, self.missing)
 
 
 @dataclass(frozen=True)
@@ -39,13 +65,7 @@ class Assessment:
     held_out : prediction of each position from the others; None where those do not determine the
         model
     components : variance components of accelerometer and robot; None without a robot
-    tilt_shares : mapping of effect to the tilt error that the uncertainty of its parameters leaves,
-        (2,), rad, rms of roll and of pitch
-    tilt_parameters : (2,) array, rad, the same of all parameters together
-    tilt_reference : (2,) array, rad, the part of it that the calibration of a reference causes;
-        None without one
-    tilt_missing : (2,) array, rad, rms tilt error of a reading that is wrong by as much as the
-        residuals exceed the stated noise; 0 where they do not refute it
+    tilt : TiltLeft, the tilt error that is left
     implausible : tuple of str, parameters and tilt errors that no sensor has
     gross_error : Recognised or None, in the campaign, its robot's angles included
     """
@@ -58,17 +78,9 @@ class Assessment:
     suspects: tuple[quality.Suspect, ...]
     held_out: quality.HeldOut | None
     components: VarianceComponents | None
-    tilt_shares: Mapping[str, Array]
-    tilt_parameters: Array
-    tilt_reference: Array | None
-    tilt_missing: Array
+    tilt: TiltLeft
     implausible: tuple[str, ...]
     gross_error: Recognised | None
-
-    @property
-    def tilt(self) -> Array:
-        """Rms tilt error that is left, (2,), rad: by parameters, and by what the model lacks."""
-        return np.hypot(self.tilt_parameters, self.tilt_missing)
 
     @property
     def p_adjusted(self) -> Array:
@@ -113,12 +125,7 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
     """
     session = (fit.model, fit.approach, fit.observed)
     solution = quality.solve(*session, fit.adjustment)
-    shares, missing = tilt_shares(fit), tilt_missing(fit)
-    left, by_reference = shares.pop("all"), shares.pop("reference", None)
-    implausible = (
-        *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
-        *implausible_tilt(*np.hypot(left, missing)),
-    )
+    tilt = tilt_left(fit)
     return Assessment(
         fit=fit,
         solution=solution,
@@ -128,71 +135,45 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         suspects=quality.suspects(*session, alpha=OUTLIER_LEVEL, sigma_known=fit.trusts_sigma),
         held_out=quality.held_out(*session),
         components=variance_components(*session) if fit.sigma_known else None,
-        tilt_shares=shares,
-        tilt_parameters=left,
-        tilt_reference=by_reference,
-        tilt_missing=missing,
-        implausible=implausible,
+        tilt=tilt,
+        implausible=(
+            *implausible_parameters(fit.model.effects, fit.parameters, fit.sigma),
+            *implausible_tilt(*tilt.total),
+        ),
         # A gross error of the angles shows even where the fit does not use them.
         gross_error=None if without_gross_error else recognise(fit.campaign),
     )
 
 
-def tilt_left(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> Array:
-    """Rms tilt error that a calibration leaves up to a tilt, rad, (2,), as `Assessment.tilt`."""
-    return np.hypot(tilt_shares(fit, max_tilt)["all"], tilt_missing(fit, max_tilt))
-
-
-def tilt_missing(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> Array:
-    """Tilt error of a reading that is wrong by the excess of the residuals, (2,), rad.
+def tilt_left(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> TiltLeft:
+    """Tilt error that a calibration leaves over tilts up to `max_tilt`, rad.
 
     The excess of the residuals over the stated noise is what the model does not describe. An effect
     of the sensor is in each reading that is leveled, as it was in the positions, and the
     uncertainty of the parameters does not contain it.
     """
-    if not fit.sigma_known or fit.trusts_sigma:
-        return np.zeros(2)
-    excess = fit.sigma_position_posteriori**2 - campaign_noise(fit.campaign).sigma_force ** 2
-    slope = tilt_by_output(*_in_use(fit, max_tilt))
-    return np.sqrt(max(excess, 0.0) * np.mean(np.sum(slope**2, axis=-1), axis=0))
+    model, campaign, g = fit.model, fit.campaign, fit.gravity
+    f_b = cap_forces(max_tilt, ATTITUDES, g)
+    hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
+    p = np.where(model.stays, fit.parameters, 0.0)
+    in_use = model, p, model.sense(f_b, p, g, hold), f_b, g, hold
+    slope = tilt_slope(*in_use) * model.stays
 
-
-def tilt_shares(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> dict[str, Array]:
-    """Tilt error from the uncertainty of each effect's parameters, and of "all", (2,), rad.
-
-    With a reference there is also the part of all that its calibration causes, "reference".
-
-    It is the rms of roll and of pitch over tilts up to `max_tilt`, rad, without the noise of a
-    reading. Effects that depend on temperature or time have those of the campaign. Effects of the
-    rig have no share: the sensor in use has left the rig.
-    """
-    model, covariance = fit.model, fit.covariance
-    slope = tilt_slope(*_in_use(fit, max_tilt)) * model.stays
-
-    def rms(columns: slice, covariance: Array = covariance) -> Array:
+    def rms(columns: slice = slice(None), covariance: Array = fit.covariance) -> Array:
         part, block = slope[..., columns], covariance[columns, columns]
         return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(part))
 
-    shares, first = {"all": rms(slice(None))}, 0
-    if fit.by_reference is not None:
-        shares["reference"] = rms(slice(None), fit.by_reference)
+    shares, first = {}, 0
     for effect in model.effects:
         last = first + len(effect.parameters)
         if effect.part == "sensor":
             shares[effect.name] = rms(slice(first, last))
         first = last
-    return shares
-
-
-def _in_use(
-    fit: CampaignFit, max_tilt: float
-) -> tuple[SensorModel, Array, Array, Array, float, HoldConditions]:
-    """Return the calibrated sensor in all tilts up to one, rad, as `tilt_slope` takes it.
-
-    These are the model, its parameters, readings and forces (k, 3), m/s², gravity and conditions.
-    """
-    model, campaign, g = fit.model, fit.campaign, fit.gravity
-    f_b = cap_forces(max_tilt, ATTITUDES, g)
-    hold = holds_in_use(campaign.hold, campaign.n_positions, f_b)
-    p = np.where(model.stays, fit.parameters, 0.0)
-    return model, p, model.sense(f_b, p, g, hold), f_b, g, hold
+    missing = np.zeros(2)
+    if fit.sigma_known and not fit.trusts_sigma:
+        excess = fit.sigma_position_posteriori**2 - campaign_noise(campaign).sigma_force ** 2
+        by_output = np.mean(np.sum(tilt_by_output(*in_use) ** 2, axis=-1), axis=0)
+        missing = np.sqrt(max(excess, 0.0) * by_output)
+    by_reference = fit.by_reference
+    reference = None if by_reference is None else rms(covariance=by_reference)
+    return TiltLeft(shares, rms(), reference, missing)

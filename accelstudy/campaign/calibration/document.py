@@ -102,9 +102,9 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
     """Quality in plain data, for `calibration.json`."""
     held, test = assessment.held_out, assessment.fit.global_test
     components = assessment.components
-    gross, parameters = assessment.gross_error, assessment.tilt_parameters / MGON
+    gross, tilt = assessment.gross_error, assessment.tilt
     angles = None if held is None else held.rms_angles
-    reference = (None, None) if (by := assessment.tilt_reference) is None else by / MGON
+    parts = {"": tilt.total, "parameters_": tilt.parameters, "reference_": tilt.reference}
     positions = assessment.fit.campaign.positions
     content = {
         "state": assessment.state,
@@ -143,12 +143,11 @@ def quality_document(assessment: Assessment) -> dict[str, Any]:
             "converged": components.converged,
         },
         "tilt_rms_mgon": {
-            "roll": assessment.tilt[0] / MGON,
-            "pitch": assessment.tilt[1] / MGON,
-            "parameters_roll": parameters[0],
-            "parameters_pitch": parameters[1],
-            "reference_roll": reference[0],
-            "reference_pitch": reference[1],
+            **{
+                f"{part}{angle}": None if left is None else left[i] / MGON
+                for part, left in parts.items()
+                for i, angle in enumerate(("roll", "pitch"))
+            },
             "max_tilt_gon": MAX_TILT_GON,
         },
     }

@@ -106,32 +106,40 @@ class CampaignFit:
             return self.observed.sigma_dof
         return solve(self.model, self.approach, self.observed, self.adjustment).sigma_dof
 
+    @cached_property
+    def noise(self) -> JudgedNoise:
+        """The noise that is quoted, as a diagnosis or the global test judged it.
+
+        A stated noise is trusted unless the residuals refute it. If it is itself an estimate it is
+        pooled with the residuals; if it is not trusted the noise is that of the residuals.
+        """
+        if self.judged is not None:
+            return self.judged
+        test, r = self.global_test, self.adjustment.redundancy
+        if self.sigma_known and (test is None or test.accepted):
+            return JudgedNoise(True, pooled_variance(self._omega, r, self.sigma_dof))
+        return JudgedNoise(False, float(self.adjustment.variance_posteriori[0]))
+
     @property
     def trusts_sigma(self) -> bool:
-        """Whether the a-priori noise is quoted: it is given, and the residuals do not refute it."""
-        if self.judged is not None:
-            return self.judged.trusted
-        test = self.global_test
-        return self.sigma_known and (test is None or test.accepted)
+        """Whether the a-priori noise is quoted."""
+        return self.noise.trusted
 
     @property
     def variance_factor(self) -> float:
-        """Variance of unit weight to quote.
-
-        Of a stated noise that is trusted it is 1, or pooled with the residuals if that noise is
-        itself an estimate; else it is that of the residuals.
-        """
-        if self.judged is not None:
-            return self.judged.variance
-        if self.trusts_sigma:
-            return pooled_variance(self._omega, self.adjustment.redundancy, self.sigma_dof)
-        return float(self.adjustment.variance_posteriori[0])
+        """Variance of unit weight to quote."""
+        return self.noise.variance
 
     @property
     def dof(self) -> float:
         """Degrees of freedom of the noise that is quoted; infinite where it is known."""
         r = self.adjustment.redundancy
         return self.sigma_dof + r if self.trusts_sigma else r
+
+    @property
+    def is_noise_known(self) -> bool:
+        """Whether the noise that is quoted is no estimate."""
+        return bool(np.isinf(self.dof))
 
     @property
     def sigma_position(self) -> float:

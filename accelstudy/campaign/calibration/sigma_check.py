@@ -12,7 +12,6 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.basics.wording import p_value, quantity_text
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
 from accelstudy.simulation.sessions import BLOCK, session, with_angle_errors
 
@@ -25,7 +24,7 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
 
     The simulation has the noise that the sigmas are quoted from: the stated one if it is trusted,
     else that of the residuals. So it finds sigmas that are wrong because the model is not linear
-    within its errors, and none that are wrong because this noise is; see `what_it_finds`.
+    within its errors, and none that are wrong because this noise is; see `what_a_check_finds`.
 
     Parameters
     ----------
@@ -98,31 +97,4 @@ def check_sigmas(fit: CampaignFit, replicates: int = 2000, seed: int = 1) -> pd.
             "ratio": fit.sigma / sd,
             "n_converged": n,
         }
-    )
-
-
-def what_it_finds(fit: CampaignFit) -> str:
-    """Say what `check_sigmas` can find, and what it cannot: the noise that it takes may be wrong.
-
-    The noise of the residuals has the 95 % interval σ̂ √(r/χ²_r), if they are Gaussian noise alone.
-    """
-    noise, test = quantity_text(fit.sigma_position, "m/s^2"), fit.global_test
-    if fit.trusts_sigma:
-        known = np.isinf(fit.sigma_dof)
-        what = "the stated noise" if known else "the noise by holds and residuals together"
-        judged = (
-            "nothing tells" if test is None else f"the global test tells ({p_value(test.p_value)})"
-        )
-        return (
-            f"The simulation has {what} of {noise}, and so have the sigmas. A ratio far "
-            f"from 1 says that the adjustment is wrong; whether that noise is right, {judged}."
-        )
-    r = fit.adjustment.redundancy
-    ends = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))
-    low, high = (quantity_text(end, "m/s^2") for end in ends)
-    why = "No noise is stated" if test is None else "The residuals refute the stated noise"
-    return (
-        f"{why}: the simulation has that of the residuals, {noise}, and so have the sigmas. A "
-        "ratio far from 1 says that the adjustment is wrong; that this noise is wrong, no ratio "
-        f"can show. With r = {r}, chance alone puts the true noise from {low} to {high} (95 %)."
     )

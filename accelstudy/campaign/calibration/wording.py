@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from accelstudy.basics import suggested
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
@@ -19,6 +20,7 @@ from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.pages import lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 
+TEMPLATE = "campaign/calibration/wording.txt.j2"
 ANGLES = {"nonorthogonality", "cross_axis_misalignment"}
 """Effects that a model has unless it takes the axes to be at right angles."""
 
@@ -34,14 +36,14 @@ def parameter_lines(content: Mapping[str, Any]) -> list[str]:
 
 def verdict_lines(assessment: Assessment) -> list[str]:
     """Say how good the calibration is, for what, and what limits it; the verdict comes first."""
-    fit, state, shares = assessment.fit, assessment.state, assessment.tilt_shares
-    says_tilt = state != IMPLAUSIBLE and np.isfinite(assessment.tilt).all()
+    fit, state, shares = assessment.fit, assessment.state, assessment.tilt.shares
+    says_tilt = state != IMPLAUSIBLE and np.isfinite(assessment.tilt.total).all()
     suspects = {
         int(fit.campaign.positions[suspect.position]): suspect.p_value
         for suspect in sorted(assessment.suspects, key=lambda suspect: suspect.position)
     }
     return lines(
-        "campaign/calibration/wording.txt.j2",
+        TEMPLATE,
         "verdict",
         assessment=assessment,
         suspects=suspects,
@@ -58,26 +60,24 @@ def verdict_lines(assessment: Assessment) -> list[str]:
 
 def approach_words(fit: CampaignFit) -> str:
     """Say what the positions were held against."""
-    name, campaign = fit.approach.name, fit.campaign
-    if fit.approach.uses_angles:
-        source = "a robot" if campaign.reference is None else "the sensor beside it"
-        return f"Held against gravity and the roll and pitch of {source} (approach {name})."
-    unused = "" if campaign.angles is None else "; the measured roll and pitch are not used"
-    return f"Held against gravity alone{unused} (approach {name})."
+    campaign = fit.campaign
+    has = campaign.angles is not None, campaign.reference is not None
+    return lines(TEMPLATE, "approach", fit.approach.name, fit.approach.uses_angles, *has)[0]
 
 
 def interval_words(fit: CampaignFit) -> str:
     """Say what the sigmas are, and how many of them hold 95 %."""
-    many = f"{fit.sigmas_95:.2f} of them hold 95 %"
-    if fit.trusts_sigma and np.isinf(fit.dof):
-        return f"sigmas of the stated noise; {many}"
-    if fit.trusts_sigma:
-        return (
-            f"sigmas of the stated noise, an estimate, and the residuals; {many} (Student's t, "
-            f"{fit.dof:.0f} degrees of freedom)"
-        )
+    return lines(TEMPLATE, "sigmas", fit)[0]
+
+
+def what_a_check_finds(fit: CampaignFit) -> str:
+    """Say what `check_sigmas` can find, and what it cannot.
+
+    The noise of the residuals has the 95 % interval σ̂ √(r/χ²_r), if they are Gaussian noise alone.
+    """
     r = fit.adjustment.redundancy
-    return f"sigmas of the noise in the residuals; {many} (Student's t, r = {r})"
+    low, high = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))
+    return lines(TEMPLATE, "finds", fit, low, high)[0]
 
 
 def next_steps(
