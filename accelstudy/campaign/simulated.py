@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -108,14 +108,7 @@ class CampaignSettings:
     @property
     def holds(self) -> HoldPlan:
         """Conditions of the holds."""
-        return HoldPlan(
-            self.interval,
-            self.temperature,
-            self.temperature_order,
-            self.vibration,
-            self.yaw,
-            self.seed,
-        )
+        return HoldPlan(**{one.name: getattr(self, one.name) for one in fields(HoldPlan)})
 
 
 def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, Any]]:
@@ -140,14 +133,13 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     seeds = np.random.SeedSequence(settings.seed).spawn(len(STREAMS))
     rng = {name: np.random.default_rng(s) for name, s in zip(STREAMS, seeds, strict=True)}
     hidden = _hidden_effects(settings, rng["effects"])
-    replaced = {effect.name for effect, _ in hidden}
-    usual = []
+    sensor = []
     for effect in get_model(settings.model).effects:
         # Of random sign, with sizes that are log-uniform between the typical sizes.
         n, (low, high) = len(effect.parameters), np.log(effect.typical)
-        sizes = np.exp(rng["sensor"].uniform(low, high, n))
-        usual.append((effect, sizes * rng["sensor"].choice([-1.0, 1.0], n)))
-    sensor = [(effect, values) for effect, values in usual if effect.name not in replaced]
+        sizes = np.exp(rng["sensor"].uniform(low, high, n)) * rng["sensor"].choice([-1.0, 1.0], n)
+        if effect.name not in {other.name for other, _ in hidden}:
+            sensor.append((effect, sizes))
     present = [*sensor, *hidden]
     model = compose("simulated", tuple(effect.spec for effect, _ in present))
     noise_effects = [get_noise_effect(spec) for spec in settings.noise_effects]
@@ -160,9 +152,9 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
                 f"{PROVIDES[column]}: missing; the effect {effect.name!r} needs the {column} of "
                 "each hold"
             )
-    parameters = np.concatenate([v for _, v in present])
-    ideal = session(model, parameters, directions, settings.gravity, hold)
+    parameters = np.concatenate([values for _, values in present])
     noise = Noise(settings.sigma, settings.robot_sigma, effects=settings.noise_effects)
+    ideal = session(model, parameters, directions, settings.gravity, hold)
     drawn = ideal.draw(noise, 1, rng["noise"])
     robot = get_approach(settings.approach).uses_angles
     campaign = Campaign(

@@ -5,23 +5,17 @@ Everything is written to a temporary folder on the same disk first, and moved wh
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
 from tempfile import mkdtemp
-from types import ModuleType
 
 from accelstudy.basics.errors import InputError
-
-fcntl: ModuleType | None
-try:
-    import fcntl
-except ImportError:  # without locks, the leftovers of a killed run stay until somebody removes them
-    fcntl = None
 
 _PREFIX, _SUFFIX = ".accelstudy-", ".part"
 
@@ -53,14 +47,11 @@ class Kind:
         return files
 
 
-CAMPAIGN = Kind(
-    "campaign",
-    "campaign.yaml",
-    ("positions.csv", "positions.parquet", "segmentation.svg", "segmentation.png"),
-    replaced=False,
-)
-CALIBRATION = Kind(
-    "calibration", "calibration.json", ("positions.parquet", "report.html"), ("figures",)
+BATCH_JOB = Kind(
+    "job of a batch",
+    "status.json",
+    ("calibration.json", "positions.parquet", "report.html"),
+    ("figures", "campaign"),
 )
 DIAGNOSIS = Kind(
     "diagnosis",
@@ -68,20 +59,23 @@ DIAGNOSIS = Kind(
     ("calibration.json", "loop.parquet", "model.yaml", "positions.parquet", "report.html"),
     ("figures",),
 )
-BATCH_JOB = Kind(
-    "job of a batch",
-    "status.json",
-    ("calibration.json", "positions.parquet", "report.html"),
-    ("figures", "campaign"),
+CALIBRATION = Kind(
+    "calibration", "calibration.json", ("positions.parquet", "report.html"), ("figures",)
+)
+CAMPAIGN = Kind(
+    "campaign",
+    "campaign.yaml",
+    ("positions.csv", "positions.parquet", "segmentation.svg", "segmentation.png"),
+    replaced=False,
 )
 COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
 HISTORY = Kind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = Kind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
-PLAN = Kind(
-    "plan",
-    "plan.parquet",
-    ("plan.md", "positions.yaml", "study.yaml", "plan.svg", "plan.png"),
-)
+_PLAN_FILES = ("plan.md", "positions.yaml", "study.yaml", "plan.svg", "plan.png")
+PLAN = Kind("plan", "plan.parquet", _PLAN_FILES)
+_TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
+SIMULATION = Kind("simulation", "simulation.json", tuple(f"{name}.parquet" for name in _TABLES))
+ADVICE = Kind("advice", "advice.json")
 STUDY = Kind(
     "study",
     "Snakefile",
@@ -89,25 +83,11 @@ STUDY = Kind(
     ("profiles", "campaigns/example"),
     replaced=False,
 )
-SIMULATION = Kind(
-    "simulation",
-    "simulation.json",
-    tuple(f"{table}.parquet" for table in
-          ("cells", "summary", "correlations", "leveling", "quantiles")),
-)  # fmt: skip
-ADVICE = Kind("advice", "advice.json")
-_KINDS = (
-    BATCH_JOB,
-    DIAGNOSIS,
-    CALIBRATION,
-    CAMPAIGN,
-    PLAN,
-    COMPARISON,
-    HISTORY,
-    LOT,
-    SIMULATION,
+_WITH_MARKERS = (
+    *(BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, COMPARISON, HISTORY, LOT, PLAN, SIMULATION),
     ADVICE,
 )
+"""Kinds that a folder can be told to be; one that holds the files of another comes first."""
 
 
 @contextmanager
@@ -134,12 +114,10 @@ def result_folder(
         written. `out` is then unchanged.
     """
     out = Path(out)
-    with _reported(out) as stages:
+    with _reported(out):
         _check_apart(out, inputs)
         is_earlier_result = _check_folder(out, kind, force)
-        with _staging(out) as stage:
-            new = stage / "new"
-            stages.append(new)
+        with _staging(out, out, "new") as new:
             new.mkdir()
             yield new
             _publish(new, out.resolve(), kind, is_earlier_result)
@@ -158,14 +136,13 @@ def new_file(
         given, or cannot be written.
     """
     path = Path(path)
-    with _reported(path) as stages:
+    with _reported(path):
         _check_apart(path, inputs)
         if path.is_dir() or (path.exists() and not path.is_file()):
             raise InputError(f"{path}: is no file; give the name of a file to write")
         if os.path.lexists(path) and not force:
             raise InputError(f"{path}: is there already; `force` replaces it")
         with whole_file(path) as temporary:
-            stages.append(temporary)
             yield temporary
 
 
@@ -173,10 +150,10 @@ def new_file(
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yield a temporary file of the same name, and move it to `path` only if all went well."""
     path = Path(path)
-    with _staging(path.parent) as stage:
-        yield stage / path.name
+    with _staging(path.parent, path, path.name) as part:
+        yield part
         path.parent.mkdir(parents=True, exist_ok=True)
-        (stage / path.name).replace(path)
+        part.replace(path)
 
 
 def check_writable(folder: str | Path) -> None:
@@ -213,11 +190,12 @@ def is_temporary(path: Path) -> bool:
 
 
 @contextmanager
-def _staging(near: Path) -> Iterator[Path]:
-    """A private folder in `near` or, if that does not exist, in the nearest folder above it.
+def _staging(near: Path, out: Path, name: str) -> Iterator[Path]:
+    """A path in a private folder in `near` or, if that is not there, in the nearest folder above.
 
-    Its name cannot be predicted, so nobody can place a link there. It is locked while it is in use,
-    so the next run recognises the leftovers of a killed run and removes them.
+    The name of the folder cannot be predicted, so nobody can place a link there. It is locked while
+    it is in use, so the next run recognises the leftovers of a killed run and removes them. Errors
+    name `out` instead of the path.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
@@ -227,9 +205,13 @@ def _staging(near: Path) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
             os.close(lock)
     stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
-    lock = _locked(stage)
+    lock, part = _locked(stage), stage / name
     try:
-        yield stage
+        yield part
+    except InputError as error:
+        if str(part) not in str(error):
+            raise
+        raise InputError(str(error).replace(str(part), str(out))) from None
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         if lock is not None:
@@ -238,39 +220,25 @@ def _staging(near: Path) -> Iterator[Path]:
 
 def _locked(folder: Path) -> int | None:
     """Descriptor that locks a temporary folder; None if it is in use, or cannot be locked."""
-    if fcntl is None:
-        return None
-    try:
+    with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:
-        return None
-    try:
-        if os.fstat(descriptor).st_uid == os.geteuid():
+        try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return descriptor
-    except OSError:
-        pass
-    os.close(descriptor)
+        except OSError:
+            os.close(descriptor)
     return None
 
 
 @contextmanager
-def _reported(out: Path) -> Iterator[list[Path]]:
-    """Turn errors into one line that names `out`, also for the temporary paths in the list."""
-    stages: list[Path] = []
+def _reported(out: Path) -> Iterator[None]:
+    """Turn errors of the disk into one line that names `out`."""
     try:
-        yield stages
+        yield
     except BrokenPipeError:  # of the terminal
         raise
     except OSError as error:
         raise InputError(cannot_write(error, out)) from None
-    except InputError as error:
-        text = str(error)
-        for stage in stages:
-            text = text.replace(str(stage), str(out))
-        if text == str(error):
-            raise
-        raise InputError(text) from None
 
 
 def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
@@ -297,7 +265,7 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
     if not there:
         return False
     _check_free(out, map(Path, (kind.marker, *kind.files)), map(Path, kind.folders))
-    earlier = next((one for one in _KINDS if (out / one.marker).is_file()), None)
+    earlier = next((one for one in _WITH_MARKERS if (out / one.marker).is_file()), None)
     if earlier not in (None, kind):
         raise InputError(f"{out}: is the folder of a {earlier.name}; give another folder")
     if not force and (earlier is None or not kind.replaced):

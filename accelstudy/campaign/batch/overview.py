@@ -92,15 +92,15 @@ def summarise_campaigns(
     DataFrame
         The table of campaigns.
     """
-    paths = [Path(folder) for folder in folders]
     documents, values = [], []
+    paths = [Path(folder) for folder in folders]
     for folder in paths:
         document = _read(folder / BATCH_JOB.marker)
         if document["status"] == "ok":
             content = _read(folder / "calibration.json")
-            suspects = (str(suspect["position"]) for suspect in content["quality"]["suspects"])
             values += [{"campaign": document["name"], "parameter": entry["name"], **entry}
                        for entry in content["parameters"]]  # fmt: skip
+            suspects = (str(suspect["position"]) for suspect in content["quality"]["suspects"])
             document = {
                 **content,
                 **document,
@@ -118,9 +118,10 @@ def summarise_campaigns(
     write_table(campaigns, table, provenance)
     long = pd.DataFrame(values, columns=list(PARAMETER_COLUMNS)).astype(PARAMETER_COLUMNS)
     write_table(parameters, long, provenance)
-    links = [_links(folder, Path(page).parent) for folder in paths]
+    known = table.astype(object).where(table.notna(), None).to_dict("records")
+    rows = [{**row, "folder": folder} for row, folder in zip(known, paths, strict=True)]
     with whole_file(page) as path:
-        path.write_text(_page(batch, table, links), encoding="utf-8")
+        path.write_text(_page(batch, rows, Path(page).parent), encoding="utf-8")
     return table
 
 
@@ -136,38 +137,12 @@ def _read(path: Path) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _links(folder: Path, start: Path) -> dict[str, str | None]:
-    """Links to the pages and pictures of a campaign, relative to the folder of the overview."""
-    places = {"report": "report.html", "holds": "campaign/segmentation.png"}
-    links = {
-        key: (folder / place).relative_to(start).as_posix() if (folder / place).exists() else None
-        for key, place in places.items()
-    }
-    return {**links, "folder": folder.as_posix()}
-
-
-def _next_steps(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
-    """Commands for the first good and for the first doubtful campaign, each with its purpose."""
-    steps = []
-    good = next((row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)), None)
-    if good is not None:
-        command = suggested.apply(f"{good['folder']}/calibration.json")
-        steps.append(("Level a log, for example", command))
-    doubtful = next((row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)), None)
-    if doubtful is not None:
-        is_folder = doubtful["kind"] == "campaign"
-        measured = doubtful["source"] if is_folder else f"{doubtful['folder']}/campaign"
-        command = suggested.diagnose(measured, doubtful["model"], doubtful["approach"])
-        steps.append(("Find what is wrong or missing, for example", command))
-    return steps
-
-
-def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -> str:
-    """Page (HTML, self-contained apart from its links), failures first."""
-    rows = [
-        {**{k: None if pd.isna(v) else v for k, v in row.items()}, **link}
-        for row, link in zip(table.to_dict("records"), links, strict=True)
-    ]
+def _page(batch: str, rows: list[dict[Any, Any]], start: Path) -> str:
+    """Page (HTML, self-contained apart from its links, which begin at `start`), failures first."""
+    for row in rows:
+        for key, place in (("report", "report.html"), ("holds", "campaign/segmentation.png")):
+            path = Path(row["folder"], place)
+            row[key] = path.relative_to(start).as_posix() if path.exists() else None
     return render(
         "campaign/batch/overview.html.j2",
         batch=batch,
@@ -175,7 +150,20 @@ def _page(batch: str, table: pd.DataFrame, links: list[dict[str, str | None]]) -
         implausible=[row for row in rows if row["state"] == IMPLAUSIBLE],
         calibrated=[row for row in rows if row["status"] == "ok" and row["state"] != IMPLAUSIBLE],
         level=REFUTATION_LEVEL,
-        robot=table["held_out_roll_rad"].notna().any(),
         blind=BLIND,
         next_steps=_next_steps(rows),
     )
+
+
+def _next_steps(rows: list[dict[Any, Any]]) -> list[tuple[str, str]]:
+    """Commands for the first good and for the first doubtful campaign, each with its purpose."""
+    steps = []
+    for row in [row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)][:1]:
+        command = suggested.apply(Path(row["folder"], suggested.HERE))
+        steps.append(("Level a log, for example", command))
+    for row in [row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)][:1]:
+        is_folder = row["kind"] == "campaign"
+        measured = row["source"] if is_folder else Path(row["folder"], "campaign")
+        command = suggested.diagnose(measured, row["model"], row["approach"])
+        steps.append(("Find what is wrong or missing, for example", command))
+    return steps

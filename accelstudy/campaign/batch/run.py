@@ -65,30 +65,29 @@ def run_task(
 def _calibrate(
     task: Task, folder: Path, public: str | Path | None, log: str | Path | None
 ) -> str | None:
+    """Import and calibrate into a folder; say what is wrong, and leave no half of a result."""
     try:
-        campaign = _measured(task, folder / "campaign", public)
-        named = None if task.approach is None else get_approach(task.approach)
-        fit = fit_campaign(campaign, get_model(task.model), named)
-        write_calibration(assess(fit), folder)
+        if task.settings is None:
+            campaign = _read(task)
+        else:
+            campaign, holds = import_log(public or task.source, task.settings)
+            write_imported(campaign, holds, folder / "campaign")
+        approach = None if task.approach is None else get_approach(task.approach)
+        write_calibration(assess(fit_campaign(campaign, get_model(task.model), approach)), folder)
+        return None
     except InputError as error:
-        _remove_results(folder)
-        return " ".join(str(error).split()).removeprefix(f"{task.name}: ")
+        wrong = " ".join(str(error).split()).removeprefix(f"{task.name}: ")
     except OSError:  # such as a full disk, which is not the campaign's fault
         raise
     except Exception as error:
         # One campaign must not cost the others their overview.
         logging.exception("%s: not foreseen", task.name)
-        _remove_results(folder)
         see = "" if log is None else f"; the log has the details: {log}"
-        return f"internal error, please report it ({type(error).__name__}: {one_line(error)}){see}"
-    return None
-
-
-def _remove_results(folder: Path) -> None:
-    """Remove the files of a failed calibration, but keep the campaign that was imported."""
-    for name in BATCH_JOB.files:
+        wrong = f"internal error, please report it ({type(error).__name__}: {one_line(error)}){see}"
+    for name in BATCH_JOB.files:  # the campaign that was imported stays
         (folder / name).unlink(missing_ok=True)
     shutil.rmtree(folder / "figures", ignore_errors=True)
+    return wrong
 
 
 def campaign_of(task: Task, folder: str | Path) -> Campaign:
@@ -99,19 +98,10 @@ def campaign_of(task: Task, folder: str | Path) -> Campaign:
     InputError
         If it cannot be read, or could not be imported.
     """
-    if task.settings is None:
-        return replace(_read(task), name=task.name)
-    return replace(read_campaign(Path(folder) / "campaign"), name=task.name)
+    own = _read(task) if task.settings is None else read_campaign(Path(folder) / "campaign")
+    return replace(own, name=task.name)
 
 
 def _read(task: Task) -> Campaign:
     gravity = task.gravity
     return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)
-
-
-def _measured(task: Task, folder: Path, public: str | Path | None) -> Campaign:
-    if task.settings is None:
-        return _read(task)
-    campaign, holds = import_log(public or task.source, task.settings)
-    write_imported(campaign, holds, folder)
-    return campaign
