@@ -19,7 +19,7 @@ from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.data_sheets import of_sigma
-from accelstudy.planning.candidates import of_scheme
+from accelstudy.planning.candidates import in_scheme
 from accelstudy.planning.question import BY_HAND, Question
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -64,8 +64,8 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     )
     question = Question(10 * MGON, 30 * GON, of_sigma(0.002), (BY_HAND,), schemes=(str(scheme),))
     models = [get_model("bias-scale-nonorthogonality")]
-    planned = [*of_scheme(question, BY_HAND, get_scheme(str(scheme)), models)]
-    assert all(each.rms > 1 * GON for each in planned)
+    planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
+    assert all(each.tilt.rms.max() > 1 * GON for each in planned)
 
 
 def test_the_approach_follows_the_campaign_and_is_said(tmp_path):
