@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictInt,
     StrictStr,
@@ -132,13 +130,11 @@ def _delimiter(value: Any) -> Any:
 _IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
 
 
-class LogLayout(BaseModel):
+class LogLayout(Block):
     """How the numbers of a log are read: what `import` was told, and `apply` needs again.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     columns: dict[str, Place] = Field(
         {},

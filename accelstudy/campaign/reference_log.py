@@ -140,7 +140,7 @@ class ReferenceLog:
         own = self.calibration.correct(np.array([means[n] for n in table.index]))
         frame = self._frame((holds.means - offset)[used], own[used])
         angles = angles_of(frame.to_frd(own))
-        resting = [[records[n]] for n in table.index[used]]
+        resting = [records[n] for n in table.index[used]]
         noise = hold_noise(resting, self.log.step).accuracy.allan
         reference = reference_sensor(self.calibration, noise, frame)
         sigma, common = reference.errors(angles, gravity)

@@ -82,8 +82,8 @@ IMPORT = Command(
     writes=outputs.CAMPAIGN,
     out="Folder of the campaign.",
     more="segmentation.png in the folder shows the holds with their numbers. With --sensor, which "
-    "may be repeated as --exclude and --join may, each sensor has a campaign of its own in the "
-    "folder, which is named after the log and the sensor.",
+    "may be repeated as --exclude may, each sensor has a campaign of its own in the folder, which "
+    "is named after the log and the sensor.",
     options=(
         click.Option(
             ["--sensor", "sensors"],
@@ -95,7 +95,7 @@ IMPORT = Command(
     sections={
         "The log": "columns sensors time time_unit rate delimiter variable",
         "Its numbers": "unit scale offset range frame",
-        "The holds": "threshold window trim shortest exclude join figure",
+        "The holds": "threshold window trim shortest exclude figure",
         "A log of blocks instead": "block",
         "A table of means instead": "means robot_sigma robot_unit",
         "A calibrated sensor beside it": (
@@ -103,6 +103,7 @@ IMPORT = Command(
         ),
         "The campaign": "out name gravity settings",
     },
+    retired={"--join": "holds in one attitude are positions each"},
 )
 
 

@@ -80,7 +80,6 @@ def find_holds(
     trim: Annotated[Quantity | None, si("s", 0, 1e6)] = None,
     shortest: Seconds = None,
     exclude: str | Sequence[str] = (),
-    join: str | Sequence[str] = (),
     block: Annotated[int, Range(4, 10**9)] | None = None,
     means: bool = False,
     robot_sigma: RobotSigma | None = None,
@@ -118,8 +117,6 @@ def find_holds(
         Shortest hold, s, without its ends. [default: 1]
     exclude : str, or several
         What to leave out, and why: 13:moved, 120s-135s:moved.
-    join : str, or several
-        Holds that are one: 4,5 or 120s-135s.
     block : int
         Samples of each position, in a log without the moves between them.
     means : bool

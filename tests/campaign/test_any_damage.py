@@ -34,7 +34,7 @@ LOG = pd.DataFrame(AT_REST, columns=["fx", "fy", "fz"])
 SETTINGS = {
     "name": "log", "columns": {"fx": 0, "fy": "fy", "fz": 2}, "rate_hz": 10.0, "unit": "counts",
     "scale": [1.0, 1.1, 1.0], "offset": 0.1, "gravity": {"value_mps2": 9.81, "sigma_mps2": 0.0},
-    "frame": "flu", "range_mps2": 1000.0, "exclude": [], "join": [], "window_s": 1.0,
+    "frame": "flu", "range_mps2": 1000.0, "exclude": [], "window_s": 1.0,
     "threshold_mps2": 10.0, "trim_s": 0.0, "shortest_s": 1.0,
 }  # fmt: skip
 CONTENTS = {

@@ -145,11 +145,8 @@ REFUSED = [
     (HELD, "--rate 100 --window 1e3", "too few samples for a window of 100001"),
     (HELD, "--rate 100 --exclude 13:moved", "exclude: there is no hold 13; they are 1 to 8"),
     (HELD, "--rate 100 --exclude 13", "exclude: expected a hold or a time, and why, as 13:moved"),
+    (HELD, "--rate 100 --join 4,5", "--join: no longer an option; holds in one attitude"),
     (HELD, "--rate 100 --exclude 1s-2s:x", "exclude: 1s-2s: no hold lies there"),
-    (HELD, "--rate 100 --join 4", "join: expected numbers of holds or a time, as 4,5 or"),
-    (HELD, "--rate 100 --join 1s-2s", "join: 1s-2s: fewer than two holds lie there"),
-    (HELD, "--rate 100 --join 4,5", "join: holds 4 and 5 differ by"),
-    (HELD, "--rate 100 --join 4,6", "join: 4, 6: hold 5 lies between them"),
     (np.repeat(np.eye(4, 3) * G, 300, axis=0), "--rate 100 --window 0.5", "frozen"),
     (moved(0.5, 4.0, 3), "--rate 100", NEVER),  # waved about
     (moved(0.1, 0.4, 2), "--rate 100", NEVER),  # turned gently by hand

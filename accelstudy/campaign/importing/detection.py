@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import NormalDist
-from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -32,8 +31,6 @@ from accelstudy.campaign.importing.windows import (
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
-Parts: TypeAlias = tuple[slice, ...]
-"""Samples of a hold: slices of a log, each uninterrupted."""
 
 MAX_SATURATED_SHARE = 0.05
 """A hold is useless if more than this share of its samples is at the end of the scale."""
@@ -62,8 +59,8 @@ class Holds:
     ----------
     windows : Windows, of the log
     threshold : Threshold
-    parts : mapping of int to slices of the samples, by the numbers that figures and options use
-    table : DataFrame, a row for each hold by its number; see `hold_table`
+    table : DataFrame, a row for each hold, by the number that figures and options use; see
+        `hold_table`
     left_out : mapping of int to str, numbers of holds that are left out, with the reason
     noise : HoldNoise, of the holds that are not left out
     warnings : tuple of str
@@ -72,7 +69,6 @@ class Holds:
 
     windows: Windows
     threshold: Threshold
-    parts: Mapping[int, Parts]
     table: pd.DataFrame
     left_out: Mapping[int, str]
     noise: HoldNoise
@@ -98,15 +94,14 @@ class Holds:
         """Return the others, as if these had not been found, with warnings that say why."""
         return replace(
             self,
-            parts={n: parts for n, parts in self.parts.items() if n not in reasons},
             table=self.table.drop(index=[*reasons]),
             left_out={n: why for n, why in self.left_out.items() if n not in reasons},
             warnings=(*self.warnings, *(f"hold {n} left out: {why}" for n, why in reasons.items())),
         )
 
 
-def hold_table(log: Recording, parts: Mapping[int, Parts]) -> pd.DataFrame:
-    """Table of holds by their numbers.
+def hold_table(log: Recording, holds: Mapping[int, slice]) -> pd.DataFrame:
+    """Table of holds by their numbers, from the samples of each.
 
     Its columns are start and end (first sample, and the one after the last), t0 and t1 (times of
     the first and of the last sample, s), n (samples), fx … (means, m/s²), sd_fx … (standard
@@ -114,19 +109,17 @@ def hold_table(log: Recording, parts: Mapping[int, Parts]) -> pd.DataFrame:
     rms vibration, m/s²; NaN where nothing was measured.
     """
     rows = []
-    for slices in parts.values():
-        forces = np.concatenate([log.forces[part] for part in slices])
-        start, end = slices[0].start, slices[-1].stop
-        row = {"start": start, "end": end, "t0": log.time[start], "t1": log.time[end - 1]}
+    for hold in holds.values():
+        forces, time = log.forces[hold], log.time[hold]
+        row = {"start": hold.start, "end": hold.stop, "t0": time[0], "t1": time[-1]}
         row |= {"n": len(forces), **dict(zip(AXES, forces.mean(axis=0), strict=True))}
         row |= dict(zip(SDS, forces.std(axis=0, ddof=1), strict=True))
-        for name in log.conditions:
-            values = np.concatenate([log.conditions[name][part] for part in slices])
+        for name, values in log.conditions.items():
             power = 2 if name == "vibration" else 1
-            known = values[np.isfinite(values)] ** power
+            known = values[hold][np.isfinite(values[hold])] ** power
             row[name] = known.mean() ** (1 / power) if len(known) else np.nan
         rows.append(row)
-    return pd.DataFrame(rows, index=[*parts])
+    return pd.DataFrame(rows, index=[*holds])
 
 
 # --- Runs at rest, and blocks --------------------------------------------------------------------
@@ -184,7 +177,7 @@ def find_holds(
     result = []
     for k, (each, threshold) in enumerate(zip(windows, thresholds, strict=True)):
         warnings = each.warnings()
-        parts: dict[int, Parts] = {n: (runs[i],) for n, i in numbers.items() if good[k, i]}
+        holds = {n: runs[i] for n, i in numbers.items() if good[k, i]}
         saturated, wandering = int(full[k].sum()), int(turns[k].sum())
         if saturated:
             warnings.append(f"{counted(saturated, 'hold')} left out: the sensor is saturated there")
@@ -194,14 +187,14 @@ def find_holds(
                 "noise, since the sensor turns slowly"
             )
         warnings += said
-        if not parts and wandering:
+        if not holds and wandering:
             raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
-        if not parts:
+        if not holds:
             raise InputError(
                 f"{each.log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
                 f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
             )
-        result.append(_chosen(each, threshold, parts, warnings, settings))
+        result.append(_chosen(each, threshold, holds, warnings, settings))
     return result
 
 
@@ -216,7 +209,7 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     InputError
         If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
-    named = [*(which for which, _ in settings.left_out), *settings.joined]
+    named = (which for which, _ in settings.left_out)
     if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
         raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
     block, row = log.part, log.row
@@ -258,8 +251,7 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     for number, each in scatters.items():
         if each > threshold.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    parts: dict[int, Parts] = {n: (each,) for n, each in blocks.items()}
-    return _chosen(windows, threshold, parts, windows.warnings(), settings, left_out, least)
+    return _chosen(windows, threshold, blocks, windows.warnings(), settings, left_out, least)
 
 
 def scatter(forces: Array) -> float:
@@ -330,65 +322,34 @@ def _too_short(rests: Sequence[float], lost: float, shortest: float) -> list[str
 def _chosen(
     windows: Windows,
     threshold: Threshold,
-    parts: dict[int, Parts],
+    holds: Mapping[int, slice],
     warnings: list[str],
     settings: ImportSettings,
     left_out: Mapping[int, str] | None = None,
     size: int | None = None,
 ) -> Holds:
-    """Holds as a person joins them and leaves them out, if the sensor was still in them.
+    """Holds without those that a person leaves out, if the sensor was still in them.
 
     Raises
     ------
     InputError
         If a person leaves all of them out, or the sensor was never still.
     """
-    log = windows.log
-    for which in settings.joined:
-        _join(parts, hold_table(log, parts), which, threshold.sd)
-    table = hold_table(log, parts)
+    log, table = windows.log, hold_table(windows.log, holds)
     left_out = {**(left_out or {}), **_left_out(table, settings.left_out)}
-    used = [slices for number, slices in parts.items() if number not in left_out]
+    used = [log.forces[hold] for number, hold in holds.items() if number not in left_out]
     if not used:
         why = f"exclude: no {'hold' if size is None else 'block'} is left"
         raise InputError(f"{log.path}: {why} ({next(iter(left_out.values()))})")
-    records = [[log.forces[part] for part in slices] for slices in used]
-    noise = hold_noise(records, log.step, windows.steps)
-    holds = Holds(windows, threshold, parts, table, left_out, noise, tuple(warnings), size)
-    if _moves(holds):
+    noise = hold_noise(used, log.step, windows.steps)
+    found = Holds(windows, threshold, table, left_out, noise, tuple(warnings), size)
+    if _moves(found):
         why = (
             f"what looks like rest varies by {threshold.floor:.3g} m/s², slowly like a hand, not "
             "like the noise of a sensor"
         )
         raise _never_still(windows, why, settings.window_s or usual_window(log), size)
-    return holds
-
-
-def _join(parts: dict[int, Parts], table: pd.DataFrame, which: Which, alike: float) -> None:
-    """Join holds, which keep the number of the first; their means differ by `alike` at most.
-
-    Raises
-    ------
-    InputError
-        If there is no such hold, a span of time has fewer than two, others lie between, or
-        their attitudes differ.
-    """
-    group = _numbers(table, which, "join")
-    if len(group) < 2:
-        raise InputError(f"join: {which}: fewer than two holds lie there")
-    first, *others = group
-    between = [n for n in parts if first < n < group[-1] and n not in group]
-    if between:
-        raise InputError(f"join: {_names(group)}: hold {between[0]} lies between them")
-    means = table[[*AXES]]
-    for number in others:
-        step = float(np.linalg.norm(means.loc[number] - means.loc[first]))
-        if step > alike:
-            raise InputError(
-                f"join: holds {first} and {number} differ by {step:.2g} m/s²: the sensor was "
-                "turned between them"
-            )
-        parts[first] += parts.pop(number)
+    return found
 
 
 def _left_out(table: pd.DataFrame, left_out: Sequence[tuple[Which, str]]) -> dict[int, str]:
@@ -401,21 +362,19 @@ def _left_out(table: pd.DataFrame, left_out: Sequence[tuple[Which, str]]) -> dic
     """
     reasons: dict[int, str] = {}
     for which, why in sorted(left_out, key=lambda each: not isinstance(each[0], Span)):
-        numbers = _numbers(table, which, "exclude")
-        if not numbers:
-            raise InputError(f"exclude: {which}: no hold lies there")
+        if isinstance(which, Span):  # in which they lie, if only in part
+            inside = (table["t0"] <= which.end) & (table["t1"] >= which.start)
+            numbers = table.index[inside].tolist()
+            if not numbers:
+                raise InputError(f"exclude: {which}: no hold lies there")
+        else:
+            numbers = [*which]
+        for number in numbers:
+            if number not in table.index:
+                names = _names(table.index)
+                raise InputError(f"exclude: there is no hold {number}; they are {names}")
         reasons |= dict.fromkeys(numbers, why)
     return reasons
-
-
-def _numbers(table: pd.DataFrame, which: Which, key: str) -> list[int]:
-    """Numbers of holds: those given, or those that lie in a span of time, if only in part."""
-    if isinstance(which, Span):
-        return table.index[(table["t0"] <= which.end) & (table["t1"] >= which.start)].tolist()
-    for number in which:
-        if number not in table.index:
-            raise InputError(f"{key}: there is no hold {number}; they are {_names(table.index)}")
-    return [*which]
 
 
 def _names(numbers: Iterable[int]) -> str:

@@ -192,7 +192,7 @@ def _campaign_of_holds(holds: Holds, reference: ReferenceLog | None) -> Imported
     several = len(log.parts) > 1
     warnings = [*holds.warnings, *_doubts(holds, gravity)]
     for i, part in enumerate(log.parts, 1):
-        if several and i not in holds.parts:
+        if several and i not in holds.table.index:
             warnings.append(f"{part.path}: no static hold; position {i} is missing")
     warnings += log.warnings()
     columns: dict[str, Any] = {}

@@ -98,30 +98,26 @@ class HoldNoise:
         return (allan + rounding) ** 2 / parts if parts > 0 else self.accuracy.dof
 
 
-def hold_noise(
-    records: Sequence[Sequence[Array]], step: float, resolution: ArrayLike = 0.0
-) -> HoldNoise:
+def hold_noise(records: Sequence[Array], step: float, resolution: ArrayLike = 0.0) -> HoldNoise:
     """Sum the samples of each hold in its channels.
 
     Parameters
     ----------
-    records : for each hold the forces (n, 3), m/s², of each of its uninterrupted parts
+    records : the forces (n, 3), m/s², of each hold
     step : float, s, usual time between samples
     resolution : (3,) array, m/s², steps in which the axes are read; 0 where there are none
     """
-    forces = [np.concatenate(parts) for parts in records]
-    means = np.array([each.mean(axis=0) for each in forces])
+    means = np.array([record.mean(axis=0) for record in records])
     center, directed = _center(means)
     frames = [_frame(mean - center) for mean in means]
-    covariances = [np.cov(each, rowvar=False) for each in forces]
+    covariances = [np.cov(record, rowvar=False) for record in records]
     variances = [
         np.diag(frame.T @ covariance @ frame)
         for covariance, frame in zip(covariances, frames, strict=True)
     ]
     sd = np.sqrt(np.mean(variances, axis=0))
-    each = [(part, frame) for parts, frame in zip(records, frames, strict=True) for part in parts]
-    allan = pooled_deviation([r[:LONGEST_RECORD] for r, _ in each], step, [f for _, f in each])
-    typical = int(np.median([len(each) for each in forces]))
+    allan = pooled_deviation([record[:LONGEST_RECORD] for record in records], step, frames)
+    typical = int(np.median([len(record) for record in records]))
     of_sensor = slice(0, 1 if directed else 3)
     accuracy, across = (
         accuracy_of_mean(allan.channels(channels), typical * step, sd[channels], typical)

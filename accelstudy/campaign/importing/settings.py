@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -16,6 +16,7 @@ from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
+    Block,
     Gravity,
     NotNegative,
     PathName,
@@ -27,7 +28,11 @@ from accelstudy.files.validation import (
 
 _LARGE = Field(le=1e6)
 
-_SPAN = re.compile(r"\s*(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s\s*")
+_EXCLUDED = re.compile(
+    r"\s*(?:(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s|(\d{1,9}(?:\s*,\s*\d{1,9})*))\s*:\s*(\S.*)",
+    re.DOTALL,
+)
+"""Holds by a span of time or by their numbers, and why they are left out."""
 
 
 class Span(NamedTuple):
@@ -44,19 +49,15 @@ Which = Span | tuple[int, ...]
 """Holds by a span of time, or by the numbers that the detector gave them."""
 
 
-class GravitySettings(BaseModel):
+class GravitySettings(Block):
     """Gravity where the sensor was."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     value_mps2: Gravity = Field(STANDARD_GRAVITY, description="local gravity, m/s²")
     sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
 
 
-class RobotSettings(BaseModel):
+class RobotSettings(Block):
     """The robot whose angles a table of means has."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
     unit: Literal["gon", "deg", "rad"] = Field("gon", description="unit of the angles in the table")
@@ -64,6 +65,8 @@ class RobotSettings(BaseModel):
 
 class ImportSettings(LogLayout):
     """How a log is read, and what the campaign gets from it; the keys of a settings file."""
+
+    retired: ClassVar = {"join": "holds in one attitude are positions each"}
 
     means: bool = Field(False, description="the file is a table of means already")
     block: int | None = Field(
@@ -90,11 +93,10 @@ class ImportSettings(LogLayout):
     exclude: list[str] = Field(
         [], description="holds to leave out, as 13:moved or 120s-135s:somebody passed"
     )
-    join: list[str] = Field([], description="holds that are one, as 4,5 or 120s-135s")
 
     @model_validator(mode="after")
     def _names_holds(self) -> Self:
-        _ = self.left_out, self.joined
+        _ = self.left_out
         return self
 
     @property
@@ -107,39 +109,20 @@ class ImportSettings(LogLayout):
     @property
     def left_out(self) -> list[tuple[Which, str]]:
         """Holds to leave out, with the reason: ``13:moved`` or ``120s-135s:moved``."""
-        chosen = []
+        chosen: list[tuple[Which, str]] = []
         for text in self.exclude:
-            holds, _, why = text.partition(":")
-            if (which := _which(holds)) is None or not why.strip():
+            match = _EXCLUDED.fullmatch(text)
+            if match is None or (match[1] and float(match[1]) >= float(match[2])):
                 raise InputError(
                     "exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
                     f"not {text!r}"
                 )
+            start, end, numbers, why = match.groups()
+            which: Which = (
+                Span(float(start), float(end)) if start else tuple(map(int, numbers.split(",")))
+            )
             chosen.append((which, why.strip()))
         return chosen
-
-    @property
-    def joined(self) -> list[Which]:
-        """Holds that are one: ``4,5`` or ``120s-135s``."""
-        chosen = []
-        for text in self.join:
-            if (which := _which(text)) is None or len(which) < 2:
-                raise InputError(
-                    f"join: expected numbers of holds or a time, as 4,5 or 120s-135s, not {text!r}"
-                )
-            chosen.append(which)
-        return chosen
-
-
-def _which(text: str) -> Which | None:
-    """Holds by their numbers or their time; None if it is neither."""
-    if match := _SPAN.fullmatch(text):
-        span = Span(float(match[1]), float(match[2]))
-        return span if span.start < span.end else None
-    numbers = [part.strip() for part in text.split(",")]
-    if not all(re.fullmatch(r"\d{1,9}", number) for number in numbers):
-        return None
-    return tuple(sorted({int(number) for number in numbers}))
 
 
 def parse_settings(
