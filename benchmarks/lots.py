@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from multiprocessing import Pool
 
 import numpy as np
+from scipy.stats import binomtest
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.shares import clopper_pearson
 from accelstudy.lots.lot import weigh_lot
 from accelstudy.sensors.models import get_model
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
@@ -161,7 +161,7 @@ def share(answers):
     if not answers:
         return ""
     count, n = sum(answers), len(answers)
-    low, high = clopper_pearson(count, n)
+    low, high = binomtest(count, n).proportion_ci()
     return f"{count / n:.2f} ({low:.2f} to {high:.2f})"
 
 

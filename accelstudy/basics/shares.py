@@ -7,11 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-Array = NDArray[np.float64]
-
 Z95 = 1.959963984540054
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 
@@ -33,20 +28,6 @@ def sigmas_95(dof: float = math.inf) -> float:
     from scipy import special  # a job that only draws goes without
 
     return float(special.stdtrit(dof, 0.975))
-
-
-def clopper_pearson(count: ArrayLike, n: ArrayLike, level: float = 0.95) -> tuple[Array, Array]:
-    """Exact interval of shares, low (...) and high (...), of counts (...) in n (...).
-
-    Where n is 0 nothing is known, and the interval is from 0 to 1.
-    """
-    from scipy import special
-
-    count, n = np.asarray(count, dtype=float), np.asarray(n, dtype=float)
-    tail = (1 - level) / 2
-    low = special.betaincinv(np.maximum(count, 1), n - count + 1, tail)
-    high = special.betainccinv(count + 1, np.maximum(n - count, 1), tail)
-    return np.where(count > 0, low, 0.0), np.where(count < n, high, 1.0)
 
 
 def wilson(count: int, n: int) -> tuple[float, float]:

@@ -72,8 +72,7 @@ STYLE: Style = {
 
 INK = "#222222"
 MISSING = "#E6E6E6"
-"""Background of what does not exist; drawn hatched."""
-HATCH = "////"
+"""Background of what does not exist."""
 
 # Okabe & Ito's colours for the groups of parameters, and two others for the approaches.
 APPROACH_COLOURS = {"gravity": "#4A4A4A", "robot": "#C2247A"}

@@ -17,12 +17,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binomtest
 
 from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
 from accelstudy.basics import units
-from accelstudy.basics.shares import clopper_pearson, sigmas_95
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, position_rows
 from accelstudy.drawing import style
@@ -198,8 +199,8 @@ def summary_table(sessions: pd.DataFrame) -> pd.DataFrame:
     table["sessions"] = groups.size()
     for percent in (5, 95):
         table[f"positions_{percent}"] = groups["positions"].quantile(percent / 100)
-    ends = clopper_pearson(groups["broken"].sum(), table["sessions"])
-    table["broken_low"], table["broken_high"] = ends
+    counts = zip(groups["broken"].sum(), table["sessions"], strict=True)
+    table[["broken_low", "broken_high"]] = [binomtest(*each).proportion_ci() for each in counts]
     return table.reset_index()
 
 

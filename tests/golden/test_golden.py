@@ -52,17 +52,6 @@ def test_each_command_with_quiet_is_kept():
     assert {*re.findall("^=== accelstudy ([a-z-]+).* --quiet", text, re.M)} == has
 
 
-def test_the_first_example_of_a_log_needs_no_columns():
-    """Those by number come second; both are the same log, so nothing else differs."""
-    steps = kept_of("readme")["README"].split("\n=== ")
-    first, second = (step for step in steps if step.startswith("accelstudy import "))
-    assert first.startswith("accelstudy import calibration.csv --out my-campaign\n")
-    assert "--columns fx=0" in second
-    holds = [re.search("^> holds: .*", text, re.M)[0] for text in (first, second)]
-    assert holds[0] == holds[1]
-    assert holds[0].startswith("> holds: 24, ")
-
-
 def test_the_readme_quotes_what_its_commands_print():
     text = (ROOT / "README.md").read_text("utf-8")
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.M | re.S)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hidden_sample import sample
+from scipy.stats import binomtest
 
-from accelstudy.basics.shares import clopper_pearson
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.space.shapes import LearnedShapes
@@ -198,7 +198,7 @@ def test_targets(targets, figure, cases, wanted, measured, n, met):
     assert (row.get("target", ""), row["n"], row.get("met", "")) == (wanted, n, met)
     assert row["measured"] == share_text(measured)
     if n and "names" not in figure and "median" not in figure and "expect" not in figure:
-        ends = clopper_pearson(round(measured * n), n)
+        ends = binomtest(round(measured * n), n).proportion_ci()
         assert row["95 % interval"] == " … ".join(share_text(float(end)) for end in ends)
 
 

@@ -1,4 +1,4 @@
-"""A release: version, changelog, citation and tag agree; hooks check what `make lint` checks."""
+"""A release: version, changelog, citation and tag agree."""
 
 import re
 import subprocess
@@ -7,7 +7,6 @@ import tomllib
 import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
-from packaging.version import Version
 from places import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -26,13 +25,6 @@ def test_version_changelog_citation_and_lock_agree():
     assert citation["license"] == PROJECT["license"]
 
 
-def test_releases_are_in_order():
-    versions = [Version(version) for version, _ in RELEASES]
-    assert versions == sorted({*versions}, reverse=True)
-    dates = [date for _, date in RELEASES]
-    assert dates == sorted(dates, reverse=True)
-
-
 def test_a_tag_of_this_commit_is_that_of_its_version():
     tags = subprocess.run(
         ["git", "tag", "--points-at", "HEAD"], cwd=ROOT, capture_output=True, text=True
@@ -48,14 +40,6 @@ def test_python_versions_are_the_same_everywhere():
         PROJECT["requires-python"]
         == f">={min(named)},<3.{max(map(int, (n[2:] for n in named))) + 1}"
     )
-
-
-def test_hooks_run_what_make_lint_runs():
-    recipe = re.search(r"^lint:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.M)[1]
-    (local,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
-    assert local["repo"] == "local"  # needs no network
-    commands = [line.strip() for line in recipe.splitlines()]
-    assert [hook["entry"] for hook in local["hooks"]] == [f".venv/bin/{c}" for c in commands]
 
 
 def test_the_environment_file_names_this_version():

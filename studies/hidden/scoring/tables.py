@@ -16,9 +16,9 @@ import numpy as np
 import pandas as pd
 import yaml
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.stats import binom, binomtest
 
-from accelstudy.basics.shares import clopper_pearson, sigmas_95
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.wording import words
 from studies.hidden.study import Row
 
@@ -80,8 +80,10 @@ def statistic(x: NDArray[np.float64], name: str) -> Measured:
         if name == "median" and (k := int(binom.ppf(0.025, n, 0.5))):
             low, high = x[k - 1], x[n - k]
         return Measured(value, low, high, n, name)
-    low, high = map(float, clopper_pearson(x.sum(), n))
-    return Measured(float(x.sum() / n) if n else np.nan, low, high, n, name)
+    if not n:
+        return Measured(np.nan, 0.0, 1.0, n, name)
+    low, high = binomtest(int(x.sum()), n).proportion_ci()
+    return Measured(float(x.sum() / n), low, high, n, name)
 
 
 # --- text -----------------------------------------------------------------------------------------
