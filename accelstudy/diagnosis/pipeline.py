@@ -21,7 +21,6 @@ from accelstudy.approaches import Approach
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.certain import add_certain_effects, withdraw_refuted
 from accelstudy.diagnosis.decision.learned import learn_function
 from accelstudy.diagnosis.decision.noise import tests_of_noise, worst_of
 from accelstudy.diagnosis.decision.posterior import Case
@@ -29,9 +28,11 @@ from accelstudy.diagnosis.decision.problem import fit_base, is_exact, pose
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Reason,
+    add_certain_effects,
     dismiss_weak_evidence,
     explain,
     judge_noise,
+    withdraw_refuted,
 )
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.held_out import Gap, gap_of

@@ -11,11 +11,10 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.diagnosis.decision.certain import withdraw_refuted
 from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
-from accelstudy.diagnosis.decision.verdict import Finding, Reason
+from accelstudy.diagnosis.decision.verdict import Finding, Reason, withdraw_refuted
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -243,7 +244,11 @@ def json_number(value: Any) -> float | None:
 
 
 def json_content(content: Any) -> Any:
-    """Content for JSON: arrays are lists, and what is no finite number is None."""
+    """Content for JSON: records are objects, arrays are lists, what is no finite number is None."""
+    if is_dataclass(content):
+        content = {part.name: getattr(content, part.name) for part in fields(content)}
+    elif hasattr(content, "_asdict"):
+        content = content._asdict()
     if isinstance(content, dict):
         return {key: json_content(value) for key, value in content.items()}
     if isinstance(content, np.ndarray):

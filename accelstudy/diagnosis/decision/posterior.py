@@ -20,8 +20,9 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
+from accelstudy.diagnosis.evidence.bounds import within_bounds
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_models import colour_densities
@@ -337,3 +338,63 @@ class Case(Weighing):
     def _colours(self) -> NDArray[np.float64]:
         """Log densities of the residuals with coloured noise, by its length."""
         return colour_densities(self.problem.residuals, self.problem.evidence)
+
+
+# --- what is large: to first order it leaves so much that anything seems to be beside it --------
+
+
+def is_large(problem: Problem, single: Explanation) -> bool:
+    """Whether an effect is so large that its signature to first order is not enough."""
+    z, basis = problem.residuals.z, single.best[0].basis
+    return single.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
+
+
+def posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterior:
+    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of sets.
+
+    Parameters
+    ----------
+    case : Case
+    single : Explanation, the effect
+    count : int, sets of candidates that are refitted, the most probable to first order
+    """
+    tried = [single, *sorted(case.sets, key=lambda one: -one.log_weight)[:count]]
+    refitted = [_refitted(case, one) for one in tried]
+    alone, solution = refitted[0]
+    weighed = [one for one, _ in refitted]
+    if solution is not None:
+        weighed += _beside(case, alone, solution)
+    others = [one for one in case.alone if one.names != single.names]
+    return Posterior.of([*weighed, *others, *case.noises])
+
+
+def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
+    """Weigh an explanation by its refit instead of by first order."""
+    fit = case.refit(one.causes)
+    if fit is None:
+        return one, None
+    best, solution = fit
+    z, basis = case.problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
+    left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
+    gain = max(float(left @ left) - solution.omega, 0.0)
+    parts = float(z @ z - left @ left) + np.array([0.0, gain])
+    first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
+    weight = one.log_weight + float(refit - first)
+    causes = tuple(replace(c, best=h) for c, h in zip(one.causes, best, strict=True))
+    return Explanation(causes, weight), solution
+
+
+def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
+    """One effect with another one, or with something unknown, in what its refit leaves."""
+    inner = Weighing(pose(replace(case.problem.base, solution=solution)))
+    problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
+    odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
+    for name, log in zip(problem.field.names, odds.tolist(), strict=True):
+        cause, more = NOT_LISTED, np.log(problem.prior_unknown)
+        if name != UNKNOWN:
+            other = problem.examined.candidates[name].strongest(z)
+            cause = Cause(name, inner.members[name], other)
+            more = within_bounds((other,), z, problem.evidence)[0] - np.log(len(case.classes))
+        weight = log + float(more + np.log(RULES.prior_two))
+        weighed.append(Explanation((*alone.causes, cause), weight))
+    return weighed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -13,18 +13,18 @@ from accelstudy.adjustment.quality import Solution, global_test
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.diagnosis.decision.noise import lack_of_fit, misfit
 from accelstudy.diagnosis.decision.posterior import (
-    NOT_LISTED,
     Case,
     Explanation,
     Posterior,
-    Weighing,
+    is_large,
+    posterior_by_refits,
 )
-from accelstudy.diagnosis.decision.problem import Problem, pose
-from accelstudy.diagnosis.decision.statement import Statement
-from accelstudy.diagnosis.evidence.bounds import within_bounds
+from accelstudy.diagnosis.decision.problem import Problem
+from accelstudy.diagnosis.decision.statement import Part, Statement, statement
 from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
 from accelstudy.diagnosis.evidence.singles import Cause
+from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
@@ -105,12 +105,12 @@ def explain(case: Case) -> Finding:
     """Find the explanation, or the few, of what is missing; "unknown" where none is enough."""
     posterior = case.posterior
     single = next((one for one in posterior.all if len(one.best) == 1), None)
-    if single is not None and _is_large(case.problem, single):
-        posterior = _posterior_by_refits(case, single, 1)
+    if single is not None and is_large(case.problem, single):
+        posterior = posterior_by_refits(case, single, 1)
     finding = _judge(case, posterior)
     if finding.code == "misfit" and single is not None:
         # To first order the best explanation was enough; the others were not asked by their refits.
-        posterior = _posterior_by_refits(case, single, RULES.refitted_sets)
+        posterior = posterior_by_refits(case, single, RULES.refitted_sets)
         finding = _judge(case, posterior)
     return finding
 
@@ -185,6 +185,101 @@ def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
     return Finding("no_effect", case.problem.frame, Reason.of("weak", p=case.detection.p_value))
 
 
+# --- what is certain, whatever else is open -----------------------------------------------------
+
+# Explanations that share an effect may leave no doubt of it, while none of them is probable enough
+# to be the answer, or all of them leave a misfit. But where more is missing than the catalogue
+# explains, an effect of it may only imitate what has no name. That is hardly ever so well done that
+# the effect explains nearly all there is; what explains less is doubted.
+
+
+def add_certain_effects(case: Case, finding: Finding) -> Finding:
+    """Say what is certain, and add it to the fit whatever else is missing."""
+    posterior = finding.posterior
+    assert posterior is not None
+    if finding.verdict != "unknown":
+        return replace(finding, says=statement(finding.credible_set, case.cosine))
+    beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
+    if finding.code == "misfit" or beyond > 1 - RULES.credible:
+        posterior = posterior.doubting(_perhaps_imitations(case, posterior))
+    says = statement(posterior.all, case.cosine)
+    finding = replace(finding, posterior=posterior, says=says)
+    chosen = [cause for _, cause in _certain_effects(case, posterior, says)]
+    if not chosen:
+        return finding
+    fit = _fit_of(case, chosen)
+    if fit is None:
+        return replace(finding, says=Statement((), ()))
+    added = tuple(
+        Cause(best.name, one.members, best, one.posterior)
+        for one, best in zip(chosen, fit[0], strict=True)
+    )
+    return replace(finding, frame=Frame.of(fit[1]), chosen=added)
+
+
+def _certain_effects(case: Case, posterior: Posterior, says: Statement) -> list[tuple[Part, Cause]]:
+    """Components that are certain and effects, each with its most probable name."""
+    chosen = []
+    for part in says.certain:
+        if (name := part.names[0]).name in effect_names():
+            shapes = (h for one in posterior.all for h in one.best if h.name == name.name)
+            best = next(shapes, case.singles.best[name.name])
+            chosen.append((part, replace(name, best=best, posterior=part.posterior)))
+    return chosen
+
+
+def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
+    """Names of what seems certain, and yet does not explain nearly all that is left without it.
+
+    More is missing than the catalogue explains. An effect of it may imitate what is in none, though
+    hardly ever nearly all of that.
+    """
+    seeming = _certain_effects(case, posterior, statement(posterior.all, case.cosine))
+    chosen, names = [cause for _, cause in seeming], set[str]()
+    after = _disagreement(case, chosen)
+    for i, (part, _) in enumerate(seeming):
+        without = _disagreement(case, [*chosen[:i], *chosen[i + 1 :]])
+        if after > (1 - RULES.nearly_all) * without:
+            names |= {name.name for name in part.names}
+    return names
+
+
+def _fit_of(case: Case, chosen: Sequence[Cause]) -> tuple[list[Hypothesis], Solution] | None:
+    """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
+    if not chosen:
+        return [], case.problem.frame.solution
+    return case.refit(chosen)
+
+
+def _disagreement(case: Case, chosen: Sequence[Cause]) -> float:
+    """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
+    fit = _fit_of(case, chosen)
+    if fit is None:
+        return np.inf
+    noise = fit[1].redundancy * float(case.problem.evidence.level.known)
+    return max(fit[1].omega - noise, 1e-9)
+
+
+def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
+    """What is said where the held-out positions refute what was chosen: nothing of it is certain.
+
+    Parameters
+    ----------
+    case : Case
+    finding : Finding
+    held : HeldOutGap
+    """
+    reason = finding.reason
+    if finding.verdict != "unknown":
+        names = [cause.name for cause in finding.chosen]
+        reason = Reason.of("refuted", names=names, before=held.before, after=held.after)
+    assert finding.posterior is not None
+    doubted = [name for cause in finding.chosen for name in cause.members]
+    posterior = finding.posterior.doubting(doubted)
+    says = Statement((), statement(posterior.all, case.cosine).open)
+    return Finding("unknown", case.problem.frame, reason, posterior=posterior, says=says)
+
+
 # --- a test of the noise fails, though no effect was significant --------------------------------
 
 
@@ -249,65 +344,3 @@ def _of_courses(problem: Problem, posterior: Posterior) -> float:
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
     return sum(one.posterior for one in posterior.told if courses.issuperset(one.names))
-
-
-# --- what is large ------------------------------------------------------------------------------
-
-
-def _is_large(problem: Problem, top: Explanation) -> bool:
-    """Whether an effect is so large that its signature to first order is not enough."""
-    z, basis = problem.residuals.z, top.best[0].basis
-    return top.best[0].effect is not None and float(np.sum((z @ basis) ** 2)) > RULES.large
-
-
-def _posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterior:
-    """Posterior by refits: of an effect alone, with more in what its refit leaves, and of sets.
-
-    To first order a large effect leaves so much that anything would seem to be beside it.
-
-    Parameters
-    ----------
-    case : Case
-    single : Explanation, the effect
-    count : int, sets of candidates that are refitted, the most probable to first order
-    """
-    tried = [single, *sorted(case.sets, key=lambda one: -one.log_weight)[:count]]
-    refitted = [_refitted(case, one) for one in tried]
-    alone, solution = refitted[0]
-    weighed = [one for one, _ in refitted]
-    if solution is not None:
-        weighed += _beside(case, alone, solution)
-    others = [one for one in case.alone if one.names != single.names]
-    return Posterior.of([*weighed, *others, *case.noises])
-
-
-def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
-    """Weigh an explanation by its refit instead of by first order."""
-    fit = case.refit(one.causes)
-    if fit is None:
-        return one, None
-    best, solution = fit
-    z, basis = case.problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
-    left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
-    gain = max(float(left @ left) - solution.omega, 0.0)
-    parts = float(z @ z - left @ left) + np.array([0.0, gain])
-    first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
-    weight = one.log_weight + float(refit - first)
-    causes = tuple(replace(c, best=h) for c, h in zip(one.causes, best, strict=True))
-    return Explanation(causes, weight), solution
-
-
-def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
-    """One effect with another one, or with something unknown, in what its refit leaves."""
-    inner = Weighing(pose(replace(case.problem.base, solution=solution)))
-    problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
-    odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
-    for name, log in zip(problem.field.names, odds.tolist(), strict=True):
-        cause, more = NOT_LISTED, np.log(problem.prior_unknown)
-        if name != UNKNOWN:
-            other = problem.examined.candidates[name].strongest(z)
-            cause = Cause(name, inner.members[name], other)
-            more = within_bounds((other,), z, problem.evidence)[0] - np.log(len(case.classes))
-        weight = log + float(more + np.log(RULES.prior_two))
-        weighed.append(Explanation((*alone.causes, cause), weight))
-    return weighed

@@ -6,6 +6,7 @@ simulations of white Gaussian noise, equal on all axes, in the same adjustment s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,39 +64,24 @@ def force_residuals(residuals: Residuals, errors: Array) -> Array:
 def level_test(residuals: Residuals, sigma_dof: float = np.inf) -> NoiseTest:
     """Whether the residuals are as large as sigma says, two-sided (the global test)."""
     factor = residuals.variance
-    omega = factor * residuals.redundancy
-    test = global_test(omega, residuals.redundancy, sigma_dof=sigma_dof)
+    test = global_test(factor * residuals.redundancy, residuals.redundancy, sigma_dof=sigma_dof)
     assert test is not None
-    size = "larger" if factor > 1 else "smaller"
-    return NoiseTest(
-        LEVEL,
-        omega,
-        min(test.p_value, 1.0),
-        (factor,),
-        f"the residuals are {np.sqrt(max(factor, 1 / factor)):.3g} times {size} than sigma says",
-    )
+    times, size = np.sqrt(max(factor, 1 / factor)), "larger" if factor > 1 else "smaller"
+    remark = f"the residuals are {times:.3g} times {size} than sigma says"
+    return NoiseTest(LEVEL, test.statistic, min(test.p_value, 1.0), (factor,), remark)
 
 
 def axis_test(residuals: Residuals, chance: Chance) -> NoiseTest:
     """Whether one axis is noisier than the others."""
 
     def shares(errors: Array) -> Array:
-        v = force_residuals(residuals, errors)
-        squares = np.sum(v**2, axis=-2)
+        squares = np.sum(force_residuals(residuals, errors) ** 2, axis=-2)
         return np.asarray(squares / np.sum(squares, axis=-1, keepdims=True))
 
-    usual = chance.statistic(residuals, shares)
-    mean, scale = usual.mean(axis=0), usual.std(axis=0)
-    statistic = float(np.max(np.abs(shares(residuals.z) - mean) / scale))
-    p = _upper(np.max(np.abs(usual - mean) / scale, axis=-1), statistic)
     factors = axis_factors(residuals)
-    return NoiseTest(
-        AXES,
-        statistic,
-        p,
-        tuple(factors),
-        "variance factors of the axes " + ", ".join(f"{k:.2f}" for k in factors),
-    )
+    remark = "variance factors of the axes " + ", ".join(f"{k:.2f}" for k in factors)
+    statistic, p = _largest(residuals, chance, shares, np.abs)
+    return NoiseTest(AXES, statistic, p, tuple(factors), remark)
 
 
 def axis_factors(residuals: Residuals) -> Array:
@@ -123,18 +109,24 @@ def colour_test(residuals: Residuals, chance: Chance) -> NoiseTest:
         total = np.sum(errors**2, axis=-1)
         return quadratic_forms(force_residuals(residuals, errors)) / total[..., None]
 
-    usual = chance.statistic(residuals, statistics)
-    mean, scale = usual.mean(axis=0), usual.std(axis=0)
-    statistic = float(np.max((statistics(residuals.z) - mean) / scale))
     v = force_residuals(residuals, residuals.z)
     successive = float(np.sum(v[1:] * v[:-1]) / np.sum(v**2))
-    return NoiseTest(
-        COLOUR,
-        statistic,
-        _upper(np.max((usual - mean) / scale, axis=-1), statistic),
-        (successive,),
-        f"residuals of successive holds are correlated by {successive:.2f}".replace("-", "−"),
-    )
+    remark = f"residuals of successive holds are correlated by {successive:.2f}".replace("-", "−")
+    statistic, p = _largest(residuals, chance, statistics, np.asarray)
+    return NoiseTest(COLOUR, statistic, p, (successive,), remark)
+
+
+def _largest(
+    residuals: Residuals,
+    chance: Chance,
+    statistics: Callable[[Array], Array],
+    sided: Callable[[Array], Array],
+) -> tuple[float, float]:
+    """Largest of some statistics, each over its usual scatter about its mean, and its p-value."""
+    usual, seen = chance.statistic(residuals, statistics), statistics(residuals.z)
+    mean, scale = usual.mean(axis=0), usual.std(axis=0)
+    value = float(np.max(sided(seen - mean) / scale))
+    return value, _upper(np.max(sided(usual - mean) / scale, axis=-1), value)
 
 
 def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
@@ -147,13 +139,8 @@ def tail_test(residuals: Residuals, chance: Chance) -> NoiseTest:
         return np.asarray(np.mean(squares**2, axis=-1) / np.mean(squares, axis=-1) ** 2)
 
     value = float(kurtosis(residuals.z))
-    return NoiseTest(
-        TAILS,
-        value,
-        _upper(chance.statistic(residuals, kurtosis), value),
-        (value,),
-        f"kurtosis of the residuals {value:.1f}",
-    )
+    p = _upper(chance.statistic(residuals, kurtosis), value)
+    return NoiseTest(TAILS, value, p, (value,), f"kurtosis of the residuals {value:.1f}")
 
 
 def within_hold_test(
@@ -178,16 +165,13 @@ def within_hold_test(
         return NoiseTest(COLOUR, 0.0, 1.0, (0.0,), remark)
     white = float(np.mean(sd**2 / n_samples[:, None]))
     freedom = 3 * float(np.sum(n_samples - 1))
-    ratio = scatter / white
-    return NoiseTest(
-        COLOUR,
-        ratio,
-        float(special.fdtrc(residuals.redundancy, freedom, ratio)),
-        (float(np.sqrt(white)),),
-        f"white noise within the holds explains {1e3 * np.sqrt(white):.2f} of "
-        f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean",
-        by_holds=True,
+    ratio, sigma = scatter / white, float(np.sqrt(white))
+    p = float(special.fdtrc(residuals.redundancy, freedom, ratio))
+    remark = (
+        f"white noise within the holds explains {1e3 * sigma:.2f} of "
+        f"{1e3 * np.sqrt(scatter):.2f} mm/s² of a position mean"
     )
+    return NoiseTest(COLOUR, ratio, p, (sigma,), remark, by_holds=True)
 
 
 def _upper(usual: Array, value: float) -> float:

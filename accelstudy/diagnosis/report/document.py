@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import (
     calibration_document,
-    json_number,
+    json_content,
     quality_document,
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
@@ -87,20 +87,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "warnings": d.campaign.warnings,
         "rules": RULES,
     }
-    return dict(_plain(content))
-
-
-def _plain(value: Any) -> Any:
-    """As JSON has it: records are mappings, and what is no finite number is null."""
-    if is_dataclass(value):
-        value = {part.name: getattr(value, part.name) for part in fields(value)}
-    elif hasattr(value, "_asdict"):
-        value = value._asdict()
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
-    return json_number(value) if isinstance(value, float) else value
+    return dict(json_content(content))
 
 
 def _some(record: object, *names: str) -> dict[str, Any]:
@@ -146,8 +133,8 @@ def _certain(part: Part, d: Diagnosis) -> dict[str, Any]:
 
 def effect_document(named: Named) -> dict[str, Any]:
     """Describe an effect, a noise effect or a gross error that was found."""
-    optional = ("position", "settings")
-    return {k: v for k, v in _plain(named).items() if k not in optional or v not in (None, [])}
+    optional, content = ("position", "settings"), json_content(named)
+    return {k: v for k, v in content.items() if k not in optional or v not in (None, [])}
 
 
 def _next(position: NextPosition) -> dict[str, Any]:
