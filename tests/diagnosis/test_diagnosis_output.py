@@ -4,24 +4,25 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call
-from diagnosis_helpers import explanation, otherwise
+from calling import succeed
+from diagnosis_helpers import NINE, ROBOT, explanation, otherwise
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
 from stand_ins import composed
 
 import accelstudy
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number
@@ -44,10 +45,8 @@ from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.drawing.style import STYLE
-from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
 
-NINE = get_model("bias-scale-nonorthogonality")
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
 CASES = {
     "named": {"effects": (THERMAL,),
@@ -92,38 +91,53 @@ RENDERED = {"named": ("residuals", "gap"), "learned": ("shape",)}
 """Figures that are rendered, by case; all others are only composed, which takes far less time."""
 
 
+class Written(NamedTuple):
+    """A diagnosis, the folder of its files, and the content of diagnosis.json."""
+
+    diagnosed: accelstudy.Diagnosis
+    folder: Path
+    content: dict
+
+    @property
+    def found(self):
+        return self.diagnosed.result
+
+    @property
+    def page(self):
+        return (self.folder / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Diagnoses of all cases, each made once."""
-    root, made = tmp_path_factory.mktemp("diagnoses"), {}
+    """Diagnoses of all cases, each made and written once."""
+    root = tmp_path_factory.mktemp("diagnoses")
 
+    @cache
     def get(case):
-        if case not in made:
-            simulated(case, root / case)
-            out = root / f"{case}-out"
-            with composed(*RENDERED.get(case, ())):
-                result = call("diagnose", root / case, "--out", out, "--replicates", 100)
-            assert result.exit_code == 0, result.output
-            content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-            made[case] = out, content, result.output
-        return made[case]
+        simulated(case, root / case)
+        diagnosed = accelstudy.diagnose(root / case, replicates=100)
+        folder = root / f"{case}-out"
+        with composed(*RENDERED.get(case, ())):
+            diagnosed.save(folder)
+        content = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+        return Written(diagnosed, folder, content)
 
     return get
 
 
 @pytest.fixture(scope="module")
-def named(tmp_path_factory):
+def named(written):
     """Diagnosis of the named effect, for what can be told of it otherwise."""
-    return diagnose(simulated("named", tmp_path_factory.mktemp("named") / "c"), NINE)
+    return written("named").found
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_verdict_is_written_and_told(written, case):
-    out, content, printed = written(case)
+    diagnosed, out, content = written(case)
     assert content["verdict"] == ("named" if case == "gravity" else case)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert HEADLINES[case] in printed
+    page = written(case).page
+    assert HEADLINES[case] in diagnosed.verdict
     assert HEADLINES[case] in text_of(page)
     drawn = {path.stem for path in (out / "figures").glob("*.svg")}
     assert {"evidence", "residuals"} <= drawn
@@ -274,13 +288,13 @@ def test_a_further_effect_is_asked_for_as_such():
     ({"verdict": "no_effect"}, "$.effects"),
 ])  # fmt: skip
 def test_the_schema_asks_what_a_verdict_requires(written, change, path):
-    _, content, _ = written("named")
+    content = written("named").content
     changed = {**content, **change, "gap": {**content["gap"], **change.get("gap", {})}}
     assert path in [error.json_path for error in SCHEMA.iter_errors(changed)]
 
 
 def test_positions_say_what_was_held_out(written):
-    out, content, _ = written("named")
+    _, out, content = written("named")
     positions = pd.read_parquet(out / "positions.parquet")
     held = positions["split"] == "held-out"
     assert positions.loc[held, "position"].tolist() == content["gap"]["held_out_positions"]
@@ -308,7 +322,7 @@ def test_a_bumped_position_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("case", ["named", "gravity", "noise_model"])
 def test_the_model_is_a_study(written, case):
-    out, content, _ = written(case)
+    _, out, content = written(case)
     study = read_study(ROOT / "config/config.yaml", out / "model.yaml")
     assert study.study == case
     assert study.sigma_force == pytest.approx(content["noise"]["sigma_mps2"])
@@ -319,11 +333,13 @@ def test_the_model_is_a_study(written, case):
 
 
 def test_same_seed_same_files(written, tmp_path):
-    out, _, _ = written("named")
+    """From the command, which says the verdict, and from the function."""
+    out = written("named").folder
     first = Path(shutil.copytree(out, tmp_path / "first"))
     with composed(*RENDERED["named"]):
         # Its commands name the folder.
-        accelstudy.diagnose(out.parent / "named", replicates=100).save(out)
+        words = ("diagnose", out.parent / "named", "--out", out, "--replicates", 100, "--force")
+        assert HEADLINES["named"] in succeed(*words).output
     for path in sorted(first.rglob("*.*")):
         if path.suffix != ".parquet":
             assert path.read_bytes() == (out / path.relative_to(first)).read_bytes(), path.name
@@ -333,7 +349,7 @@ def test_same_seed_same_files(written, tmp_path):
 
 
 def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
-    loop = close_loop(named, 300, seed=3)
+    loop = written("named").diagnosed.loop
     old, real, new = loop.document["cases"]
     assert not old["contains_measurement"]
     assert real["contains_measurement"]
@@ -346,18 +362,14 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     assert real["tilt_rms_mgon"] == pytest.approx(before / MGON, rel=0.05)
     assert new["tilt_rms_mgon"] == pytest.approx(after / MGON, rel=0.1)
     assert old["tilt_rms_mgon"] < 0.5 * before / MGON
-    out, content, _ = written("named")
-    shown = number(content["loop"]["cases"][0]["tilt_rms_mgon"])
-    assert f"promises a tilt error of {shown} mgon" in text_of(
-        (out / "report.html").read_text("utf-8")
-    )
+    promised = f"promises a tilt error of {number(old['tilt_rms_mgon'])} mgon"
+    assert promised in text_of(written("named").page)
 
     with angles_in("deg"), composed():
         document = write_diagnosis(named, tmp_path / "deg", loop=loop)
     assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
     page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
-    promised = document["loop"]["cases"][0]["tilt_rms_mgon"]
-    assert f"promises a tilt error of {number(0.9 * promised)} mdeg" in page
+    assert f"promises a tilt error of {number(0.9 * old['tilt_rms_mgon'])} mdeg" in page
     assert re.findall(r"(?:[^.\w]|m)gon", page) == []
 
 
@@ -372,37 +384,34 @@ def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     assert page.count("<svg") == 1  # that of the residuals
 
 
-@pytest.mark.parametrize("effects", [(), ("saturation(knee=9.3): 1, 1, 1",)])
-def test_nothing_to_compare_without_an_effect_or_an_inverse(effects):
-    settings = CampaignSettings(scheme="fibonacci-36", seed=3, effects=effects)
-    assert close_loop(diagnose(simulate_campaign(settings)[0], NINE)) is None
+def test_nothing_to_compare_without_an_effect_or_a_tilt(written, named):
+    """A sensor that clips may have no tilt."""
+    assert written("no_effect").diagnosed.loop is None
+    assert close_loop(otherwise(named, leveling=None)) is None
 
 
 @pytest.mark.usefixtures("composed")
-def test_a_figure_that_fails_takes_nothing_with_it(tmp_path, monkeypatch, capsys):
-    campaign = simulated("no_effect", tmp_path / "c")
-    diagnosis = diagnose(campaign, NINE)
+def test_a_figure_that_fails_takes_nothing_with_it(written, tmp_path, monkeypatch, capsys):
+    """Of a diagnosis, nor of a calibration."""
+    found = written("no_effect").found
     monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
-    write_diagnosis(diagnosis, tmp_path / "out")
-    assert (tmp_path / "out/diagnosis.json").exists()
-    assert not list((tmp_path / "out").rglob("*.part"))
-
-    fit = fit_campaign(campaign, NINE, get_approach("robot"))
     monkeypatch.setattr(
         "accelstudy.campaign.calibration.output.correlation_figure", lambda _: 1 / 0
     )
-    write_calibration(assess(fit), tmp_path / "calibrated")
-    for line, name, folder in zip(capsys.readouterr().err.splitlines(),
-                                  ("evidence", "correlations"), ("out", "calibrated"),
-                                  strict=True):  # fmt: skip
+    write_diagnosis(found, tmp_path / "evidence")
+    assert (tmp_path / "evidence/diagnosis.json").exists()
+    assert not list((tmp_path / "evidence").rglob("*.part"))
+    write_calibration(assess(fit_campaign(found.campaign, NINE, ROBOT)), tmp_path / "correlations")
+    failed = ("evidence", "correlations")
+    for line, name in zip(capsys.readouterr().err.splitlines(), failed, strict=True):
         said = f"The figure '{name}' could not be drawn (ZeroDivisionError: division by zero)."
         assert line == f"warning: {said}"
-        page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
+        page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert said in page.replace("&#x27;", "'")
         assert page.count("<svg") == 1
 
 
-def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, monkeypatch):
+def test_variances_of_unit_weight_that_are_nothing_are_not_compared(named, monkeypatch):
     """They say nothing of the noise."""
     sessions = pd.DataFrame(
         [{"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
@@ -410,10 +419,9 @@ def test_variances_of_unit_weight_that_are_nothing_are_not_compared(tmp_path, mo
     ).assign(converged=True, tilt_error_rad=1e-3)  # fmt: skip
     loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
     assert loop.document["cases"][0]["sigma0_squared_central95"] == [1.2, 1.2]
-    diagnosis = diagnose(simulated("gravity", tmp_path / "c"), NINE)
     nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
     monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
-    assert close_loop(diagnosis, 1) is None
+    assert close_loop(named, 1) is None
 
 
 def test_numbers_of_many_positions_do_not_meet():

@@ -37,9 +37,11 @@ def measured(*effects, **changes):
 
 
 @pytest.mark.parametrize("effect", PLACES)
-def test_a_large_effect_is_placed_where_its_formula_has_it(effect):
+def test_a_large_effect_is_confirmed_and_placed_where_its_formula_has_it(effect):
     found = diagnose(measured(effect), NINE)
     assert found.verdict == "named"
+    assert found.gap.confirmed
+    assert found.gap.after < 2 < found.gap.before
     assert (found.like[0].coordinate, found.like[0].target) == PLACES[effect]
     posteriors = [place.posterior for place in found.like]
     assert posteriors[0] > 0.5
