@@ -23,9 +23,8 @@ from accelstudy.diagnosis.decision.noise import exceeds_stated, unit_variance
 from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Seen
 from accelstudy.diagnosis.evidence.detection import log_ratio, simulated, total_odds
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Seen
-from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.prediction import (
     Group,
     HeldOutGap,
@@ -122,7 +121,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
     split = LinearSplit(problem.frame, fitted, held)
-    beyond = case.detection.by_chance.beyond(RULES.level(known))
+    beyond = case.detection.beyond(RULES.level(known))
     test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[2]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1

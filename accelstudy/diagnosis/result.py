@@ -37,10 +37,9 @@ from accelstudy.diagnosis.decision.verdict import (
     coloured,
     unrecorded,
 )
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.detection import Detection
-from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL, NoiseTest
-from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
 from accelstudy.diagnosis.rules import RULES

@@ -15,8 +15,8 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.evidence.sets import weigh_sets

@@ -9,7 +9,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import best_refit, with_settings
 from accelstudy.diagnosis.evidence.bounds import box_probability
-from accelstudy.diagnosis.evidence.singles import weigh_singles
+from accelstudy.diagnosis.evidence.candidates import weigh_singles
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.plausibility import impossible_parameters

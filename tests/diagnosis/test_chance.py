@@ -3,8 +3,8 @@
 import numpy as np
 
 from accelstudy.diagnosis.evidence import detection
+from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.detection import Chance
-from accelstudy.diagnosis.evidence.field import Field
 from accelstudy.diagnosis.space.residuals import Residuals
 
 

@@ -9,10 +9,10 @@ from scipy import stats
 
 from accelstudy.diagnosis.decision.noise import misfit
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, credible_set
+from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.evidence.detection import log_ratio, simulated
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
-from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.evidence.size import (
     SHAPE_SIZES,
     SHAPE_WEIGHTS,

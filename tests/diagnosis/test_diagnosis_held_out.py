@@ -11,8 +11,8 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out
 from accelstudy.diagnosis.decision.posterior import Weighing
 from accelstudy.diagnosis.decision.refits import refit
+from accelstudy.diagnosis.evidence.candidates import weigh_singles
 from accelstudy.diagnosis.evidence.detection import Chance, detect
-from accelstudy.diagnosis.evidence.singles import weigh_singles
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
@@ -45,7 +45,7 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     problem, part, split = parts
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
-    beyond = detect(field, evidence, residuals, chance).by_chance.beyond(RULES.level_effects)
+    beyond = detect(field, evidence, residuals, chance).beyond(RULES.level_effects)
     weighing, rng = Weighing(problem), np.random.default_rng(3)
     needed = held_out.threshold(weighing, None, beyond, part, split, rng)
     assert needed > RULES.z_significant + 0.3

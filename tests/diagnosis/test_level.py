@@ -47,15 +47,14 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         chance = Chance(np.random.SeedSequence(seed), len(residuals.design))
         errors = rng.standard_normal((SETS, len(residuals.design)))
         detection = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
-        by_chance = detection.by_chance
         z = residuals.project(errors.T).T
         odds = total_odds(field.odds(evidence, field.seen(z)))
-        p = np.array([tail(by_chance.values, by_chance.weights, value) for value in odds])
+        p = np.array([tail(detection.by_chance, detection.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(detection.p_value, abs=0.005)
         rates.append(np.mean(p < RULES.level(level.known)))
         seen.append(odds)
-        weights.append(np.mean(by_chance.weights))
+        weights.append(np.mean(detection.weights))
     error = np.std(rates, ddof=1) / np.sqrt(RUNS)
     # Small enough that a level of one percent more or less would not pass.
     assert STANDARD_ERRORS * error < 0.012

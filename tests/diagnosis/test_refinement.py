@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
 
-from accelstudy.diagnosis.evidence.singles import refined, shaped
+from accelstudy.diagnosis.evidence.candidates import refined, shaped
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 SIZE = 8.0

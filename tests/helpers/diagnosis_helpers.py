@@ -11,7 +11,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
-from accelstudy.diagnosis.evidence.singles import Cause
+from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions

@@ -20,8 +20,7 @@ from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.decision.verdict import Finding, impossible
-from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.singles import Cause
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame

@@ -23,8 +23,16 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.refits import best_refit
 from accelstudy.diagnosis.evidence.bounds import within_bounds
+from accelstudy.diagnosis.evidence.candidates import (
+    UNKNOWN,
+    Cause,
+    Singles,
+    classes_of,
+    equivalents,
+    unknown_beside,
+    weigh_singles,
+)
 from accelstudy.diagnosis.evidence.detection import Chance, Detection, detect
-from accelstudy.diagnosis.evidence.field import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_models import colour_densities
 from accelstudy.diagnosis.evidence.noise_tests import (
     AXES,
@@ -36,14 +44,6 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     tail_test,
 )
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets
-from accelstudy.diagnosis.evidence.singles import (
-    Cause,
-    Singles,
-    classes_of,
-    equivalents,
-    unknown_beside,
-    weigh_singles,
-)
 from accelstudy.diagnosis.evidence.size import log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Hypothesis, cosines

@@ -14,7 +14,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign, least_sigma
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.evidence.field import UNKNOWN, Field
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Field
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES

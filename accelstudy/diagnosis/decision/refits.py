@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.singles import Cause, Singles, shaped
+from accelstudy.diagnosis.evidence.candidates import Cause, Singles, shaped
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis

@@ -18,8 +18,7 @@ from typing import TypeAlias
 
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.evidence.field import UNKNOWN
-from accelstudy.diagnosis.evidence.singles import Cause
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
@@ -178,14 +177,3 @@ def _open(
         p = one.posterior + (rest[names].posterior if names in rest else 0.0)
         rest[names] = replace(one, causes=left, posterior=p)
     return tuple(sorted(rest.values(), key=lambda one: -one.posterior)) if any(rest) else ()
-
-
-def effects_and_others(
-    explanations: Sequence[Explanation],
-) -> tuple[list[Explanation], list[Explanation]]:
-    """Explanations by effects alone, and the others."""
-    catalogue = {*effect_names()}
-    parts: tuple[list[Explanation], list[Explanation]] = [], []
-    for one in explanations:
-        parts[not catalogue.issuperset(one.names)].append(one)
-    return parts

@@ -21,9 +21,8 @@ from accelstudy.diagnosis.decision.posterior import (
 )
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.statement import Part, Statement, statement
-from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
-from accelstudy.diagnosis.evidence.singles import Cause
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame

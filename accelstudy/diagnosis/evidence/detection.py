@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
-from accelstudy.diagnosis.evidence.field import Field
+from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.hypotheses import Shapes, log_sum
@@ -96,21 +96,6 @@ class Chance:
 
 
 @dataclass(frozen=True)
-class Simulated:
-    """A statistic of noise alone: values (s, ...) of simulated residuals, with weights (s,)."""
-
-    values: Array
-    weights: Array
-
-    def beyond(self, level: float) -> float:
-        """Value that noise alone exceeds with the probability `level`."""
-        order = np.argsort(-self.values)
-        rate = np.cumsum(self.weights[order]) / len(self.values)
-        place = min(int(np.searchsorted(rate, level)), len(order) - 1)
-        return float(self.values[order[place]])
-
-
-@dataclass(frozen=True)
 class Detection:
     """Outcome of the test for anything that is missing.
 
@@ -122,7 +107,7 @@ class Detection:
     noise : (c,) array, log density of the residuals in noise alone, by the components of the level
     p_candidate : dict of candidate to its p-value alone, over its shapes
     p_family : dict of candidate to its p-value as the strongest of all
-    by_chance : Simulated, S of simulated residuals
+    by_chance, weights : (s,) arrays, S of simulated residuals, and their weights as noise alone
     """
 
     statistic: float
@@ -131,7 +116,15 @@ class Detection:
     noise: Array
     p_candidate: Mapping[str, float]
     p_family: Mapping[str, float]
-    by_chance: Simulated
+    by_chance: Array
+    weights: Array
+
+    def beyond(self, level: float) -> float:
+        """Value of S that noise alone exceeds with the probability `level`."""
+        order = np.argsort(-self.by_chance)
+        rate = np.cumsum(self.weights[order]) / len(self.by_chance)
+        place = min(int(np.searchsorted(rate, level)), len(order) - 1)
+        return float(self.by_chance[order[place]])
 
 
 def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chance) -> Detection:
@@ -145,9 +138,8 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     chance : Chance
     """
     if not field.names:
-        nobody: Array = np.zeros(0)
         noise = evidence.of_noise(residuals.z @ residuals.z)
-        return Detection(0.0, 1.0, {}, noise, {}, {}, Simulated(nobody, nobody))
+        return Detection(0.0, 1.0, {}, noise, {}, {}, np.zeros(0), np.zeros(0))
     seen, k = field.seen(residuals.z), len(field.names)
     densities, noise = field.densities(evidence, seen), evidence.of_noise(seen.squares)
     nothing = np.logaddexp.reduce(noise)
@@ -170,7 +162,8 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
         noise=noise,
         p_candidate={n: tail(each[:, i], w, observed[i]) for i, n in enumerate(field.names)},
         p_family={n: tail(strongest, w, observed[i], k) for i, n in enumerate(field.names)},
-        by_chance=Simulated(total, w),
+        by_chance=total,
+        weights=w,
     )
 
 

@@ -18,7 +18,7 @@ from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import family_of
-from accelstudy.diagnosis.evidence.field import UNKNOWN
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import as_place
 from accelstudy.diagnosis.result import Diagnosis

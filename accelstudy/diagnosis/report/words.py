@@ -18,12 +18,11 @@ from accelstudy.diagnosis.decision.statement import (
     Cosine,
     Part,
     Statement,
-    effects_and_others,
     family_of,
     statement,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
-from accelstudy.diagnosis.evidence.singles import Cause
+from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.formulas import OTHER_FORM
 from accelstudy.diagnosis.result import Diagnosis, Named
 from accelstudy.diagnosis.rules import RULES
@@ -251,7 +250,7 @@ def explain(names: Sequence[str]) -> str:
 
 def missing(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
-    effects, others = effects_and_others(credible_set)
+    effects, others = _effects_and_others(credible_set)
     unless = _or([one for one in others if one.posterior >= MIN_SAID])
     return _missing(_if_it_is_an_effect(effects, cosine)) + f", unless it is {unless}" * bool(
         unless
@@ -312,7 +311,7 @@ def _kind(cause: Cause) -> str:
 
 def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
-    effects, others = effects_and_others(credible_set)
+    effects, others = _effects_and_others(credible_set)
     set_says = _if_it_is_an_effect(effects, cosine)
     alike = [
         [(_names([name]), name.posterior) for name in part.names]
@@ -368,6 +367,14 @@ def _or(explanations: Sequence[Explanation]) -> str:
     alternatives = [explained(one.names) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
     return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
+
+
+def _effects_and_others(
+    credible_set: Sequence[Explanation],
+) -> tuple[list[Explanation], list[Explanation]]:
+    """Explanations by effects alone, and the others."""
+    effects = [one for one in credible_set if one.of_effects]
+    return effects, [one for one in credible_set if not one.of_effects]
 
 
 def _if_it_is_an_effect(effects: Sequence[Explanation], cosine: Cosine) -> Statement:
