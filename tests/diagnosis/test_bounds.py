@@ -9,7 +9,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import best_refit, with_settings
 from accelstudy.diagnosis.evidence.bounds import box_probability
-from accelstudy.diagnosis.evidence.candidates import weigh_singles
+from accelstudy.diagnosis.evidence.candidates import Cause, weigh_singles
 from accelstudy.effects import get_effect
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.plausibility import impossible_parameters
@@ -78,9 +78,8 @@ def test_the_uncertainty_of_a_knee_is_in_all_sigmas():
     """Cofactors of parameters and knee, from the norm of what readings are corrected to."""
     campaign = saturated(np.array([0.1, 0.06, 0.12]), 8.8, 2)
     problem, singles = weighed(campaign)
-    (chosen,), fit = best_refit(
-        problem.examined, singles, [(singles.best["saturation"], ("saturation",))]
-    )
+    cause = Cause("saturation", ("saturation",), singles.best["saturation"])
+    (chosen,), fit = best_refit(problem.examined, singles, [cause])
     assert fit.model.parameter_names[6:] == ("k_sat_x", "k_sat_y", "k_sat_z")
 
     def norm(p, read):
