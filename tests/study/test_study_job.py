@@ -110,34 +110,30 @@ def test_the_version_of_code_changes_with_code_and_nothing_else(monkeypatch, tmp
     assert [a == b for a, b in zip(second, versions(), strict=True)] == [True, True, False]
 
 
-LOADED = """\
-import sys
-import {modules}
-rooms = "{rooms}".replace("/", ".").split()
-print([name for name in sys.modules if name.startswith(tuple(f"accelstudy.{{x}}" for x in rooms))])
-"""
-
-
-@pytest.mark.parametrize(("snakefile", "list_of_rooms", "modules"), [
-    ("workflow/Snakefile", "NO_NUMBERS", "accelstudy.study.results, accelstudy.study.sensitivity"),
-    ("studies/hidden/hidden.smk", "UNUSED", "studies.hidden.campaigns"),
-])  # fmt: skip
-def test_numbers_hang_on_no_code_that_their_version_leaves_out(snakefile, list_of_rooms, modules):
+def left_out(snakefile, name):
+    """Modules whose code the version of numbers leaves out, as a workflow lists their rooms."""
     text = (ROOT / snakefile).read_text(encoding="utf-8")
-    (rooms,) = re.findall(rf'^{list_of_rooms} = "(.+)"$', text, re.MULTILINE)
+    (rooms,) = re.findall(rf'^{name} = "(.+)"$', text, re.MULTILINE)
     assert all((ROOT / "accelstudy" / room).is_dir() for room in rooms.split())
-    code = LOADED.format(modules=modules, rooms=f"{rooms} study/figures study/explorer")
-    words = [sys.executable, "-c", code]
-    ran = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT)
-    assert ran.stdout.strip() == "[]"
+    rooms = [*rooms.split(), "study/figures", "study/explorer"]
+    return [f"accelstudy.{room.replace('/', '.')}" for room in rooms]
+
+
+SIMULATE = "accelstudy.jobs, accelstudy.study.results"
+SENSITIVITY = f"{SIMULATE}, accelstudy.study.sensitivity"
+START = "accelstudy.jobs, accelstudy.study.config, accelstudy.study.figures"
 
 
 @pytest.mark.parametrize(("modules", "unused"), [
-    ("accelstudy.jobs, accelstudy.study.results", "pydantic matplotlib jinja2 scipy.stats"),
-    ("accelstudy.jobs, accelstudy.study.config, accelstudy.study.figures",
-     "matplotlib pandas scipy.stats"),
-])  # fmt: skip
-def test_jobs_and_the_start_of_the_workflow_load_no_more_than_they_need(modules, unused):
-    code = f"import sys, {modules}\nprint([x for x in {unused.split()} if x in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    # Numbers hang on no code that their version leaves out.
+    (SENSITIVITY, left_out("workflow/Snakefile", "NO_NUMBERS")),
+    ("studies.hidden.campaigns", left_out("studies/hidden/hidden.smk", "UNUSED")),
+    # Jobs and the start of the workflow load no more than they need.
+    (SIMULATE, ["pydantic", "matplotlib", "jinja2", "scipy.stats"]),
+    (START, ["matplotlib", "pandas", "scipy.stats"]),
+], ids=["numbers", "hidden", "simulate", "start"])  # fmt: skip
+def test_what_is_not_used_is_not_loaded(modules, unused):
+    code = f"import sys, {modules}\nprint([x for x in sys.modules if x.startswith({(*unused,)})])"
+    words = [sys.executable, "-c", code]
+    ran = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT)
     assert ran.stdout.strip() == "[]"
