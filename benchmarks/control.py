@@ -28,7 +28,7 @@ from accelstudy.study.tables import tables_of
 CONFIG = Path(__file__).parent.parent / "config" / "config.yaml"
 NOISES = (0.002, 0.02, 0.1, 0.3)
 FAILING = (1.0,)
-LEVELING = {"max_tilt_gon": 50.0, "attitudes": 50}
+ATTITUDES = 50
 
 
 def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
@@ -44,7 +44,9 @@ def cells_of(noises: Sequence[float], where: Sequence[str] = ()) -> list[Cell]:
                 cell.noise, sigma_force=noise, sigma_angle=factor * cell.noise.sigma_angle
             )
             name = f"{cell.name}/{noise:g}"
-            chosen.append(replace(cell, name=name, noise=scaled, compiled=False))
+            chosen.append(
+                replace(cell, name=name, noise=scaled, compiled=False, attitudes=ATTITUDES)
+            )
     return chosen
 
 
@@ -55,7 +57,7 @@ def estimates(
     cell = replace(cell, replicates=replicates, compiled=compiled)
     made = simulate(cell, seed)
     made = Replicates.plain(made.simulated) if plain else made
-    tables = tables_of([statistics(cell, made, LEVELING)])
+    tables = tables_of([statistics(cell, made)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 
 

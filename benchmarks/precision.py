@@ -30,35 +30,34 @@ def run(speeds):
     speeds : {approach: {way: (rounds,) calibrations/s}}, as of `speeds.py`
     """
     study = read_study(CONFIG)
-    leveling = study.leveling.model_dump()
     needed, seconds = {}, {}
     for cell in study.cells:
         if cell.name != f"bias-scale-nonorthogonality/{SCHEME}/{cell.approach}":
             continue
         name = cell.approach
         plain = replace(cell, replicates=PILOT, compiled=False)
-        needed[name] = _needed(_plain(plain, leveling), PILOT)
+        needed[name] = _needed(_plain(plain), PILOT)
         rates = {way: float(np.median(each)) for way, each in speeds[name].items()}
         seconds[name] = {
             way: {what: count / rate for what, count in needed[name].items()}
             for way, rate in rates.items()
         }
         some = replace(cell, replicates=1000, compiled=False)
-        few = _needed(simulated_statistics(some, 1, leveling), 1000)
+        few = _needed(simulated_statistics(some, 1), 1000)
         controlled = {}
         for what, count in few.items():
             own = replace(cell, replicates=max(MIN_REPLICATES, math.ceil(count)), compiled=False)
-            simulated_statistics(own, 1, leveling)  # what is traced is kept
+            simulated_statistics(own, 1)  # what is traced is kept
             start = process_time()
-            simulated_statistics(own, 1, leveling)
+            simulated_statistics(own, 1)
             controlled[what] = process_time() - start, own.replicates
         seconds[name]["controlled"] = controlled
     return needed, seconds
 
 
-def _plain(cell, leveling):
+def _plain(cell):
     """Statistics without linear theory."""
-    return statistics(cell, Replicates.plain(simulate(cell, 1).simulated), leveling)
+    return statistics(cell, Replicates.plain(simulate(cell, 1).simulated))
 
 
 def _needed(found, count):

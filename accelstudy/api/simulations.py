@@ -27,7 +27,7 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study import statistics as of_cells
 from accelstudy.study.cell import Cell
-from accelstudy.study.config import LevelingConfig, parse_study
+from accelstudy.study.config import parse_study
 from accelstudy.study.statistics import ANGLES, TILT, CellStatistics
 from accelstudy.study.tables import tables_of
 
@@ -40,8 +40,6 @@ GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
     "approach": ("approaches", get_approach),
 }
 """What there may be several of: its key in a grid of a study, and what a name stands for."""
-LEVELING = LevelingConfig().model_dump()
-"""Where the tilt error is evaluated, as in a study by default."""
 
 
 class Simulation(Result):
@@ -91,7 +89,7 @@ class Simulation(Result):
         cells = _with_truth(parse_study(content, "simulate").cells, truth)
         if not any(cell.estimability.estimable for cell in cells):
             raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
-        return cls([of_cells.simulated_statistics(cell, seed, LEVELING) for cell in cells], seed)
+        return cls([of_cells.simulated_statistics(cell, seed) for cell in cells], seed)
 
     @property
     def state(self) -> str:
@@ -218,8 +216,7 @@ class Simulation(Result):
             if one.replicates is not None:
                 block = one.replicates.simulated
                 rows = np.flatnonzero(block.converged)
-                of_tilt = of_cells.cell_tilt_error(one.cell, LEVELING)
-                numbers = of_cells.calibrations(one.cell, block, of_tilt)
+                numbers = of_cells.calibrations(one.cell, block)
                 estimate[i, rows[:, None], own] = block.estimates[rows]
                 sigma[i, rows[:, None], own] = numbers["sigma_posteriori"]
                 tilt[i, rows] = numbers["tilt"][:, : len(ANGLES)]

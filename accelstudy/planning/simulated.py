@@ -121,10 +121,10 @@ def simulate(question: Question, config: dict[str, Any]) -> list[Simulated]:
     and at that of the question.
     """
     study, shares = parse_study(config), {*QUOTED_SHARES, question.confidence} - {None}
-    leveling, levels = study.leveling.model_dump(), np.sort([*shares])
+    levels = np.sort([*shares])
     cells = [parse_study({**config, "grids": [grid]}).cells[0] for grid in config["grids"]]
     by_name = {
-        name: Simulated(name, simulated_statistics(cell, study.seed, leveling, levels))
+        name: Simulated(name, simulated_statistics(cell, study.seed, levels))
         for name, cell in {cell.name: cell for cell in cells}.items()
     }
     return [by_name[cell.name] for cell in cells]

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.basics.units import MGON
+from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import Estimability, estimability
 from accelstudy.effects import HoldConditions, get_effect
+from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.schemes import Scheme, get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -45,8 +46,10 @@ class Cell:
     gravity : float, true local gravity, m/s²
     truth : dict of parameter name to true value, SI
     holds : HoldPlan, conditions of the holds
-    directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
     compiled : bool, whether compiled code calibrates it; see `accelstudy.study.compiling`
+    directions : tuple of (x, y, z), of a scheme that was read from a file; None of any other
+    max_tilt : float, rad, largest tilt at which the tilt error is evaluated
+    attitudes : int, least number of attitudes, spread evenly over these tilts
     """
 
     name: str
@@ -62,6 +65,8 @@ class Cell:
     holds: HoldPlan
     compiled: bool = False
     directions: tuple[tuple[float, ...], ...] | None = None
+    max_tilt: float = MAX_TILT_GON * GON
+    attitudes: int = ATTITUDES
 
     @cached_property
     def estimated_model(self) -> SensorModel:
@@ -110,6 +115,23 @@ class Cell:
         """Linear theory at the calibration of that session; None if it does not converge."""
         observed = self.ideal.observations(self.noise)
         return LinearTheory.of(self.estimated_model, self.conditions, observed)
+
+    @cached_property
+    def tilt_error(self) -> TiltError:
+        """Tilt error that its calibrations leave, about the calibration without noise."""
+        simulated, estimated = self.simulated_model, self.estimated_model
+        theory = self.linear_theory
+        reference = self.true_values if theory is None else theory.reference
+        forces = cap_forces(self.max_tilt, self.attitudes, self.gravity)
+        return tilt_error(
+            simulated,
+            simulated.vector(self.truth),
+            estimated,
+            reference[: estimated.n_parameters],
+            forces,
+            self.gravity,
+            self.holds.use(forces, self.positions.n_positions),
+        )
 
     @cached_property
     def true_values(self) -> Array:

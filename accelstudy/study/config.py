@@ -32,7 +32,7 @@ from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import MAX_NAME_BYTES
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY, to_si
+from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files import validation as kinds
 from accelstudy.files.reading import config_hash, overlay, read_layer
@@ -326,8 +326,8 @@ class Grid(Block):
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Grid:
-        with _at("number of cells"):
-            bounds.CELLS.check(math.prod(map(len, self.lists(NoiseConfig().settings))))
+        count = math.prod(map(len, self.lists(NoiseConfig().settings)))
+        bounds.CELLS.check_key("number of cells", count)
         return self
 
 
@@ -580,6 +580,8 @@ class Study(Configuration):
                 truth=self.truth(dict.fromkeys([*effects, *simulated])),
                 holds=self.hold_plan,
                 directions=None if file is None else tuple(map(tuple, file["directions"])),
+                max_tilt=self.leveling.max_tilt_gon * GON,
+                attitudes=self.leveling.attitudes,
             )
 
     @property

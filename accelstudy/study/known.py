@@ -11,7 +11,6 @@ from scipy import special
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.leveling.distribution import TiltDistribution
-from accelstudy.leveling.error import TiltError
 from accelstudy.study.cell import Cell
 
 Array = NDArray[np.float64]
@@ -28,12 +27,15 @@ class KnownValues:
     ----------
     cell : Cell
     theory : LinearTheory, of the cell
-    tilt : TiltError; None where its statistics are not asked for
     """
 
     cell: Cell
     theory: LinearTheory
-    tilt: TiltError | None = None
+
+    @classmethod
+    def of(cls, cell: Cell) -> KnownValues | None:
+        """Return what is known of a cell, or None if it has no linear theory."""
+        return None if cell.linear_theory is None else cls(cell, cell.linear_theory)
 
     @cached_property
     def bias(self) -> Array:
@@ -59,9 +61,9 @@ class KnownValues:
     @cached_property
     def tilts(self) -> TiltDistribution:
         """Distribution of the tilt errors."""
-        assert self.tilt is not None
-        u = len(self.tilt.reference)
-        return TiltDistribution(self.tilt, self.theory.covariance[:u, :u])
+        tilt = self.cell.tilt_error
+        u = len(tilt.reference)
+        return TiltDistribution(tilt, self.theory.covariance[:u, :u])
 
     @property
     def statistics(self) -> dict[str, Array | float]:

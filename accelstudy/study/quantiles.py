@@ -57,7 +57,7 @@ def controlled_quantiles(
     """
     p, count = levels, len(own)
     wide = np.minimum(p, 1 - p) / 2
-    plain, low, high = _sample_quantiles(own, [p, p - wide, p + wide])
+    plain, low, high = np.quantile(own, [p, p - wide, p + wide])
     slope = (high - low) / (2 * wide)
     # Too few values have no density: their error is unknown.
     variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
@@ -65,7 +65,7 @@ def controlled_quantiles(
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
     paired = theory if converged is None else theory[converged]
     failed = len(theory) - count
-    linear, low, high = _sample_quantiles(theory, [p, p - wide, p + wide])
+    linear, low, high = np.quantile(theory, [p, p - wide, p + wide])
     sd = _sd_near((own - paired)[:DIFFERENCE_REPLICATES], paired[:DIFFERENCE_REPLICATES], p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
         # Share of the replicates that only one of the two has below its quantile.
@@ -94,17 +94,6 @@ def share_below(value: float, own: Array, quantiles: Estimates) -> float:
     """
     shift = np.interp(value, quantiles.value, quantiles.value - quantiles.plain)
     return float(np.mean(own < value - shift))
-
-
-def _sample_quantiles(values: Array, probabilities: ArrayLike) -> Array:
-    """Quantiles of values, of which only those at some ranks are sorted."""
-    last = len(values) - 1
-    rank = np.asarray(probabilities, dtype=float) * last
-    below = rank.astype(int)
-    above = np.minimum(below + 1, last)
-    ordered = np.partition(values, np.append(below, above))
-    low, high = ordered[below], ordered[above]
-    return np.asarray(low + (rank - below) * (high - low))
 
 
 def _sd_near(differences: Array, theory: Array, p: Array, wide: Array) -> Array:

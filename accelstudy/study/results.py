@@ -21,7 +21,6 @@ log = logging.getLogger(__name__)
 def simulated_tables(
     cells: Sequence[Cell],
     seed: int,
-    leveling: Mapping[str, Any],
     keep: Callable[[Cell, Replicates], object],
 ) -> dict[str, pd.DataFrame]:
     """Simulate cells one after the other; return each of `TABLES`.
@@ -30,13 +29,12 @@ def simulated_tables(
     ----------
     cells : sequence of Cell
     seed : int, of the study
-    leveling : mapping with max_tilt_gon and attitudes
     keep : function that gets each cell that is estimable with its replicates
     """
 
     def results() -> Iterator[CellStatistics]:
         for number, cell in enumerate(cells, 1):
-            found = simulated_statistics(cell, seed, leveling)
+            found = simulated_statistics(cell, seed)
             if found.replicates is not None:
                 keep(cell, found.replicates)
             failed = found.simulated - found.converged
@@ -50,7 +48,6 @@ def simulated_tables(
 
 def simulate_cells(
     cells: Sequence[Cell],
-    leveling: Mapping[str, Any],
     outputs: Mapping[str, str | Path],
     provenance: Mapping[str, Any],
 ) -> None:
@@ -61,7 +58,6 @@ def simulate_cells(
     Parameters
     ----------
     cells : sequence of Cell
-    leveling : mapping with max_tilt_gon and attitudes
     outputs : paths of `estimates` and of each of `TABLES`
     provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
     """
@@ -70,7 +66,6 @@ def simulate_cells(
         tables = simulated_tables(
             cells,
             provenance["seed"],
-            leveling,
             lambda cell, replicates: write(estimates_table(cell, replicates)),
         )
     for name in TABLES:

@@ -47,7 +47,7 @@ def study_tables(study: Study) -> dict[str, pd.DataFrame]:
         if study.paper and settings and cell.name == settings.cell(cell.approach, cell.scheme):
             estimates[cell.name] = estimates_table(cell, replicates).to_pandas()
 
-    tables = simulated_tables(study.cells, study.seed, study.leveling.model_dump(), keep)
+    tables = simulated_tables(study.cells, study.seed, keep)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment.calibration import Block
 from accelstudy.basics.shares import sigmas_95
-from accelstudy.basics.units import GON
-from accelstudy.leveling.error import TiltError, cap_forces, tilt_error
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import (
     CORRELATION,
@@ -109,7 +107,6 @@ class CellStatistics:
 def statistics(
     cell: Cell,
     replicates: Replicates,
-    leveling: Mapping[str, Any],
     levels: Sequence[float] | Array | None = None,
 ) -> CellStatistics:
     """Take the statistics of the replicates of a cell.
@@ -118,7 +115,6 @@ def statistics(
     ----------
     cell : Cell, estimable
     replicates : Replicates
-    leveling : mapping with max_tilt_gon and attitudes
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
     # Imports scipy.special slowly; who only reads tables does without it.
@@ -127,10 +123,9 @@ def statistics(
     good, count = replicates.simulated.converged, int(replicates.simulated.converged.sum())
     if not count:
         return CellStatistics(cell, replicates)
-    tilt = cell_tilt_error(cell, leveling)
-    own, theory = (calibrations(cell, block, tilt) for block in replicates)
+    own, theory = (calibrations(cell, block) for block in replicates)
     at = usual_levels(count) if levels is None else np.asarray(levels, dtype=float)
-    known = None if cell.linear_theory is None else KnownValues(cell, cell.linear_theory, tilt)
+    known = KnownValues.of(cell)
     expected = {} if known is None else known.statistics
     estimates = {}
     for name, (statistic, number) in STATISTICS.items():
@@ -151,13 +146,13 @@ def statistics(
     return CellStatistics(cell, replicates, estimates, first, at, quantiles)
 
 
-def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dict[str, Array]:
+def calibrations(cell: Cell, block: Block) -> dict[str, Array]:
     """Numbers of the c calibrations that converged, (c, k), SI; NaN what needs redundancy.
 
     They are `error`, `sigma_priori`, `sigma_posteriori` and `inside` of each parameter (the last
     says whether the nominal 95 % interval, estimate ± t σ a posteriori, holds the truth),
-    `sigma_and_error` of all parameters after each other, and `variance_factor`. With a `tilt`
-    there are `tilt_squared` of roll and pitch, and `tilt` as in `TILTS`, rms over attitudes.
+    `sigma_and_error` of all parameters after each other, `variance_factor`, and over the attitudes
+    the mean `tilt_squared` of roll and pitch, and the rms `tilt` as in `TILTS`.
     """
     good = block.converged
     freedom = block.redundancy if block.redundancy > 0 else np.nan
@@ -167,48 +162,23 @@ def calibrations(cell: Cell, block: Block, tilt: TiltError | None = None) -> dic
     posteriori, error = np.hsplit(together, 2)  # parts of it, as a million of each takes long
     np.multiply(np.sqrt(factor), priori, out=posteriori)
     np.subtract(estimates, cell.true_values, out=error)
-    numbers = {
+    squares = cell.tilt_error.squares(estimates[:, : cell.estimated_model.n_parameters])
+    tilt = np.sqrt(squares)
+    return {
         "error": error,
         "sigma_priori": priori,
         "sigma_posteriori": posteriori,
         "sigma_and_error": together,
         "inside": (np.abs(error) <= sigmas_95(block.redundancy) * posteriori).astype(float),
         "variance_factor": factor,
+        "tilt_squared": squares,
+        "tilt": np.column_stack([tilt, tilt.max(axis=1)]),
     }
-    if tilt is not None:
-        squares = tilt.squares(estimates[:, : len(tilt.reference)])
-        each = np.sqrt(squares)
-        numbers["tilt_squared"] = squares
-        numbers["tilt"] = np.column_stack([each, each.max(axis=1)])
-    return numbers
-
-
-def cell_tilt_error(cell: Cell, leveling: Mapping[str, Any]) -> TiltError:
-    """Tilt error that the calibrations of a cell leave, about the calibration without noise.
-
-    Parameters
-    ----------
-    cell : Cell
-    leveling : mapping with max_tilt_gon and attitudes
-    """
-    simulated, estimated, theory = cell.simulated_model, cell.estimated_model, cell.linear_theory
-    reference = cell.true_values if theory is None else theory.reference
-    forces = cap_forces(leveling["max_tilt_gon"] * GON, leveling["attitudes"], cell.gravity)
-    return tilt_error(
-        simulated,
-        simulated.vector(cell.truth),
-        estimated,
-        reference[: estimated.n_parameters],
-        forces,
-        cell.gravity,
-        cell.holds.use(forces, cell.positions.n_positions),
-    )
 
 
 def simulated_statistics(
     cell: Cell,
     seed: int,
-    leveling: Mapping[str, Any],
     levels: Sequence[float] | Array | None = None,
 ) -> CellStatistics:
     """Simulate a cell and take its statistics; without calibrations if it is not estimable.
@@ -217,8 +187,8 @@ def simulated_statistics(
     ----------
     cell : Cell
     seed : int, of the study
-    leveling, levels : as of `statistics`
+    levels : as of `statistics`
     """
     if not cell.estimability.estimable:
         return CellStatistics(cell)
-    return statistics(cell, simulate(cell, seed), leveling, levels)
+    return statistics(cell, simulate(cell, seed), levels)

@@ -41,9 +41,6 @@ def make_cells(*grids, **keys):
     return {cell.name: cell for cell in make_study(grids=list(grids), **keys).cells}
 
 
-LEVELING = {"max_tilt_gon": 50, "attitudes": 200}
-
-
 def simulated(cell, seed=1):
     """All replicates of a cell."""
     return simulate(cell, seed).simulated
@@ -51,13 +48,13 @@ def simulated(cell, seed=1):
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, Replicates.plain(simulated(cell, seed)), LEVELING)
+    return statistics(cell, Replicates.plain(simulated(cell, seed)))
 
 
-def simulate_cells(folder, cells, seed=1, leveling=LEVELING):
+def simulate_cells(folder, cells, seed=1):
     """Simulate cells as a job; the paths of the estimates and the tables."""
     paths = {name: folder / f"{name}.parquet" for name in ("estimates", *TABLES)}
-    results.simulate_cells([*cells], leveling, paths, {**PROVENANCE, "seed": seed})
+    results.simulate_cells([*cells], paths, {**PROVENANCE, "seed": seed})
     return paths
 
 
@@ -66,7 +63,7 @@ def run_study(folder, pattern="{model}", **keys):
     study = make_study(**keys)
     cells = study.cells
     parts = [
-        simulate_cells(folder / name, each, study.seed, study.leveling.model_dump())
+        simulate_cells(folder / name, each, study.seed)
         for name, each in fanned_out(cells, pattern).items()
     ]
     names = [cell.name for cell in cells]

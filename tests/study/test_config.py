@@ -312,43 +312,41 @@ def test_a_value_that_is_spoilt_is_named(path):
         assert key[: len(place)] == place[: len(key)], message
 
 
+def some(values, most=2):
+    return st.lists(values, min_size=1, max_size=most)
+
+
 POSITIVE = st.floats(1e-6, 1.0)
 GRIDS = st.fixed_dictionaries(
     {
-        "models": st.just("all") | st.lists(st.sampled_from([*MODELS, "mine"]), min_size=1),
-        "schemes": st.just("all")
-        | st.lists(st.sampled_from([*scheme_names(), "random-7-3"]), min_size=1, max_size=5),
+        "models": st.just("all") | some(st.sampled_from([*MODELS, "mine"])),
+        "schemes": some(st.sampled_from([*scheme_names(), "random-7-3"]), 4),
         "replicates": st.integers(1, 5000),
     },
     optional={
         "approaches": st.sampled_from(["all", "robot", ["gravity"], ["robot", "gravity"]]),
-        "sensor_sigma_mps2": st.lists(POSITIVE | st.just(0.002), min_size=1, max_size=3),
-        "robot_sigma_mgon": st.lists(st.just(0) | POSITIVE, min_size=1, max_size=3),
-        "gravity_sigma_mps2": st.lists(st.just(0) | POSITIVE, min_size=1, max_size=2),
-        "gravity_error_mps2": st.lists(st.floats(-1, 1), min_size=1, max_size=2),
+        "sensor_sigma_mps2": some(POSITIVE | st.just(0.002)),
+        "robot_sigma_mgon": some(st.just(0) | POSITIVE),
+        "gravity_sigma_mps2": some(st.just(0) | POSITIVE),
+        "gravity_error_mps2": some(st.floats(-1, 1)),
     },
 )
 VALID = st.fixed_dictionaries(
-    {
-        "grids": st.lists(GRIDS, min_size=1, max_size=3),
-        "models": st.just({"mine": ["bias", "cubic_scale"]}),
-        # Some effects need them.
-        "holds": st.just(
-            {"interval_s": 30, "temperature_degC": [10, 30], "vibration_mps2": [0, 1]}
-        ),
-    },
+    {"grids": some(GRIDS, 3)},
     optional={
         "presets": st.none() | st.fixed_dictionaries({"replicates": st.integers(1, 5000)}),
         "simulated_effects": st.just("model")
         | st.lists(st.sampled_from(effect_names()), min_size=1, unique=True),
     },
 )
+HOLDS = {"interval_s": 30, "temperature_degC": [10, 30], "vibration_mps2": [0, 1]}
+"""What some effects need."""
 
 
 @settings(max_examples=10)
 @given(keys=VALID)
 def test_cells_of_any_valid_study(keys):
-    study = make_study(**keys)
+    study = make_study(models={"mine": ["bias", "cubic_scale"]}, holds=HOLDS, **keys)
     assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
 
     cells = study.cells

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import LEVELING, grid, make_cells, plain, run_study
+from study_helpers import grid, make_cells, plain, run_study
 
 from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, controlled
 from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles, share_below
@@ -178,7 +178,7 @@ STATISTICS = ("bias", "sd", "sd_ratio", "correlation", "variance_factor", "tilt_
 @pytest.mark.parametrize(("noise", "approach"), [(0.3, "gravity"), (0.02, "robot")])
 def test_stated_errors_are_those_over_seeds(noise, approach):
     cell = cell_of(noise, approach, replicates=100)
-    many = [simulated_statistics(cell, seed, LEVELING, [0.5, 0.95]) for seed in range(40)]
+    many = [simulated_statistics(cell, seed, [0.5, 0.95]) for seed in range(40)]
     for name in STATISTICS:
         values = np.array([one[name].value for one in many])
         errors = np.array([one[name].error for one in many])
@@ -204,7 +204,7 @@ DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
     (0.002, "gravity", {"noise": {"effects": ["quantisation"]}}, 1),
 ])  # fmt: skip
 def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, keys, gain):
-    few = simulated_statistics(cell_of(noise, approach, 400, **keys), 1, LEVELING)
+    few = simulated_statistics(cell_of(noise, approach, 400, **keys), 1)
     many = plain(cell_of(noise, approach, 4000, **keys), 2)
     assert (few.control, many.control) == ("linear", "none")
     limit = 6 if keys is DISTURBED else STANDARD_ERRORS  # heavy tails of squares
@@ -222,7 +222,7 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
 
 def test_where_calibrations_fail_what_is_left_is_estimated():
     cell = cell_of(1.5, replicates=1000)
-    found = simulated_statistics(cell, 1, LEVELING)
+    found = simulated_statistics(cell, 1)
     assert 3 < found.simulated - found.converged < 300
     many = plain(replace(cell, replicates=4000), 2)
     for name in ("bias", "sd", "coverage", "correlation", "tilt_rms"):
@@ -233,7 +233,7 @@ def test_where_calibrations_fail_what_is_left_is_estimated():
 
 def test_plain_statistics_stand_beside():
     cell = cell_of(0.1, replicates=300)
-    found, alone = simulated_statistics(cell, 1, LEVELING), plain(cell, 1)
+    found, alone = simulated_statistics(cell, 1), plain(cell, 1)
     errors = simulate(cell, 1).simulated.estimates - cell.true_values
     np.testing.assert_allclose(found["bias"].plain, errors.mean(axis=0))
     np.testing.assert_allclose(found["sd"].plain, errors.std(axis=0, ddof=1))

@@ -104,42 +104,42 @@ def test_origin_is_in_every_file(tmp_path):
         assert json.loads(pq.read_schema(path).metadata[b"accelstudy"]) == read_origin(path)
 
 
-def test_commit(monkeypatch):
+@pytest.fixture
+def fresh():
+    """The commit is asked for anew, now and afterwards."""
     git_commit.cache_clear()
-    try:
-        head = subprocess.run(
-            ["git", "rev-parse", "HEAD"],
-            capture_output=True, text=True, check=True, cwd=accelstudy.__path__[0],
-        ).stdout.strip()  # fmt: skip
-    except (OSError, subprocess.CalledProcessError):
-        head = "unknown"  # an export of the repository
-    assert git_commit().rstrip("+") == head
+    yield
+    git_commit.cache_clear()
+
+
+def git(folder, *words):
+    given = ("-c", "user.name=n", "-c", "user.email=e@example.org")
+    ran = subprocess.run(["git", "-C", folder, *given, *words], capture_output=True, text=True)
+    return ran.stdout.strip()
+
+
+@pytest.mark.usefixtures("fresh")
+def test_commit(monkeypatch):
+    head = git(accelstudy.__path__[0], "rev-parse", "HEAD")
+    assert git_commit().rstrip("+") == (head or "unknown")  # of an export of the repository
     git_commit.cache_clear()
     monkeypatch.setenv("PATH", "/nowhere")
     assert git_commit() == "unknown"
-    git_commit.cache_clear()
 
 
+@pytest.mark.usefixtures("fresh")
 def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monkeypatch):
-    def git(*words):
-        given = ("-c", "user.name=n", "-c", "user.email=e@example.org")
-        subprocess.run(["git", "-C", tmp_path, *given, *words], check=True, capture_output=True)
-
-    git("init")
-    git("commit", "--allow-empty", "--message", "somebody's project")
     installed = tmp_path / "env" / "tables.py"
     installed.parent.mkdir()
     installed.write_text("")
     monkeypatch.setattr(tables, "__file__", str(installed))
-    found = []
-    for _ in range(2):
-        git_commit.cache_clear()
-        found.append(git_commit())
-        git("add", "--all")
-        git("commit", "--allow-empty", "--message", "a copy under git")
+    git(tmp_path, "init")
+    git(tmp_path, "commit", "--allow-empty", "--message", "somebody's project")
+    assert git_commit() == "unknown"
     git_commit.cache_clear()
-    assert found[0] == "unknown"
-    assert len(found[1]) == 40
+    git(tmp_path, "add", "--all")
+    git(tmp_path, "commit", "--message", "a copy under git")
+    assert git_commit() == git(tmp_path, "rev-parse", "HEAD")
 
 
 # --- whole or not at all -------------------------------------------------------------------------

@@ -103,21 +103,26 @@ def test_coverage_of_the_confidence_intervals(summary):
     assert abs(known["coverage_95"].mean() - 0.95) < STANDARD_ERRORS * single / np.sqrt(cells)
 
 
+def coverage(n, value, error, gain, plain):
+    """The row of an estimated coverage by n calibrations."""
+    inside = Estimates(*(np.array([x]) for x in (value, error, gain, plain)))
+    return {name: column[0] for name, column in coverage_columns(inside, n).items()}
+
+
 def test_wilson_interval_of_the_coverage():
     """Of plain averages."""
-    inside = Estimates(*(np.array([x]) for x in (0.93, 1e-2, 1.0, 0.93)))
-    row = {name: column[0] for name, column in coverage_columns(inside, 500).items()}
-    p, n, z = row["coverage_95"], 500, 1.959964
+    p, n, z = 0.93, 500, 1.959964
+    row = coverage(n, value=p, error=1e-2, gain=1.0, plain=p)
     centre = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    assert row["coverage_95"] == p
     assert row["coverage_95_low"] == pytest.approx(centre - half, rel=1e-6)
     assert row["coverage_95_high"] == pytest.approx(centre + half, rel=1e-6)
 
 
 def test_a_coverage_that_rounds_to_more_than_one():
     """A mean of ones is made of differences and of linear theory's, each rounded."""
-    inside = Estimates(*(np.array([x]) for x in (0.95, 1e-4, 9.0, np.nextafter(1, 2))))
-    row = {name: column[0] for name, column in coverage_columns(inside, 30).items()}
+    row = coverage(30, value=0.95, error=1e-4, gain=9.0, plain=np.nextafter(1, 2))
     assert (row["coverage_95"], row["coverage_95_high"]) == (1, 1)
     assert row["coverage_95_se"] == 0
 
@@ -184,48 +189,34 @@ def test_empirical_correlations_are_those_of_the_adjustment(study):
 # --- what did not converge -----------------------------------------------------------------------
 
 
-def assert_flagged(tables, cell, failed):
-    """Replicates that failed are NaN and counted; the others alone make the statistics."""
-    rows = tables["estimates"]
-    rows = rows[rows["cell"] == cell]
-    bad = rows[~rows["converged"]]
-    assert bad["replicate"].nunique() == failed
-    assert bad[["estimate", "sigma_priori", "omega"]].isna().all().all()
-    good = rows[rows["converged"]]
-    assert good[["estimate", "sigma_priori", "omega"]].notna().all().all()
-
-    summary = of(tables["summary"], cell)
-    for name, found in good.groupby("parameter", observed=True):
-        in_si = {"mm/s^2": 1e-3, "ppm": 1e-6, "mgon": np.pi / 200e3}[summary.loc[name, "unit"]]
-        error = (found["estimate"] - found["truth"]) / in_si
-        assert summary.loc[name, "bias_plain"] == pytest.approx(error.mean(), rel=1e-9)
-        assert summary.loc[name, "sd_plain"] == pytest.approx(error.std(), rel=1e-9)
-    n = good["replicate"].nunique()
-    assert set(summary["n_converged"]) == {n}
-    assert set(summary["n_replicates"]) == {n + failed}
-    row = tables["cells"].set_index("cell").loc[cell]
-    assert (row["n_replicates"], row["n_converged"]) == (n + failed, n)
-
-
 def test_some_replicates_fail(monkeypatch, tmp_path):
-    """Replicates with a hopeless observation fail, and the others do not notice."""
-    whole = run_study(tmp_path / "whole", grids=[grid(approaches="gravity")])
+    """Replicates with a hopeless observation are NaN and counted; others alone make statistics."""
+    grids, failed = [grid(approaches="gravity")], [3, 50]
+    whole = run_study(tmp_path / "whole", grids=grids)["estimates"]
 
     def spoilt(cell):
         def calibrate(model, approach, observed):
             forces = observed.forces.copy()
-            forces[[3, 50]] = np.nan
+            forces[failed] = np.nan
             return calibrator(cell)(model, approach, replace(observed, forces=forces))
 
         return calibrate
 
     monkeypatch.setattr(module, "calibrator", spoilt)
-    tables = run_study(tmp_path / "spoilt", grids=[grid(approaches="gravity")])
-    assert_flagged(tables, f"{MCLAREN}/gravity", 2)
-    kept = ~tables["estimates"]["replicate"].isin([3, 50])
-    pd.testing.assert_frame_equal(
-        tables["estimates"][kept], whole["estimates"][kept], check_exact=True
-    )
+    tables = run_study(tmp_path / "spoilt", grids=grids)
+    rows, summary = tables["estimates"], of(tables["summary"], f"{MCLAREN}/gravity")
+    good, bad = rows[rows["converged"]], rows[~rows["converged"]]
+    assert [*bad["replicate"].unique()] == failed
+    assert bad[["estimate", "sigma_priori", "omega"]].isna().all().all()
+    others = ~whole["replicate"].isin(failed)
+    pd.testing.assert_frame_equal(good, whole[others], check_exact=True)
+    for name, found in good.groupby("parameter", observed=True):
+        in_si = {"mm/s^2": 1e-3, "ppm": 1e-6, "mgon": np.pi / 200e3}[summary.loc[name, "unit"]]
+        error = (found["estimate"] - found["truth"]) / in_si
+        assert summary.loc[name, "bias_plain"] == pytest.approx(error.mean(), rel=1e-9)
+        assert summary.loc[name, "sd_plain"] == pytest.approx(error.std(), rel=1e-9)
+    for table in (summary, tables["cells"]):
+        assert {*zip(table["n_replicates"], table["n_converged"], strict=True)} == {(60, 58)}
 
 
 def test_no_replicate_converges(tmp_path):

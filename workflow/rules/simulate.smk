@@ -15,7 +15,6 @@ rule simulate:
         mem_mb=lambda wildcards, attempt: memory(SET_UPS[SET_UP.format(**wildcards)]) * attempt,
     params:
         cells=lambda wildcards: SET_UPS[SET_UP.format(**wildcards)],
-        leveling=STUDY.leveling.model_dump(),
         seed=STUDY.seed,
         version=NUMBERS,
     message:

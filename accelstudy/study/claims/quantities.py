@@ -35,6 +35,11 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
+ESTIMATED = [
+    *("replicate", "parameter", "converged"),
+    *("sigma_priori", "omega", "linear_omega", "redundancy"),
+]
+"""Columns of the estimates that are used."""
 LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
 """Probabilities of quantiles of single simulations: the first and the last are the ends of the
 central 95 %, and the median is in the middle."""
@@ -55,7 +60,7 @@ class Evidence:
     ----------
     study : Study, with `sensitivity`
     tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
-    estimates_of : function that returns the estimates of a cell by its name, as they are stored
+    estimates_of : function that returns estimates of a cell by its name, at least `ESTIMATED`
     """
 
     study: Study
@@ -244,9 +249,9 @@ def single_reductions(evidence: Evidence, effect: str, scheme: str, paper: float
     sigmas = [_sigmas(cell, evidence.estimates_of(cell.name), effect) for cell in pair]
     n, known = min(map(len, sigmas)), None
     ratio, linear = (sigmas[0][:n] / sigmas[1][:n]).T
-    theories = [KnownValues(cell, theory) for cell in pair if (theory := cell.linear_theory)]
-    if len(theories) == len(pair):
-        known = theories[0].effect_ratio_quantiles(theories[1], effect, LEVELS)
+    robot, gravity = map(KnownValues.of, pair)
+    if robot and gravity:
+        known = robot.effect_ratio_quantiles(gravity, effect, LEVELS)
     quantiles = controlled_quantiles(LEVELS, ratio, linear, known)
     share = share_below(1 - paper / 100, ratio, quantiles)
     ends = _ends(100 * (1 - quantiles.value[[-1, len(LEVELS) // 2, 0]]))

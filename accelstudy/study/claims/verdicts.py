@@ -21,7 +21,7 @@ from accelstudy.study.beyond_linear_theory import (
 )
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_page
-from accelstudy.study.claims.quantities import Evidence, Numbers, claim_table
+from accelstudy.study.claims.quantities import ESTIMATED, Evidence, Numbers, claim_table
 from accelstudy.study.config import Study
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
@@ -52,7 +52,7 @@ def judge_claims(
 
     @cache
     def estimates_of(cell: str) -> pd.DataFrame:
-        return read_table(estimates, rows=("cell", [cell]))
+        return read_table(estimates, columns=ESTIMATED, rows=("cell", [cell]))
 
     read = {name: read_table(tables[name]) for name in TABLES}
     evidence = Evidence(study, read, estimates_of)
