@@ -15,11 +15,12 @@ from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.calibration.applying import calibration_of, read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.importing.sources import Source
 from accelstudy.campaign.session import Campaign
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
@@ -29,19 +30,14 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "s_z": 2e-4, "alpha_zx": 7e-4}
-
-
-def calibration_file(folder, approach=ROBOT, seed=1):
-    fit = fit_campaign(simulated_campaign(TRUTH, seed=seed), NINE, approach)
-    path = folder / "calibration.json"
-    path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
-    return path
+AXES = ["fx", "fy", "fz"]
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory):
+def plain():
     """A calibration of the nine parameters, with a robot."""
-    return read_calibration(calibration_file(tmp_path_factory.mktemp("plain")))
+    fit = fit_campaign(simulated_campaign(TRUTH), NINE, ROBOT)
+    return calibration_of(calibration_document(fit))
 
 
 @pytest.fixture
@@ -62,8 +58,12 @@ def calibrated_in(table):
 
 
 def test_the_file_gives_back_the_fit(tmp_path):
-    fit = fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY)
-    read = read_calibration(calibration_file(tmp_path, GRAVITY))
+    fit, path = (
+        fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY),
+        tmp_path / "calibration.json",
+    )
+    path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
+    read = read_calibration(path)
     np.testing.assert_array_equal(read.parameters, fit.parameters)
     np.testing.assert_allclose(np.sqrt(np.diag(read.covariance)), fit.sigma, rtol=1e-12)
     np.testing.assert_allclose(read.correct(fit.campaign.forces), fit.corrected, atol=1e-12)
@@ -142,12 +142,13 @@ def test_what_is_no_calibration_is_one_line(plain, tmp_path, change, part):
 
 SESSION = 600.0
 SIGMA = 1e-4
+ATTITUDES = np.random.default_rng(4).uniform(-60, 60, (40, 2)) * GON
 
 
-def fitted(folder, effects, values, approach=GRAVITY, scheme="fibonacci-30", **changes):
-    """File of a calibration that has effects, in a session with time, temperature and vibration."""
+def calibrated(effects, values, approach=GRAVITY, **changes):
+    """A calibration that has effects, in a session with time, temperature and vibration."""
     model = get_model(f"bias-scale-nonorthogonality+{effects}")
-    directions = get_scheme(scheme).directions
+    directions = get_scheme("fibonacci-30").directions
     n = len(directions)
     rng = np.random.default_rng(3)
     conditions = {
@@ -163,31 +164,35 @@ def fitted(folder, effects, values, approach=GRAVITY, scheme="fibonacci-30", **c
         name="extended", positions=np.arange(1, n + 1), forces=drawn.forces[0],
         gravity=simulated.gravity, sigma_force=SIGMA, **{**conditions, **angles, **changes},
     )  # fmt: skip
-    fit = fit_campaign(campaign, model, approach)
-    path = folder / "calibration.json"
-    path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
-    return path
+    return calibration_of(calibration_document(fit_campaign(campaign, model, approach)))
 
 
-ATTITUDES = np.random.default_rng(4).uniform(-60, 60, (40, 2)) * GON
-
-
-def written_log(path, effects, values, **columns):
+def rows_of(effects, values, **columns):
     """Log of a sensor that has effects, in known attitudes and conditions."""
     model = get_model(f"bias-scale-nonorthogonality+{effects}")
     f_b = np.column_stack(specific_force(*ATTITUDES.T, 9.80665))
     hold = HoldConditions(**{k: np.broadcast_to(v, len(f_b)) for k, v in columns.items()})
     forces = model.sense(f_b, model.vector(values), 9.80665, hold.with_steps(f_b))
-    table = pd.DataFrame({**dict(zip(("fx", "fy", "fz"), forces.T, strict=True)), **columns})
-    table.to_csv(path, index=False)
-    return path
+    return pd.DataFrame(dict(zip(AXES, forces.T, strict=True))).assign(**columns)
 
 
-def errors_of(path, attitudes=ATTITUDES):
-    """Errors of roll and pitch, and what the file says of their sigma, mgon."""
-    table = pd.read_csv(path)
-    found = table[["roll_gon", "pitch_gon"]].to_numpy() * 1e3
-    return found - attitudes / MGON, table[["sigma_roll_mgon", "sigma_pitch_mgon"]].to_numpy()
+def leveled_rows(calibration, rows, given=None, **options):
+    """The rows leveled, and the warnings."""
+    log = Source("rows", pa.Table.from_pandas(rows, preserve_index=False))
+    leveled = level(calibration, log, given, **options)
+    return leveled.to_frame(), list(leveled.warnings)
+
+
+def sigmas_in(table):
+    """Sigmas of roll and pitch, mgon."""
+    return table[["sigma_roll_mgon", "sigma_pitch_mgon"]].to_numpy()
+
+
+def assert_leveled(table, within_sigmas=True):
+    """Errors of roll and pitch are small, and within their sigmas."""
+    errors = 1e3 * table[["roll_gon", "pitch_gon"]].to_numpy() - ATTITUDES / MGON
+    assert np.sqrt(np.mean(errors**2)) < 3
+    assert np.abs(errors / sigmas_in(table)).max() < 4.5 or not within_sigmas
 
 
 @pytest.mark.parametrize(("effects", "values", "columns"), [
@@ -198,88 +203,58 @@ def errors_of(path, attitudes=ATTITUDES):
     ("bias_drift", {"d_x": 5e-5, "d_y": -4e-5}, {"time": np.linspace(0, 600, 40)}),
     ("vibration_rectification", {"K_vre_x": 5e-3}, {"vibration": np.linspace(0, 2, 40)}),
 ])  # fmt: skip
-def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(
-    tmp_path, effects, values, columns
-):
+def test_what_depends_on_conditions_is_corrected_by_those_of_the_row(effects, values, columns):
     (condition,) = columns
-    path, log = fitted(tmp_path, effects, values), tmp_path / "log.csv"
-    written_log(log, effects, values, **columns)
-    calibration = read_calibration(path)
-    leveled = level_log(calibration, log, tmp_path / "out.csv", sigma=0.0)
-    errors, sigmas = errors_of(tmp_path / "out.csv")
-    assert np.abs(errors / sigmas).max() < 4.5
-    assert np.sqrt(np.mean(errors**2)) < 3
-    assert sigmas.max() < 20
-    assert sum("start of the calibration session" in w for w in leveled.warnings) == (
-        condition == "time"
-    )
-    without = pd.read_csv(log).drop(columns=condition)
-    without.to_csv(tmp_path / "without.csv", index=False)
+    own, rows = calibrated(effects, values), rows_of(effects, values, **columns)
+    table, warnings = leveled_rows(own, rows, sigma=0.0)
+    assert_leveled(table)
+    assert sigmas_in(table).max() < 20
+    said = sum("start of the calibration session" in warning for warning in warnings)
+    assert said == (condition == "time")
     stored = LogLayout(columns={c: c for c in ("temperature", "vibration")}, time=None)
     for known in (None, stored):
         with pytest.raises(InputError, match=rf"{effects.split('(')[0]} needs the {condition}.*`"):
-            level_log(
-                replace(calibration, log=known), tmp_path / "without.csv", tmp_path / "never.csv"
-            )
-    assert not (tmp_path / "never.csv").exists()
+            leveled_rows(replace(own, log=known), rows[AXES])
 
 
-def test_a_lag_follows_the_thermometer(tmp_path):
+def test_a_lag_follows_the_thermometer():
     effects, values = "thermal_bias(tau=400)", {"b_T_x": 2e-3, "b_T_y": -3e-3}
-    calibration, log = read_calibration(fitted(tmp_path, effects, values)), tmp_path / "log.csv"
     time = np.linspace(0, 2000, 40)
-    written_log(log, effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
-    leveled = level_log(calibration, log, tmp_path / "out.csv", sigma=0)
-    errors, _ = errors_of(tmp_path / "out.csv")
-    assert np.sqrt(np.mean(errors**2)) < 3
-    assert any(
-        "assumes that the sensor has the temperature of row 1" in warning
-        for warning in leveled.warnings
-    )
-    assert not any("start of the calibration session" in warning for warning in leveled.warnings)
+    rows = rows_of(effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
+    table, warnings = leveled_rows(calibrated(effects, values), rows, sigma=0.0)
+    assert_leveled(table, within_sigmas=False)
+    said = " ".join(warnings)
+    assert "assumes that the sensor has the temperature of row 1" in said
+    assert "start of the calibration session" not in said
 
 
-def test_a_drift_stays_where_the_session_left_it(tmp_path):
+def test_a_drift_stays_where_the_session_left_it():
     values = {"d_x": 5e-5, "d_y": -4e-5, "d_z": 3e-5}
-    calibration = read_calibration(fitted(tmp_path, "bias_drift", values))
+    own = calibrated("bias_drift", values)
     # The sensor stops drifting at the end of the session, in the first tenth of the log.
-    log = written_log(
-        tmp_path / "log.csv", "bias_drift", values, time=np.minimum(150.0 * np.arange(40), SESSION)
-    )
-    pd.read_csv(log).drop(columns="time").to_csv(log, index=False)
-    leveled = level_log(
-        calibration, log, tmp_path / "out.csv", {"rate_hz": 1 / 150}, sigma=0.0, start=0
-    )
-    errors, sigmas = errors_of(tmp_path / "out.csv")
-    assert np.abs(errors / sigmas).max() < 4.5
-    (warning,) = leveled.warnings
+    time = np.minimum(150.0 * np.arange(40), SESSION)
+    rows, rate = rows_of("bias_drift", values, time=time)[AXES], {"rate_hz": 1 / 150}
+    table, (warning,) = leveled_rows(own, rows, rate, sigma=0.0, start=0)
+    assert_leveled(table)
     assert "bias_drift: kept constant after the end of the calibration session" in warning
     assert "(600 s), in 35 of 40 rows" in warning
     # A day later nothing else is known, and no more is claimed to be unknown.
-    level_log(calibration, log, tmp_path / "day.csv", {"rate_hz": 1 / 150}, 0.0, start=86400)
-    np.testing.assert_allclose(errors_of(tmp_path / "day.csv")[1][5:], sigmas[5:], rtol=1e-9)
+    later, _ = leveled_rows(own, rows, rate, sigma=0.0, start=86400)
+    np.testing.assert_allclose(sigmas_in(later)[5:], sigmas_in(table)[5:], rtol=1e-9)
     reading = np.array([[0.1, 0.2, -9.8]])
     for time in (0.0, 300.0, SESSION):  # within the session it is the model's own
         hold = HoldConditions(time=np.array([time]))
-        expected = calibration.model.correct(
-            reading, calibration.parameters, calibration.gravity, hold
-        )
-        np.testing.assert_allclose(calibration.correct(reading, hold), expected, atol=1e-12)
+        expected = own.model.correct(reading, own.parameters, own.gravity, hold)
+        np.testing.assert_allclose(own.correct(reading, hold), expected, atol=1e-12)
 
 
-def test_what_depends_on_the_position_before_is_left_and_said(tmp_path):
+def test_what_depends_on_the_position_before_is_left_and_said():
     values = {"h_x": 5e-3, "h_y": -2e-3}
-    calibration = read_calibration(fitted(tmp_path, "hysteresis", values))
-    written_log(tmp_path / "log.csv", "hysteresis", values)
-    leveled = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv")
-    (warning,) = leveled.warnings
+    own, rows = calibrated("hysteresis", values), rows_of("hysteresis", values)
+    table, (warning,) = leveled_rows(own, rows)
     assert "hysteresis is not corrected (h_x = 4.9" in warning
-    table = pd.read_csv(tmp_path / "out.csv")
-    nine = replace(
-        calibration, model=NINE, parameters=calibration.parameters[: NINE.n_parameters]
-    ).correct(table[["fx", "fy", "fz"]])
-    found = calibrated_in(table)
-    np.testing.assert_allclose(found, nine, atol=1e-9)
+    nine = replace(own, model=NINE, parameters=own.parameters[: NINE.n_parameters])
+    np.testing.assert_allclose(calibrated_in(table), nine.correct(rows[AXES]), atol=1e-9)
 
 
 @pytest.mark.parametrize(("effects", "values"), [
@@ -287,45 +262,56 @@ def test_what_depends_on_the_position_before_is_left_and_said(tmp_path):
     ("encoder_scale", {"e_roll": 1e-3, "e_pitch": -1e-3}),
     ("mounting_rotation", {"eps_x": 0.01, "eps_y": -0.02, "eps_z": 0.015}),
 ])  # fmt: skip
-def test_the_sensor_takes_along_what_is_its_own(tmp_path, effects, values):
+def test_the_sensor_takes_along_what_is_its_own(effects, values):
     """What the rig had is left with it; the rotation against the flange is taken along."""
     own = values if effects == "mounting_rotation" else {}
     known = dict(zip(get_model(effects).parameter_names, values.values(), strict=True))
-    calibration = read_calibration(fitted(tmp_path, effects, known, ROBOT))
-    kept = {name for name in known if name in calibration.model.parameter_names}
-    assert kept == set(own)
-    written_log(tmp_path / "log.csv", "mounting_rotation", own)
-    leveled = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv", sigma=0.0)
-    errors, sigmas = errors_of(tmp_path / "out.csv")
-    assert np.abs(errors / sigmas).max() < 4.5
-    assert np.sqrt(np.mean(errors**2)) < 3
-    assert leveled.warnings == ()
+    taken = calibrated(effects, known, ROBOT)
+    assert {name for name in known if name in taken.model.parameter_names} == set(own)
+    table, warnings = leveled_rows(taken, rows_of("mounting_rotation", own), sigma=0.0)
+    assert_leveled(table)
+    assert warnings == []
 
 
-def test_a_log_in_other_axes_is_leveled_in_them(tmp_path):
+def test_a_log_in_other_axes_is_leveled_in_them():
     values = {"b_T_x": 2e-3, "b_T_y": -3e-3}
-    calibration = read_calibration(fitted(tmp_path, "thermal_bias", values))
-    written_log(tmp_path / "log.csv", "thermal_bias", values, temperature=np.linspace(16, 34, 40))
-    level_log(calibration, tmp_path / "log.csv", tmp_path / "frd.csv")
-    frd, frame = pd.read_csv(tmp_path / "frd.csv"), parse_frame("rfu")
-    table = pd.read_csv(tmp_path / "log.csv")
-    names = ["fx", "fy", "fz"]
+    own = calibrated("thermal_bias", values)
+    rows = rows_of("thermal_bias", values, temperature=np.linspace(16, 34, 40))
+    frd, frame = leveled_rows(own, rows)[0], parse_frame("rfu")
     # As counts, whose scale and offset belong to the axes of the log.
     scale, offset = np.array([0.01, 0.02, 0.005]), np.array([5.0, 6.0, 7.0])
-    table[names] = frame.from_frd(table[names]) / scale + offset
-    table.to_csv(tmp_path / "rfu.csv", index=False)
+    rows[AXES] = frame.from_frd(rows[AXES]) / scale + offset
     layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame="rfu")
-    turned = replace(calibration, log=layout)
-    level_log(turned, tmp_path / "rfu.csv", tmp_path / "out.csv")
-    found = pd.read_csv(tmp_path / "out.csv")
-    calibrated = [f"{name}_calibrated_mps2" for name in names]
-    np.testing.assert_allclose(found[calibrated], frame.from_frd(frd[calibrated]), atol=1e-8)
-    for i, angle in enumerate(("roll", "pitch")):
-        expected = frame.signs[i] * frd[f"{angle}_gon"]
-        np.testing.assert_allclose(found[f"{angle}_gon"], expected, atol=1e-6)
-        np.testing.assert_allclose(
-            found[f"sigma_{angle}_mgon"], frd[f"sigma_{angle}_mgon"], atol=1e-6
-        )
+    table, _ = leveled_rows(replace(own, log=layout), rows)
+    turned = frame.from_frd(calibrated_in(frd))
+    np.testing.assert_allclose(calibrated_in(table), turned, atol=1e-8)
+    for sign, angle in zip(frame.signs, ("roll", "pitch"), strict=False):
+        np.testing.assert_allclose(table[f"{angle}_gon"], sign * frd[f"{angle}_gon"], atol=1e-6)
+    np.testing.assert_allclose(sigmas_in(table), sigmas_in(frd), atol=1e-6)
+
+
+def test_a_single_reading_is_as_noisy_as_within_the_holds():
+    noisy = calibrated("thermal_bias", {}, sd=np.full((30, 3), 0.05))
+    rows = rows_of("thermal_bias", {}, temperature=np.full(40, 20.0))
+    for own, sigma in ((noisy, 0.05), (calibrated("thermal_bias", {}), SIGMA)):
+        default, given = (leveled_rows(own, rows, **more)[0] for more in ({}, {"sigma": sigma}))
+        np.testing.assert_allclose(sigmas_in(default), sigmas_in(given), rtol=0.05)
+
+
+def test_what_the_calibration_did_not_see_is_counted():
+    rows = pd.DataFrame({"fx": 0.1, "fy": [0.1, 12.5, 0.2, 0.1], "fz": -9.8, "temperature": 20.0})
+    rows.loc[2:, "temperature"] = [36.0, 60.0]  # the first is within the margin
+    _, (warm, strong) = leveled_rows(calibrated("thermal_bias", {"b_T_x": 2e-3}), rows)
+    assert warm.startswith("temperature outside the range of the calibration in 1 of 4 rows")
+    assert "up to 60 °C" in warm
+    assert "force outside the range of the calibration in 1 of 4 rows: up to 12.5 m/s² r" in strong
+
+
+def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(plain):
+    quality = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
+    doubtful = calibration_of({**plain.content, "log": None, "quality": quality})
+    _, warnings = leveled_rows(doubtful, mixed_log()[AXES])
+    assert "do not use this calibration: s_y is beyond" in warnings
 
 
 # --- Logs ----------------------------------------------------------------------------------------
@@ -466,29 +452,6 @@ def test_any_layout_that_import_reads_is_leveled(plain, tmp_path, name, text, wa
         np.testing.assert_allclose(calibrated_in(found), plain.correct(forces), atol=1e-9)
 
 
-def test_a_single_reading_is_as_noisy_as_within_the_holds(tmp_path):
-    n = get_scheme("fibonacci-30").n_positions
-    sd = np.full((n, 3), 0.05)
-    noisy = read_calibration(fitted(tmp_path, "thermal_bias", {}, sd=sd))
-    plain = read_calibration(fitted(tmp_path, "thermal_bias", {}))
-    log = written_log(tmp_path / "log.csv", "thermal_bias", {}, temperature=np.full(40, 20.0))
-    for calibration, sigma in ((noisy, 0.05), (plain, SIGMA)):
-        level_log(calibration, log, tmp_path / "default.csv")
-        level_log(calibration, log, tmp_path / "given.csv", sigma=sigma)
-        found, expected = (errors_of(tmp_path / f"{name}.csv")[1] for name in ("default", "given"))
-        np.testing.assert_allclose(found, expected, rtol=0.05)
-
-
-def test_a_calibration_that_no_sensor_has_is_not_applied_without_a_word(tmp_path):
-    path, log = calibration_file(tmp_path), tmp_path / "log.csv"
-    mixed_log().to_csv(log, index=False)
-    content = json.loads(path.read_text(encoding="utf-8"))
-    content["quality"] = {"plausible": False, "warnings": ["s_y is beyond"], "state": "implausible"}
-    path.write_text(json.dumps(content), encoding="utf-8")
-    warnings = level_log(read_calibration(path), log, tmp_path / "out.csv").warnings
-    assert "do not use this calibration: s_y is beyond" in warnings
-
-
 def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(plain, log, tmp_path):
     mixed_log().to_csv(log, index=False)
     layout = LogLayout(columns={"fx": "ax", "fy": "ay", "fz": "az", "temperature": "T"})
@@ -500,21 +463,6 @@ def test_columns_of_the_campaign_that_a_log_lacks_are_said_to_come_from_there(pl
     known = replace(plain, log=layout)
     level_log(known, log, tmp_path / "out.csv")
     level_log(known, log, tmp_path / "out.csv", {"columns": {"temperature": "count"}})
-
-
-def test_what_the_calibration_did_not_see_is_counted(tmp_path):
-    calibration = read_calibration(fitted(tmp_path, "thermal_bias", {"b_T_x": 2e-3}))
-    log = pd.DataFrame({"fx": 0.1, "fy": [0.1, 12.5, 0.2, 0.1], "fz": -9.8, "temperature": 20.0})
-    log.loc[2:, "temperature"] = [36.0, 60.0]  # the first is within the margin
-    log.to_csv(tmp_path / "log.csv", index=False)
-    warnings = level_log(calibration, tmp_path / "log.csv", tmp_path / "out.csv").warnings
-    assert len(warnings) == 2
-    assert warnings[0].startswith("temperature outside the range of the calibration in 1 of 4 rows")
-    assert "up to 60 °C" in warnings[0]
-    assert (
-        "force outside the range of the calibration in 1 of 4 rows: up to 12.5 m/s² r"
-        in warnings[1]
-    )
 
 
 def test_a_reading_at_the_end_of_the_range_is_no_measurement(plain, tmp_path):
