@@ -196,22 +196,14 @@ def read(whole, name, command, damage=None):
         return status
 
 
-WHICH = st.integers(0, 59)
-"""Which of up to five commands reads a file."""
-
-
 @pytest.mark.parametrize("name", READ_BY)
-@settings(max_examples=20)
-@given(damage=bytes_damaged() | words_replaced(), which=WHICH)
-def test_any_damage_of_a_file_is_one_line(whole, name, damage, which):
-    read(whole, name, READ_BY[name][which % len(READ_BY[name])], damage)
-
-
-@pytest.mark.parametrize("name", [name for name in READ_BY if name.endswith((".yaml", ".json"))])
 @settings(max_examples=25)
-@given(damage=values_replaced(), which=WHICH)
-def test_any_other_value_is_one_line(whole, name, damage, which):
-    read(whole, name, READ_BY[name][which % len(READ_BY[name])], damage)
+@given(data=st.data(), which=st.integers(0, 59))
+def test_any_damage_of_a_file_is_one_line(whole, name, data, which):
+    kinds = [bytes_damaged(), words_replaced()]
+    if name.endswith((".yaml", ".json")):
+        kinds += [values_replaced()]
+    read(whole, name, READ_BY[name][which % len(READ_BY[name])], data.draw(st.one_of(kinds)))
 
 
 # --- options and numbers that no sensor has -------------------------------------------------------

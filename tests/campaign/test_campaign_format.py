@@ -136,34 +136,6 @@ def test_what_is_written_is_read_again(written, table):
         assert_same(read_campaign(folder), written)
 
 
-def test_files_are_those_of_the_format(tmp_path):
-    write_campaign(campaign(), tmp_path / "new" / "folder")
-    assert {path.name for path in (tmp_path / "new" / "folder").iterdir()} == {
-        "campaign.yaml",
-        "positions.csv",
-    }
-    assert yaml.safe_load((tmp_path / "new" / "folder" / "campaign.yaml").read_text()) == {
-        "schema_version": 1,
-        "name": "small",
-        "sensor": "a sensor",
-        "unit": "m/s^2",
-        "gravity": {"value_mps2": 9.81, "sigma_mps2": 1e-5},
-        "sensor_noise": {"sigma_mps2": 0.002},
-        "range_mps2": 20.0,
-        "robot": {"angle_sigma_mgon": pytest.approx(3.2)},
-        "log": {
-            "columns": {"fx": 0, "fy": "b", "fz": 2},
-            "time_unit": "s",
-            "rate_hz": 100.0,
-            "unit": "m/s^2",
-            "frame": "flu",
-        },
-    }
-    header, *rows = (tmp_path / "new" / "folder" / "positions.csv").read_text().splitlines()
-    assert header.split(",")[:5] == ["position", "time_s", "fx", "fy", "fz"]
-    assert len(rows) == len(ROLL)
-
-
 def test_one_table_replaces_the_other(tmp_path):
     for table in ("csv", "parquet", "csv"):
         write_campaign(campaign(name=table), tmp_path, table)

@@ -11,12 +11,11 @@ from log_helpers import G, session, write
 from scipy.io import savemat
 from stand_ins import drawn
 
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY, angles_in
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.settings import ImportSettings, read_settings
+from accelstudy.campaign.importing.settings import ImportSettings
 
 
 @pytest.fixture
@@ -99,14 +98,6 @@ def test_means_as_columns(tmp_path):
     assert campaign.sigma_force is None
 
 
-def test_settings_are_overlaid(tmp_path):
-    (tmp_path / "settings.yaml").write_text("rate_hz: 50\nscale: 0.1\nunit: counts\n")
-    settings = read_settings(tmp_path / "settings.yaml", {"rate_hz": 100})
-    assert (settings.rate_hz, settings.scale, settings.unit) == (100, [0.1], "counts")
-    with pytest.raises(InputError, match=r"none\.yaml"):
-        read_settings(tmp_path / "none.yaml")
-
-
 # --- The command ---------------------------------------------------------------------------------
 
 
@@ -150,7 +141,7 @@ def test_command_with_everything(tmp_path):
     forces, _ = session(holds=4)
     table = np.column_stack([np.arange(len(forces)) * 10.0, 1000 * forces + [1, 2, 3]])
     np.savetxt(tmp_path / "log.txt", table, "%.1f")
-    content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1"}
+    content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1", "unit": "g"}
     (tmp_path / "settings.yaml").write_text(yaml.safe_dump(content))
     result = succeed(
         "import",

@@ -89,15 +89,6 @@ def test_saturated_holds_are_left_out(tmp_path):
     assert any("saturated" in text for text in holds.warnings)
 
 
-def test_a_coarse_sensor_is_not_saturated(tmp_path):
-    rng = np.random.default_rng(5)
-    forces = np.repeat(np.diag([G] * 3), 400, axis=0) + 0.02 * rng.standard_normal((1200, 3))
-    coarse = np.round(forces / 0.03) * 0.03
-    holds = find_holds(opened(tmp_path, coarse))
-    assert len(holds.table) == 3
-    assert not any("saturated" in text for text in holds.warnings)
-
-
 def test_override_and_limits(tmp_path):
     forces, edges = session()
     log = opened(tmp_path, forces)
@@ -120,9 +111,6 @@ def test_a_log_at_rest_is_one_hold(tmp_path):
 def test_few_holds_in_much_motion(tmp_path):
     forces, edges = session(holds=4, still=400, moving=2500)
     assert len(find_holds(opened(tmp_path, forces)).table) == len(edges)
-
-
-# --- Public data ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("sigma", "factor"), [(0.0003, 6), (0.002, 6), (0.01, 2), (0.1, 2)])
