@@ -151,42 +151,34 @@ def find_holds(
         If a log cannot be read, is shorter than a window, nothing in it is at rest, or the sensor
         was never still.
     """
-    step, seconds = logs[0].step, settings.window_s or usual_window(logs[0])
+    seconds = settings.window_s or usual_window(logs[0])
     windows = [Windows.lasting(log, seconds) for log in logs]
     thresholds = [each.threshold(settings.threshold_mps2) for each in windows]
-    still = np.all([w.at_rest(t.sd) for w, t in zip(windows, thresholds, strict=True)], axis=0)
-    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
-    cut, least = round(settings.trim_s / step), max(2, round(settings.shortest_s / step))
-    rests = edges + np.array([cut, -cut])
-    lengths = np.diff(rests)[:, 0]
-    runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
-    lost = 2 * cut + windows[0].width
-    short = (lengths[(lengths >= MIN_REST) & (lengths < least)] + lost) * step
-    said = _too_short(short.tolist(), seconds + 2 * settings.trim_s, settings.shortest_s)
+    limits = [threshold.sd for threshold in thresholds]
+    runs, too_short = _runs_at_rest(windows, limits, seconds, settings)
     full = np.array([find_saturated(each, runs, settings.full_range) for each in windows], bool)
     # A sensor that turns slowly is nearly still in each window, yet has no constant attitude: its
     # force changes over the run by more than within each of them.
     sds = np.array([[scatter(log.forces[run]) for run in runs] for log in logs])
-    turns = ~full & (sds > MAX_WANDER * np.array([[threshold.sd] for threshold in thresholds]))
+    turns = ~full & (sds > MAX_WANDER * np.array(limits)[:, None])
     good = ~full & ~turns
     numbers = dict(enumerate(np.flatnonzero(good.any(axis=0)).tolist(), 1))
     if one_each:
-        recording = logs[0].part
+        part = logs[0].part
         by_length = sorted(numbers.values(), key=lambda i: runs[i].stop - runs[i].start)
-        numbers = dict(sorted({int(recording[runs[i].start]) + 1: i for i in by_length}.items()))
+        numbers = dict(sorted({int(part[runs[i].start]) + 1: i for i in by_length}.items()))
     result = []
     for k, (each, threshold) in enumerate(zip(windows, thresholds, strict=True)):
-        warnings = each.warnings()
         holds = {n: runs[i] for n, i in numbers.items() if good[k, i]}
-        saturated, wandering = int(full[k].sum()), int(turns[k].sum())
-        if saturated:
-            warnings.append(f"{counted(saturated, 'hold')} left out: the sensor is saturated there")
-        if wandering:
-            warnings.append(
-                f"{counted(wandering, 'hold')} left out: the force changes there by more than its "
-                "noise, since the sensor turns slowly"
-            )
-        warnings += said
+        warnings, wandering = each.warnings(), int(turns[k].sum())
+        for count, why in (
+            (int(full[k].sum()), "the sensor is saturated there"),
+            (wandering, "the force changes there by more than its noise, since the sensor turns "
+             "slowly"),
+        ):  # fmt: skip
+            if count:
+                warnings.append(f"{counted(count, 'hold')} left out: {why}")
+        warnings += too_short
         if not holds and wandering:
             raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
         if not holds:
@@ -194,8 +186,39 @@ def find_holds(
                 f"{each.log.path}: no static hold of {settings.shortest_s:g} s or more (a window "
                 f"is at rest up to {threshold.sd:.3g} m/s²)" + "".join(f"; {w}" for w in warnings)
             )
-        result.append(_chosen(each, threshold, holds, warnings, settings))
+        result.append(_holds_of(each, threshold, holds, warnings, settings))
     return result
+
+
+def _runs_at_rest(
+    windows: Sequence[Windows], limits: Sequence[float], seconds: float, settings: ImportSettings
+) -> tuple[list[slice], list[str]]:
+    """Samples that are at rest for long enough in windows of all sensors, up to sds in m/s².
+
+    Also a line about rests that are too short, with the option that takes them.
+    """
+    step, shortest = windows[0].log.step, settings.shortest_s
+    still = np.all([w.at_rest(limit) for w, limit in zip(windows, limits, strict=True)], axis=0)
+    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
+    cut, least = round(settings.trim_s / step), max(2, round(shortest / step))
+    rests = edges + np.array([cut, -cut])
+    lengths = np.diff(rests)[:, 0]
+    runs = [slice(first, end) for first, end in rests[lengths >= least].tolist()]
+    short = (lengths >= MIN_REST) & (lengths < least)
+    if not short.any():
+        return runs, []
+    rests_s = (lengths[short] + 2 * cut + windows[0].width) * step
+    lost = seconds + 2 * settings.trim_s
+    spans = sorted({f"{rests_s.min():.1f}", f"{rests_s.max():.1f}"}, key=float)
+    left = (float(rests_s.min()) - lost) * (1 + 1e-9)
+    digit = 10.0 ** np.floor(np.log10(left))
+    several = len(rests_s) > 1
+    return runs, [
+        f"{counted(len(rests_s), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} "
+        f"no hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not "
+        f"count; `shortest` {digit * np.floor(left / digit):g} (now {shortest:g}) takes "
+        f"{'them' if several else 'it'}"
+    ]
 
 
 def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
@@ -251,7 +274,7 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     for number, each in scatters.items():
         if each > threshold.sd:
             left_out[number] = f"the sensor moves: its parts scatter by {each:.2g} m/s²"
-    return _chosen(windows, threshold, blocks, windows.warnings(), settings, left_out, least)
+    return _holds_of(windows, threshold, blocks, windows.warnings(), settings, left_out, least)
 
 
 def scatter(forces: Array) -> float:
@@ -300,26 +323,10 @@ def at_range(forces: Array, full_range: float) -> bool:
     return bool(np.any(beyond.sum(axis=0) > MAX_SATURATED_SHARE * len(forces)))
 
 
-def _too_short(rests: Sequence[float], lost: float, shortest: float) -> list[str]:
-    """Say which rests, of so many seconds, are no holds, and the option that takes them."""
-    if not rests:
-        return []
-    several = len(rests) > 1
-    spans = sorted({f"{min(rests):.1f}", f"{max(rests):.1f}"}, key=float)
-    left = (min(rests) - lost) * (1 + 1e-9)
-    digit = 10.0 ** np.floor(np.log10(left))
-    takes = digit * np.floor(left / digit)
-    return [
-        f"{counted(len(rests), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} no "
-        f"hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not count; "
-        f"`shortest` {takes:g} (now {shortest:g}) takes {'them' if several else 'it'}"
-    ]
-
-
 # --- What a person says of them ------------------------------------------------------------------
 
 
-def _chosen(
+def _holds_of(
     windows: Windows,
     threshold: Threshold,
     holds: Mapping[int, slice],

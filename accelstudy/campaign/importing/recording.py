@@ -407,7 +407,7 @@ class Recording:
         where the last one ends
     forces : (n, 3) array, m/s², in forward, right, down; each axis in one piece
     conditions : mapping of str to (n,) arrays, those of `CONDITIONS` that all parts have
-    part, row : (n,) int arrays, number of the part, and of the row in it, from 0
+    lengths : list of int, samples of each part
 
     Raises
     ------
@@ -441,8 +441,17 @@ class Recording:
             for key in CONDITIONS
             if all(key in part.places for part in parts)
         }
-        self.part = self._of_all([np.full(len(lost), i) for i, lost in enumerate(self._lost)])
-        self.row = self._of_all([np.arange(len(lost)) for lost in self._lost])
+        self.lengths = [len(each) for each in times]
+
+    @property
+    def part(self) -> NDArray[np.int_]:
+        """Number of the part of each sample, from 0, (n,)."""
+        return np.repeat(np.arange(len(self.parts)), self.lengths)
+
+    @property
+    def row(self) -> NDArray[np.int_]:
+        """Number of the row of each sample in its part, from 0, (n,)."""
+        return self._of_all([np.arange(len(lost)) for lost in self._lost])
 
     def _of_all(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
         """Columns of the parts, (..., n) each, without the rows that lack a reading."""

@@ -77,13 +77,14 @@ class Windows:
     def __init__(self, log: Recording, width: int) -> None:
         self.log, self.width = log, width
         time, forces = log.time, log.forces
-        another = np.diff(log.part) > 0
-        jumps = (np.diff(time) > GAP_RATIO * log.step) & ~another
+        firsts = np.cumsum(log.lengths)[:-1]
+        jumps = np.diff(time) > GAP_RATIO * log.step
+        jumps[firsts - 1] = False
         self.gaps = int(jumps.sum())
         self.variance = np.full(len(time), np.nan)
         self.frozen = np.zeros(len(time), dtype=bool)
         half = width // 2
-        pieces = [0, *(1 + np.flatnonzero(jumps | another)).tolist(), len(time)]
+        pieces = sorted([0, *firsts.tolist(), *(1 + np.flatnonzero(jumps)).tolist(), len(time)])
         for start, end in pairwise(pieces):
             for first in range(start, end - width + 1, _TOGETHER):
                 beyond = min(first + _TOGETHER + width - 1, end)
@@ -248,7 +249,8 @@ def _window_sums(values: Array, width: int) -> Array:
 
 def _histogram(variance: Array) -> NDArray[np.int_]:
     """Numbers of windows by the logarithms of their variances."""
-    decades = np.log10(variance[variance > 0])
+    with np.errstate(divide="ignore"):  # what is zero has no bin
+        decades = np.log10(variance)
     # Bins of equal width, which numpy finds faster than those of an array.
     counts: NDArray[np.int_] = np.histogram(decades, len(_BINS) - 1, (_BINS[0], _BINS[-1]))[0]
     return counts
