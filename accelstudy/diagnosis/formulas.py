@@ -20,7 +20,7 @@ from scipy.stats import f as f_distribution
 from accelstudy.basics.units import shown_unit
 from accelstudy.basics.wording import comma_list, estimate
 from accelstudy.diagnosis.coordinates import ANGLES, TARGETS, Coordinate, coordinate_of
-from accelstudy.diagnosis.decision.learned import coordinate_values, weighted_shapes
+from accelstudy.diagnosis.decision.learned import coordinate_values, weigh_place
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
@@ -170,7 +170,7 @@ class _Functions:
         """Log density under any smooth function, even over its smoothness."""
         z, effect = self.residuals.z, self.effect
         like = WAVES.get(effect.coordinate, effect.coordinate), effect.target
-        tried = weighted_shapes(place, self.frame, self.residuals, z[None], evidence)
+        tried = weigh_place(place, self.frame, self.residuals, z[None], evidence)
         shapes = [one for one in tried if (one.effect.coordinate, one.effect.target) == like]
         square = np.array([z @ z])
         if not shapes:

@@ -17,10 +17,10 @@ from accelstudy.diagnosis.decision.learned import (
     SIZES,
     fit_of_place,
     most_probable_place,
-    weighted_shapes,
+    weigh_place,
 )
 from accelstudy.diagnosis.decision.noise import exceeds_stated, unit_variance
-from accelstudy.diagnosis.decision.posterior import Case, Posterior, Weighing
+from accelstudy.diagnosis.decision.posterior import Alternatives, Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Seen
@@ -108,7 +108,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
         base = solve(first.model, first.approach, first.observed.take(fitted))
     except (InputError, np.linalg.LinAlgError):
         return replace(gap, reason="the fitted positions do not determine the model")
-    part = Weighing(pose(replace(problem.base, solution=base)))
+    part = Alternatives(pose(replace(problem.base, solution=base)))
     chosen, others = _chosen_alike(part, finding)
     refit = _refitted(part, chosen, place)
     if isinstance(refit, str):
@@ -132,11 +132,11 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
     # What was found, and all that could leave the same in this campaign.
     imitators = problem.examined.imitators(cause.shape)
     names = tuple(dict.fromkeys((cause.name, *cause.members, *imitators)))
-    sure = _is_of(names, problem, part.problem, finding, split)
+    sure = _prefers(names, problem, part.problem, finding, split)
     return replace(gap, names=names) if sure else gap
 
 
-def _chosen_alike(part: Weighing, finding: Finding) -> tuple[Sequence[Cause], bool]:
+def _chosen_alike(part: Alternatives, finding: Finding) -> tuple[Sequence[Cause], bool]:
     """Effects of the credible set that a part chooses, and whether it would choose something else.
 
     Of a learned function they are what is certain beside it.
@@ -168,7 +168,7 @@ def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     )
 
 
-def _refitted(part: Weighing, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
+def _refitted(part: Alternatives, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
     """Fit to a part with what was chosen, and a function of a place; or say why that cannot be."""
     alternatives = []
     for cause in chosen:
@@ -184,7 +184,7 @@ def _refitted(part: Weighing, chosen: Sequence[Cause], place: Place | None) -> S
     return "the fit to the fitted positions alone has no solution" if fit is None else fit[1]
 
 
-def _place_of(part: Weighing) -> Place | None:
+def _place_of(part: Alternatives) -> Place | None:
     """Place that a part chooses for something unknown, alone or beside effects."""
     alone = [one for one in part.alone if one.names == (UNKNOWN,)]
     if not alone:
@@ -193,7 +193,7 @@ def _place_of(part: Weighing) -> Place | None:
     return None if found is None else found.place
 
 
-def _is_of(
+def _prefers(
     group: Sequence[str], problem: Problem, part: Problem, finding: Finding, split: LinearSplit
 ) -> bool:
     """Whether held-out positions by themselves prefer some names to the other explanations."""
@@ -201,7 +201,7 @@ def _is_of(
     errors = problem.residuals.errors[None]
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
-    for one in finding.posterior.told[: RULES.held_out_rivals + 1]:
+    for one in finding.posterior.reported[: RULES.held_out_rivals + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
             (columns,) = problem.frame.columns(one.best)
             missed = split.beside(errors)[1] - split.corrections(errors, [(0, columns, 0.0)])
@@ -223,7 +223,7 @@ def _is_of(
 
 
 def threshold(
-    weighing: Weighing,
+    whole: Alternatives,
     place: Place | None,
     beyond: float,
     part: Problem,
@@ -234,14 +234,14 @@ def threshold(
 
     Parameters
     ----------
-    weighing : Weighing, of all positions
+    whole : Alternatives, of all positions
     place : Place, of which a function was learned in place of a name; None for a name
     beyond : float, total evidence from which on something counts as missing
     part : Problem, of the fitted positions
     split : LinearSplit
     rng : Generator
     """
-    problem, label = weighing.problem, labels(weighing.classes)
+    problem, label = whole.problem, labels(whole.classes)
     residuals, field = problem.residuals, problem.field
     drawn = list[Shapes](field.named)
     if place is not None:
@@ -255,14 +255,18 @@ def threshold(
     z = residuals.project(noise.T).T
     seen = field.seen(z)
     odds = field.odds(problem.evidence, seen)
-    claimed = learned(problem, seen, place) if place else named(odds, field.names, label)
+    claimed = (
+        claimed_place(problem, seen, place) if place else claimed_names(odds, field.names, label)
+    )
     sets = np.flatnonzero((claimed >= 0) & (total_odds(odds) > beyond))
     if not len(sets):
         return RULES.z_significant
     weights = np.exp(-log_ratio(drawn, [shapes.parts(z[sets]) for shapes in drawn]))
     noise = noise[sets]
     found, change = (
-        by_place(part, split, noise, place) if place else by_name(part, split, noise, label)
+        chosen_place(part, split, noise, place)
+        if place
+        else chosen_names(part, split, noise, label)
     )
     values = split.statistic(change, noise, part.evidence.level.known)
     order = np.argsort(-values)
@@ -278,7 +282,7 @@ def labels(classes: Sequence[Cause]) -> dict[str, int]:
     return {name: i for name, i in each if name != OUTLIER}
 
 
-def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
+def claimed_names(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
     """Class that residuals would be given as a name, alone or among few, (b,); −1 for none.
 
     Parameters
@@ -296,7 +300,7 @@ def named(odds: Array, names: Sequence[str], label: Mapping[str, int]) -> Ints:
     return np.where((p.max(axis=1) >= RULES.sure) | few, top, -1)
 
 
-def by_name(
+def chosen_names(
     part: Problem, split: LinearSplit, noise: Array, label: Mapping[str, int]
 ) -> tuple[Ints, Array]:
     """Class that the fitted positions choose of noise (b, m), and the corrections that it makes."""
@@ -317,7 +321,7 @@ def by_name(
     return found, split.corrections(noise, groups())
 
 
-def learned(problem: Problem, seen: Seen, place: Place) -> Ints:
+def claimed_place(problem: Problem, seen: Seen, place: Place) -> Ints:
     """Whether a function of a place would be learned of residuals, (b,): 0, or −1 if not."""
     field, evidence, unknown = problem.field, problem.evidence, problem.unknown
     assert unknown is not None
@@ -329,14 +333,16 @@ def learned(problem: Problem, seen: Seen, place: Place) -> Ints:
     return np.where(np.exp(of_place + prior - log_sum(densities)) >= RULES.sure, 0, -1)
 
 
-def by_place(part: Problem, split: LinearSplit, noise: Array, place: Place) -> tuple[Ints, Array]:
+def chosen_place(
+    part: Problem, split: LinearSplit, noise: Array, place: Place
+) -> tuple[Ints, Array]:
     """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
     unknown, z, frame = part.unknown, split.residuals(part.residuals, noise), split.frame
     assert unknown is not None
     each = unknown.of_place(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
     most = np.max([*each.values()], axis=0)
     found = np.where(each.get(place, np.full(len(z), -np.inf)) >= most, 0, -1)
-    shapes = weighted_shapes(place, part.frame, part.residuals, z, part.evidence)
+    shapes = weigh_place(place, part.frame, part.residuals, z, part.evidence)
 
     def groups() -> Iterator[Group]:
         best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)

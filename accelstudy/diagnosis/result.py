@@ -221,7 +221,7 @@ class Diagnosis:
     @property
     def certain(self) -> tuple[Part, ...]:
         """What is missing whatever else is open."""
-        return self.finding.says.certain
+        return self.finding.statement.certain
 
     @cached_property
     def found(self) -> tuple[Named, ...]:
@@ -252,7 +252,7 @@ class Diagnosis:
         """What is wrong with the noise."""
         worst, posterior = worst_of(self.noise_tests), self.finding.posterior
         assert posterior is not None
-        name = next(one.names[0] for one in posterior.told if one.of_noise)
+        name = next(one.names[0] for one in posterior.reported if one.of_noise)
         # Of larger residuals the level says least; what they are, the evidence says.
         if worst is not None and not (worst.name == LEVEL and posterior.of_noise >= RULES.sure):
             name = worst.name

@@ -139,7 +139,7 @@ def test_the_posterior_merges_what_means_the_same():
     same = Cause("z", weighed[0].classes[0])
     posterior = Posterior.of([*weighed, Explanation((same,), np.log(0.3))])
     assert tuple(one.posterior for one in posterior.all) == pytest.approx((0.6, 0.2, 0.2))
-    assert posterior.told[0].names == ("a",)
+    assert posterior.reported[0].names == ("a",)
     assert sum(one.posterior for one in posterior.credible_set) == pytest.approx(1.0)
 
 
@@ -167,8 +167,8 @@ DRIFT, OTHER, BIAS = ("bias_drift",), ("hysteresis",), ("bias",)
 ])  # fmt: skip
 def test_what_is_told_of_pairs(given, told):
     posterior = Posterior.of(weighed(*given.items()))
-    assert {e.names: e.posterior for e in posterior.told} == pytest.approx(told)
-    assert [e.names for e in posterior.told] == [*told]
+    assert {e.names: e.posterior for e in posterior.reported} == pytest.approx(told)
+    assert [e.names for e in posterior.reported] == [*told]
     assert [e.posterior for e in posterior.all] == pytest.approx(sorted(given.values())[::-1])
 
 
@@ -176,7 +176,7 @@ def test_wrong_noise_of_all_kinds_is_one_explanation():
     posterior = Posterior.of(
         weighed((("bias",), 0.4), (("axis_noise",), 0.2), (("heavy_tails",), 0.4 - 1e-9))
     )
-    assert posterior.told[0].names == ("heavy_tails",)
+    assert posterior.reported[0].names == ("heavy_tails",)
     assert posterior.of_noise == pytest.approx(0.6)
 
 

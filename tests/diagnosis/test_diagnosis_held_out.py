@@ -9,7 +9,7 @@ from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, 
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out
-from accelstudy.diagnosis.decision.posterior import Weighing
+from accelstudy.diagnosis.decision.posterior import Alternatives
 from accelstudy.diagnosis.decision.refits import refit
 from accelstudy.diagnosis.evidence.candidates import weigh_singles
 from accelstudy.diagnosis.evidence.detection import Chance, detect
@@ -46,7 +46,7 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
     beyond = detect(field, evidence, residuals, chance).beyond(RULES.level_effects)
-    weighing, rng = Weighing(problem), np.random.default_rng(3)
+    weighing, rng = Alternatives(problem), np.random.default_rng(3)
     needed = held_out.threshold(weighing, None, beyond, part, split, rng)
     assert needed > RULES.z_significant + 0.3
     rng = np.random.default_rng(4)
@@ -55,9 +55,9 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     odds = field.odds(evidence, field.seen(z))
     of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
     label = held_out.labels(weighing.classes)
-    claimed = held_out.named(odds, field.names, label)
+    claimed = held_out.claimed_names(odds, field.names, label)
     sets = np.flatnonzero((claimed >= 0) & (of_any > beyond))
-    found, change = held_out.by_name(part, split, noise[sets], label)
+    found, change = held_out.chosen_names(part, split, noise[sets], label)
     values = split.statistic(change, noise[sets], evidence.level.known)
     same, n = found == claimed[sets], len(sets)
     assert n > 150

@@ -32,7 +32,7 @@ from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Posterior
-from accelstudy.diagnosis.decision.statement import statement
+from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
 from accelstudy.diagnosis.loop import Loop, close_loop
@@ -182,7 +182,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     posterior = Posterior.of(weighed)
     finding = Finding(
         "narrowed", named.final, None, named.finding.chosen, posterior,
-        statement(posterior.credible_set, named.case.cosine),
+        statement_of(posterior.credible_set, named.case.cosine),
     )  # fmt: skip
     diagnosis = replace(otherwise(named, finding), gap=replace(named.gap, names=()))
     content, text = told(diagnosis, tmp_path)
@@ -208,7 +208,7 @@ def test_what_is_certain_of_the_unknown_is_told_and_in_the_model(named, tmp_path
     posterior = Posterior.of(weighed)
     finding = Finding(
         "unknown", named.final, Reason.of("not in the catalogue"), named.finding.chosen, posterior,
-        statement(posterior.all, named.case.cosine),
+        statement_of(posterior.all, named.case.cosine),
     )  # fmt: skip
     diagnosis = otherwise(named, finding, next_positions=())
     content, text = told(diagnosis, tmp_path)

@@ -3,7 +3,7 @@
 import pytest
 from diagnosis_helpers import explanation
 
-from accelstudy.diagnosis.decision.statement import family_of, statement
+from accelstudy.diagnosis.decision.statement import family_of, statement_of
 from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
@@ -86,7 +86,7 @@ def made(*explanations):
 ])  # fmt: skip
 def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside):
     """Parts by their family, unless they have one name, with the posteriors."""
-    found = statement(made(*explanations), cosine)
+    found = statement_of(made(*explanations), cosine)
     for part, (family, names) in zip(found.certain, certain, strict=True):
         assert len(part.names) == 1 or part.family == family
         assert {name.name: name.posterior for name in part.names} == pytest.approx(names)
@@ -152,7 +152,9 @@ def test_what_is_certain_of_the_unknown_comes_first():
         ([("warm_up+unknown", 0.99)],
          "The model lacks warm up; what is missing beside it has no name here."),
     ):  # fmt: skip
-        assert without_a_name(statement(made(*explanations), cosine), "something smaller") == says
+        assert (
+            without_a_name(statement_of(made(*explanations), cosine), "something smaller") == says
+        )
 
 
 def test_the_unknown_is_said_by_families():
@@ -160,12 +162,12 @@ def test_the_unknown_is_said_by_families():
         *(("bias_drift", 0.4), ("coloured_noise", 0.25), ("warm_up", 0.2)),
         *(("unknown", 0.1), ("hysteresis", 0.05)),
     )
-    assert most_probable(statement(spread, cosine), spread) == (
+    assert most_probable(statement_of(spread, cosine), spread) == (
         "Most probable: a slow change in time (0.6), noise of another kind (0.25) and something "
         "that is not in the catalogue (0.1)."
     )
     beside = made(("bias_drift+unknown", 0.7), ("bias_drift+hysteresis", 0.25))
-    assert most_probable(statement(beside, cosine), beside) == (
+    assert most_probable(statement_of(beside, cosine), beside) == (
         "Most probable beside it: something that is not in the catalogue (0.7) and a memory of the "
         "previous position (0.25)."
     )
@@ -178,8 +180,8 @@ def test_names_that_are_not_alike_are_no_component():
         return 0.3 if {one, other} == {"bias_drift", "hysteresis"} else 0.7
 
     three = made(("warm_up", 0.4), ("bias_drift", 0.3), ("hysteresis", 0.25))
-    assert statement(three, chain).certain == ()
-    (part,) = statement(three[:2], chain, probability=0.6).certain
+    assert statement_of(three, chain).certain == ()
+    (part,) = statement_of(three[:2], chain, probability=0.6).certain
     assert (part.purity, family_of("warm_up", "bias_drift")) == (0.7, part.family)
 
 
@@ -189,5 +191,5 @@ def test_names_that_are_not_alike_are_no_component():
     [("bias_drift", 0.3), ("hysteresis", 0.2), ("coloured_noise", 0.3), ("unknown", 0.15)],
 ])  # fmt: skip
 def test_nothing_is_certain_of_what_no_effect_explains(explanations):
-    says = without_a_name(statement(made(*explanations), cosine))
+    says = without_a_name(statement_of(made(*explanations), cosine))
     assert says.startswith("Something is missing from the model")

@@ -196,7 +196,7 @@ def _shape(settings: dict[str, str | float]) -> Learned:
 
 
 @dataclass(frozen=True)
-class Weighted:
+class PlaceShape:
     """A shape, and how probable it is of each size.
 
     Attributes
@@ -216,7 +216,7 @@ class Weighted:
     @classmethod
     def of(
         cls, effect: Learned, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
-    ) -> Weighted | None:
+    ) -> PlaceShape | None:
         """Weigh a shape by errors (b, m) in a space of residuals; None if too little shows."""
         rows = residuals.whitened(frame.signature(effect)) * effect.deviations
         left = residuals.project(rows)
@@ -231,11 +231,13 @@ class Weighted:
         return cls(effect, vectors, shares, trace, logs)
 
 
-def weighted_shapes(
+def weigh_place(
     place: Place, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
-) -> list[Weighted]:
+) -> list[PlaceShape]:
     """Shapes of a place, weighed by errors (b, m) in the space of residuals of a frame."""
-    each = (Weighted.of(one, frame, residuals, errors, evidence) for one in shapes_of(place, frame))
+    each = (
+        PlaceShape.of(one, frame, residuals, errors, evidence) for one in shapes_of(place, frame)
+    )
     return [one for one in each if one is not None]
 
 
@@ -249,7 +251,7 @@ def fit_of_place(
     frame = problem.frame
     residuals = frame.residuals.beside(space_of(beside, len(frame.residuals.z)))
     z, evidence = residuals.z, replace(problem.evidence, redundancy=residuals.redundancy)
-    shapes = weighted_shapes(place, frame, residuals, z[None], evidence)
+    shapes = weigh_place(place, frame, residuals, z[None], evidence)
     if not shapes:
         return None
     best = max(shapes, key=lambda one: float(np.logaddexp.reduce(one.logs[0])))

@@ -1,9 +1,9 @@
 """One posterior over everything that could be the case once something is missing.
 
-Fewer explanations are told than were weighed (`Posterior.told`). All kinds of wrong noise count as
-one, named by the most probable of them. Where one effect is more probable than several, a set
-counts for the most probable of its effects, and likewise a set of three for the most probable of
-its pairs where two are more probable. "This effect is missing" then leaves open whether a second
+Fewer explanations are reported than were weighed (`Posterior.reported`). All kinds of wrong noise
+count as one, named by the most probable of them. Where one effect is more probable than several, a
+set counts for the most probable of its effects, and likewise a set of three for the most probable
+of its pairs where two are more probable. "This effect is missing" then leaves open whether a second
 one, too small to be seen, is missing as well.
 """
 
@@ -137,8 +137,8 @@ class Posterior:
         return cls(ranked(merged.values()))
 
     @cached_property
-    def told(self) -> tuple[Explanation, ...]:
-        """Those that are told, most probable first."""
+    def reported(self) -> tuple[Explanation, ...]:
+        """Those that are reported, most probable first."""
         noise = next((i for i, one in enumerate(self.all) if one.of_noise), None)
         size, parts = self._size, dict[tuple[tuple[str, ...], ...], int]()
         for i, one in enumerate(self.all):
@@ -167,12 +167,12 @@ class Posterior:
     @property
     def credible_set(self) -> tuple[Explanation, ...]:
         """Smallest set of explanations that holds the truth with a probability of 0.9."""
-        return credible_set(self.told)
+        return credible_set(self.reported)
 
     @property
     def of_noise(self) -> float:
         """Probability that nothing is wrong but the noise."""
-        return sum(one.posterior for one in self.told if one.of_noise)
+        return sum(one.posterior for one in self.reported if one.of_noise)
 
     def doubting(self, names: Collection[str]) -> Posterior:
         """Share what has some names with something unknown that they may only imitate."""
@@ -194,8 +194,8 @@ class Posterior:
 
 
 @dataclass(frozen=True)
-class Weighing:
-    """Everything that a problem may have missing, weighed once it is needed.
+class Alternatives:
+    """All that a problem may have missing: the evidence for it, weighed once it is needed.
 
     Attributes
     ----------
@@ -283,7 +283,7 @@ class Weighing:
 
 
 @dataclass(frozen=True)
-class Case(Weighing):
+class Case(Alternatives):
     """A campaign and everything that could explain it, the noise among it.
 
     Attributes
@@ -312,7 +312,7 @@ class Case(Weighing):
         """Explanations by wrong noise alone, one of each kind."""
         problem, by_level = self.problem, self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
-        # Weighted axes need no further evidence that they differ.
+        # PlaceShape axes need no further evidence that they differ.
         weighted = problem.frame.solution is not problem.base.solution
         unequal = by_level[0] if weighted else nothing + problem.unequal_axes
         tails = most_evidence(tail_test(problem.residuals, self.chance).p_value)
@@ -386,7 +386,7 @@ def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | Non
 
 def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
     """One effect with another one, or with something unknown, in what its refit leaves."""
-    inner = Weighing(pose(replace(case.problem.base, solution=solution)))
+    inner = Alternatives(pose(replace(case.problem.base, solution=solution)))
     problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
     odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
     for name, log in zip(problem.field.names, odds.tolist(), strict=True):

@@ -86,7 +86,7 @@ class Statement:
     open: tuple[Explanation, ...]
 
 
-def statement(
+def statement_of(
     explanations: Sequence[Explanation], cosine: Cosine, probability: float = RULES.credible
 ) -> Statement:
     """Say what explanations leave no doubt of, and what they leave open.

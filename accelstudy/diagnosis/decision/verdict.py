@@ -20,7 +20,7 @@ from accelstudy.diagnosis.decision.posterior import (
     posterior_by_refits,
 )
 from accelstudy.diagnosis.decision.problem import Problem
-from accelstudy.diagnosis.decision.statement import Part, Statement, statement
+from accelstudy.diagnosis.decision.statement import Part, Statement, statement_of
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
 from accelstudy.diagnosis.prediction import HeldOutGap
@@ -62,7 +62,7 @@ class Finding:
     reason : Reason or None
     chosen : tuple of Cause; of the unknown, what is certain
     posterior : Posterior or None, where something is missing
-    says : Statement, what is missing whatever else is open, and what may be missing beside that
+    statement : Statement, what is missing whatever else is open, and what may be beside that
     place : Place or None, coordinate and target of a learned function, which is the first chosen
     without_function : Finding or None, what is said without that function
     """
@@ -72,7 +72,7 @@ class Finding:
     reason: Reason | None = None
     chosen: tuple[Cause, ...] = ()
     posterior: Posterior | None = None
-    says: Statement = field(default=Statement((), ()))
+    statement: Statement = field(default=Statement((), ()))
     place: Place | None = None
     without_function: Finding | None = None
 
@@ -87,7 +87,7 @@ class Finding:
         if self.verdict != "unknown":
             return self.credible_set
         added = {choice.members for choice in self.chosen}
-        parts = [part for part in self.says.certain if part.names[0].members in added]
+        parts = [part for part in self.statement.certain if part.names[0].members in added]
         alternatives = product(*(part.names for part in parts))
         return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)
 
@@ -116,7 +116,7 @@ def explain(case: Case) -> Finding:
 
 def _judge(case: Case, posterior: Posterior) -> Finding:
     """Judge the explanations of a posterior: the first rule that matches."""
-    frame, top = case.problem.frame, posterior.told[0]
+    frame, top = case.problem.frame, posterior.reported[0]
     if top.best:
         fit = case.refit(top.causes)
         reason = _against(case.problem, top, fit)
@@ -143,7 +143,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         return Finding("noise_model", frame, reason, posterior=posterior)
     reason = Reason.of("not in the catalogue")
     if UNKNOWN not in top.names:
-        reason = Reason.of("undecided", first=top, second=posterior.told[1])
+        reason = Reason.of("undecided", first=top, second=posterior.reported[1])
     return Finding("unknown", frame, reason, posterior=posterior)
 
 
@@ -179,7 +179,7 @@ def dismiss_weak_evidence(case: Case, finding: Finding) -> Finding | None:
     test = global_test(base.omega, base.redundancy, sigma_dof=base.sigma_dof)
     if test is None or not test.accepted or test.powerless:
         return None
-    if any(part.is_effect for part in finding.says.certain):
+    if any(part.is_effect for part in finding.statement.certain):
         return None
     return Finding("no_effect", case.problem.frame, Reason.of("weak", p=case.detection.p_value))
 
@@ -197,18 +197,18 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
     posterior = finding.posterior
     assert posterior is not None
     if finding.verdict != "unknown":
-        return replace(finding, says=statement(finding.credible_set, case.cosine))
+        return replace(finding, statement=statement_of(finding.credible_set, case.cosine))
     beyond = sum(one.posterior for one in posterior.all if UNKNOWN in one.names)
     if finding.code == "misfit" or beyond > 1 - RULES.credible:
         posterior = posterior.doubting(_perhaps_imitations(case, posterior))
-    says = statement(posterior.all, case.cosine)
-    finding = replace(finding, posterior=posterior, says=says)
+    says = statement_of(posterior.all, case.cosine)
+    finding = replace(finding, posterior=posterior, statement=says)
     chosen = [cause for _, cause in _certain_effects(case, posterior, says)]
     if not chosen:
         return finding
     fit = _fit_of(case, chosen)
     if fit is None:
-        return replace(finding, says=Statement((), ()))
+        return replace(finding, statement=Statement((), ()))
     added = tuple(
         Cause(best.name, one.members, best, one.posterior)
         for one, best in zip(chosen, fit[0], strict=True)
@@ -233,7 +233,7 @@ def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     More is missing than the catalogue explains. An effect of it may imitate what is in none, though
     hardly ever nearly all of that.
     """
-    seeming = _certain_effects(case, posterior, statement(posterior.all, case.cosine))
+    seeming = _certain_effects(case, posterior, statement_of(posterior.all, case.cosine))
     chosen, names = [cause for _, cause in seeming], set[str]()
     after = _disagreement(case, chosen)
     for i, (part, _) in enumerate(seeming):
@@ -275,8 +275,8 @@ def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
     assert finding.posterior is not None
     doubted = [name for cause in finding.chosen for name in cause.members]
     posterior = finding.posterior.doubting(doubted)
-    says = Statement((), statement(posterior.all, case.cosine).open)
-    return Finding("unknown", case.problem.frame, reason, posterior=posterior, says=says)
+    says = Statement((), statement_of(posterior.all, case.cosine).open)
+    return Finding("unknown", case.problem.frame, reason, posterior=posterior, statement=says)
 
 
 # --- a test of the noise fails, though no effect was significant --------------------------------
@@ -291,7 +291,7 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
         verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
     elif name == LEVEL and worst.estimate[0] >= 1 and noise < RULES.more_probable:
-        other = next(n for e in posterior.told for n in e.names if n not in NOISES)
+        other = next(n for e in posterior.reported for n in e.names if n not in NOISES)
         reason = Reason.of("noise or effect", name=name, remark=worst.remark, p=noise, other=other)
         verdict = "unknown"
     return Finding(verdict, problem.frame, reason, posterior=posterior)
@@ -342,4 +342,4 @@ def _of_courses(problem: Problem, posterior: Posterior) -> float:
         places = unknown.by_place(problem.evidence, problem.residuals.z)
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
-    return sum(one.posterior for one in posterior.told if courses.issuperset(one.names))
+    return sum(one.posterior for one in posterior.reported if courses.issuperset(one.names))

@@ -19,7 +19,7 @@ from accelstudy.diagnosis.decision.statement import (
     Part,
     Statement,
     family_of,
-    statement,
+    statement_of,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.evidence.candidates import Cause
@@ -296,7 +296,7 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
 def stands_for(diagnosis: Diagnosis) -> list[str]:
     """Say of each certain family which of its members the model has."""
     d, said = diagnosis, []
-    for part in d.finding.says.certain if d.verdict == "unknown" else ():
+    for part in d.finding.statement.certain if d.verdict == "unknown" else ():
         added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
         if added and len(part.names) > 1:
             others = _names([n for n in part.names if n.name not in added])
@@ -380,7 +380,7 @@ def _effects_and_others(
 def _if_it_is_an_effect(effects: Sequence[Explanation], cosine: Cosine) -> Statement:
     """What is certain given that it is one of these explanations."""
     probability = RULES.credible * sum(one.posterior for one in effects)
-    return statement(effects, cosine, probability)
+    return statement_of(effects, cosine, probability)
 
 
 def _surely_more(set_says: Statement, probability: float) -> bool:
