@@ -1,0 +1,171 @@
+"""Logs and studies in memory: tables in and out, and no file between."""
+
+import json
+import pickle
+import tempfile
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from calling import succeed
+from matplotlib.figure import Figure
+from study_helpers import grid, run_study
+
+import accelstudy as acs
+from accelstudy.basics.given import quantity
+from accelstudy.basics.units import UNITS, Given
+from accelstudy.files.tables import read_table
+from accelstudy.schemes import get_scheme
+
+
+@pytest.fixture(scope="module")
+def calibration():
+    return acs.calibrate(acs.simulate_campaign(seed=0, scheme="fibonacci-24", sigma=0.002))
+
+
+@pytest.fixture
+def table(calibration):
+    """A log with an index of dates, two of which are the same, and a text of its owner."""
+    forces = pd.DataFrame(calibration.fit.campaign.forces, columns=["fx", "fy", "fz"])
+    dates = pd.date_range("2026-01-31 10:00", periods=len(forces), freq="s", name="when")
+    forces.index = dates.where(np.arange(len(dates)) != 7, dates[6])
+    return forces.assign(note=[f"pose {i}" for i in range(len(forces))])
+
+
+def test_a_table_that_is_leveled_keeps_its_index_and_columns(calibration, table):
+    leveled = calibration.apply(table)
+    pd.testing.assert_frame_equal(leveled[table.columns], table)
+    added = leveled.columns.difference(table.columns)
+    assert set(added) == {
+        *(f"{axis}_calibrated_mps2" for axis in table.columns[:3]), "near_pole",
+        *(f"{angle}gon" for angle in ("roll_", "pitch_", "sigma_roll_m", "sigma_pitch_m")),
+    }  # fmt: skip
+    # Its columns go beside others of the same index, those of a former leveling are replaced.
+    pd.testing.assert_frame_equal(table.assign(**leveled[added])[leveled.columns], leveled)
+    pd.testing.assert_frame_equal(calibration.apply(leveled), leveled)
+    by_number = table.set_axis([0, 1, 2, "note"], axis=1)
+    log = acs.read_log(by_number, rate=1, columns={"fx": 0, "fy": 1, "fz": 2})
+    assert repr(log) == "Log('DataFrame', columns, rate_hz)"
+    by_number.iloc[:, :3] = 0.0  # a log is what it was when it was given
+    other = calibration.apply(log)
+    assert list(other.columns[:4]) == [0, 1, 2, "note"]
+    np.testing.assert_array_equal(other["roll_gon"], leveled["roll_gon"])
+
+
+def test_a_table_in_memory_goes_through_no_file(calibration, table, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with pytest.raises(FileNotFoundError):
+        tempfile.mkdtemp()
+    monkeypatch.chdir(tmp_path)
+    log = acs.read_log(table)
+    assert len(calibration.apply(log)) == len(table)
+    assert len(calibration.apply(pickle.loads(pickle.dumps(log)))) == len(table)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_tables_files_and_the_command_are_leveled_alike(calibration, table, tmp_path, ending):
+    table.iloc[3, 0] = np.nan
+    path, out = tmp_path / f"log.{ending}", tmp_path / "out.parquet"
+    written = table.reset_index()
+    written.to_csv(path, index=False) if ending == "csv" else written.to_parquet(path)
+    calibration.save(tmp_path / "calibrated")
+    succeed("apply", tmp_path / "calibrated/calibration.json", path, "--out", out)
+    of_command, of_file, of_table = (
+        pd.read_parquet(out), calibration.apply(path), calibration.apply(table)
+    )  # fmt: skip
+    pd.testing.assert_frame_equal(of_file, of_command)
+    numbers = of_table.columns.difference(["note"])
+    pd.testing.assert_frame_equal(of_table[numbers].reset_index(drop=True), of_file[numbers])
+    (warning,) = of_table.attrs["warnings"]
+    assert "row 4, column fx" in warning
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_a_quantity_is_a_number_in_si_or_a_text_with_its_unit(unit):
+    """Also where the unit begins with a digit, as 1/K does."""
+    given = Given(unit, "", -np.inf)
+    for number in (0.25, 2e-4, -3, np.float64(1e-9)):
+        assert quantity("x", number, given) == number
+    for name, size in UNITS[unit].items():
+        assert quantity("x", f"2 {name}", given) == 2 * size
+
+
+# --- studies -------------------------------------------------------------------------------------
+
+
+def test_a_study_in_memory_has_the_numbers_of_one_of_the_workflow(tmp_path):
+    scheme, given = tmp_path / "mine.yaml", ["fibonacci-9", str(tmp_path / "mine.yaml")]
+    directions = (-get_scheme("fibonacci-12").directions).tolist()
+    scheme.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
+    result = acs.simulate(
+        ["bias", "bias-scale"], given, ["gravity", "robot"], sigma=["3 mm/s^2", 0.001],
+        robot_sigma="3.2 mgon", truth={"b_x": 0.05, "s_y": "200 ppm"}, replicates=40,
+    )  # fmt: skip
+    written = run_study(
+        tmp_path,
+        noise={"sensor": {"sigma_mps2": 0.003}},
+        sensor={
+            "bias": {"value": [0.05, 0, 0], "unit": "m/s^2"},
+            "scale": {"value": [0, 200, 0], "unit": "ppm"},
+        },
+        grids=[
+            grid(["bias", "bias-scale"], given, replicates=40, sensor_sigma_mps2=[0.003, 0.001])
+        ],
+    )
+    for name, table in result.tables.items():
+        pd.testing.assert_frame_equal(table, written[name], check_dtype=False, rtol=1e-9)
+    kept, estimates = written["estimates"], result.estimates["estimate"].to_numpy()
+    assert np.array_equal(estimates[np.isfinite(estimates)], kept["estimate"].to_numpy())
+
+
+def test_every_calibration_of_a_study_is_in_a_dataset():
+    result = acs.simulate(
+        ["bias", "bias-scale-nonorthogonality"], "faces-6", "gravity", sigma=0.002, replicates=50
+    )
+    found = result.estimates
+    assert dict(found.sizes) == {"cell": 2, "replicate": 50, "parameter": 9, "angle": 2}
+    assert found["unit"].to_series()[["b_x", "s_y"]].tolist() == ["m/s^2", "1"]
+    assert found["tilt"].attrs["units"] == "rad"
+    bias, undetermined = found["estimate"]
+    assert np.isfinite(bias).sum("replicate").to_series().to_dict() == {
+        name: 50 if name.startswith("b_") else 0 for name in found["parameter"].to_numpy()
+    }
+    assert (~np.isfinite(undetermined)).all()
+    assert result.tables["cells"]["reason"].str.len().astype(bool).tolist() == [False, True]
+    first = result.parameters.loc[result.cells[0].name]
+    assert np.allclose(bias.std("replicate")[:3], first["sd"], rtol=0.4)
+    rms = np.sqrt((found["tilt"][0] ** 2).mean("replicate"))
+    assert np.allclose(rms, result.tilt.loc[result.cells[0].name, "rms"], rtol=0.4)
+
+
+def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
+    result = acs.simulate("bias", "faces-6", ["gravity", "robot"], sigma="2mm/s^2", replicates=20)
+    assert (result.state, result.name) == ("converged", "2 cells")
+    assert [*result.to_frame()] == [*result.tilt]
+    assert result.plot(Figure().subplots()).has_data()
+    result.save(tmp_path / "simulated")
+    written = {path.stem: read_table(path) for path in (tmp_path / "simulated").glob("*.parquet")}
+    assert set(written) == set(result.tables)
+    pd.testing.assert_frame_equal(written["summary"], result.tables["summary"])
+    said = json.loads((tmp_path / "simulated/simulation.json").read_text(encoding="utf-8"))
+    assert (said["state"], said["verdict"]) == (result.state, result.verdict)
+    result.save(tmp_path / "simulated")  # the same again takes no `force`
+    with pytest.raises(acs.InputError, match="is the folder of a simulation"):
+        acs.calibrate(acs.simulate_campaign()).save(tmp_path / "simulated", force=True)
+    # The tables of a study have the same names, and are no simulation to write over.
+    (tmp_path / "simulated/simulation.json").unlink()
+    with pytest.raises(acs.InputError, match="is not empty"):
+        result.save(tmp_path / "simulated")
+
+
+def test_a_truth_is_in_si_or_with_its_unit():
+    given = {"model": "bias-scale", "scheme": "faces-6", "approach": "robot"}
+    given |= {"sigma": 1e-3, "replicates": 2}
+    numbers, texts = (
+        acs.simulate(**given, truth=truth).parameters
+        for truth in ({"s_x": 2e-4, "b_y": -0.05}, {"s_x": "200 ppm", "b_y": "-50 mm/s^2"})
+    )
+    pd.testing.assert_frame_equal(numbers, texts)
+    assert numbers.loc[["s_x", "b_y"], "truth"].tolist() == [2e-4, -0.05]

@@ -1,0 +1,380 @@
+"""What verbs return: it says, shows, draws and saves itself, and is what the command gives."""
+
+import json
+import sys
+from copy import copy
+from subprocess import run
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from calling import call, refusal, succeed
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+from places import ROOT
+from scipy import stats
+
+import accelstudy as acs
+from accelstudy.drawing.style import STYLE
+from accelstudy.schemes import get_scheme
+
+matplotlib.use("agg")
+BIAS = (0.05, 0.01, 0.03)
+HOW = {"rate": 100, "columns": {"fx": "ax", "fy": "ay", "fz": "az"}}
+WORDS = ("--rate", 100, "--columns", "fx=ax,fy=ay,fz=az")
+VERBS = ("calibrate", "diagnose", "compare", "history", "lot")
+
+
+def logged():
+    """A log of 24 holds with a turn before each, of a sensor with a known bias."""
+    rng = np.random.default_rng(1)
+    forces = -9.80795 * get_scheme("fibonacci-24").directions
+    rows = []
+    for before, after in zip(np.roll(forces, 1, axis=0), forces, strict=True):
+        rows += [np.linspace(before, after, 100), np.tile(after, (400, 1))]
+    readings = np.concatenate(rows) + BIAS
+    readings += 0.005 * rng.standard_normal(readings.shape)
+    return pd.DataFrame(readings, columns=["ax", "ay", "az"])
+
+
+@pytest.fixture(scope="module")
+def guide(tmp_path_factory):
+    """What the names of the guide's lines stand for after they have run."""
+    folder = tmp_path_factory.mktemp("guide")
+    logged().to_csv(folder / "imu.csv", index=False)
+    source = (ROOT / "docs/guides/python_example.py").read_text(encoding="utf-8")
+    names = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        exec(compile(source, "python_example.py", "exec"), names)
+    return {**names, "folder": folder}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four campaigns of sensors of one type, of which three have a quadratic scale."""
+    root = tmp_path_factory.mktemp("verbs")
+    for i, effects in enumerate([(), *[("quadratic_scale: 0.004, -0.004, 0.004",)] * 3]):
+        campaign = acs.simulate_campaign(
+            name=f"sensor-{i}", seed=i, scheme="fibonacci-24", effects=effects, sigma=0.002
+        )
+        acs.write_campaign(campaign, root / f"sensor-{i}")
+    return root
+
+
+@pytest.fixture(scope="module")
+def calibrations(folder):
+    made = [acs.calibrate(folder / f"sensor-{i}") for i in range(4)]
+    for i, one in enumerate(made):
+        one.save(folder / f"calibrated-{i}")
+    return made
+
+
+@pytest.fixture(scope="module")
+def results(folder, calibrations):
+    """A result of each verb, with the command that gives the same."""
+    dates = ("2025-01-01", "2025-07-01", "2026-01-01")
+    files = [folder / f"calibrated-{i}/calibration.json" for i in range(3)]
+    two = [folder / f"sensor-{i}" for i in (1, 2)]
+    return {
+        "calibrate": (calibrations[0], ["calibrate", folder / "sensor-0"]),
+        "diagnose": (
+            acs.diagnose(folder / "sensor-1", replicates=100),
+            ["diagnose", folder / "sensor-1", "--replicates", 100],
+        ),
+        "compare": (acs.compare(*calibrations[:2]), ["compare", *files[:2]]),
+        "history": (
+            acs.history(calibrations[:3], dates=dates, tilt_accuracy="50 mgon"),
+            ["history", *files, *(word for d in dates for word in ("--date", d)),
+             "--tilt-accuracy", "50mgon"],
+        ),
+        "lot": (acs.lot(two), ["lot", *two, "--cores", 2]),  # in one process, and in two
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def every(guide, results):
+    """Each kind of result."""
+    return {
+        **{name: guide[name] for name in ("log", "campaign", "plan", "result")},
+        **{verb: result for verb, (result, _) in results.items()},
+        "design": acs.find_positions(
+            positions=4, model="bias", approach="gravity", starts=1, roll=("-50gon", "50gon")
+        ),
+        "advise": acs.advise(guide["campaign"], tilt_accuracy="1gon", model="bias"),
+    }
+
+
+@pytest.mark.parametrize("name", ["log", "campaign", "plan", "result", *VERBS, "design", "advise"])
+def test_a_result_says_shows_and_draws_itself_and_is_equal_to_itself_alone(every, name):
+    one, other = every[name], copy(every[name])
+    assert len(repr(one)) <= 100
+    assert "\n" not in repr(one)
+    assert "<table" in one._repr_html_()
+    assert (one == one, one == other, len({one, other})) == (True, False, 2)
+    if name in ("log", "campaign"):
+        return
+    assert one.state in repr(one)
+    assert one.verdict in one.summary()
+    assert len(one.to_frame()) > 0
+    for row in one.to_frame().index[:3] if name in VERBS else ():
+        assert str(row) in one.summary()
+    given = Figure().subplots()
+    assert one.plot(given) is given
+    assert given.has_data()
+    with matplotlib.rc_context({"interactive": True, "backend": "agg"}):
+        ax = one.plot()
+        assert matplotlib.is_interactive()
+    sizes = {label.get_fontsize() for label in ax.get_xticklabels()}
+    assert sizes == {STYLE["xtick.labelsize"]}  # the style of all figures
+    assert not ax.spines["top"].get_visible()
+    pyplot.close(ax.figure)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
+    result, command = results[verb]
+    result.save(tmp_path / "function")
+    answer = succeed(*command, "--out", tmp_path / "command")
+    assert result.verdict.split(". ")[0] in answer.output
+    names = [
+        sorted(p.relative_to(tmp_path / way).as_posix() for p in (tmp_path / way).rglob("*.*"))
+        for way in ("function", "command")
+    ]
+    assert names[0] == names[1]
+    for name in (name for name in names[0] if name.endswith(".json")):
+        ways = (tmp_path / way / name for way in ("function", "command"))
+        function, written = (json.loads(path.read_text()) for path in ways)
+        assert function == written, name
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "report.html").write_text("mine")
+    with pytest.raises(acs.InputError, match="force"):
+        result.save(other)
+
+
+def test_results_of_a_lot_are_apart_from_the_campaigns_of_its_list(folder, tmp_path):
+    listed = [{"campaign": str(folder / f"sensor-{i}")} for i in range(3)]
+    batch = tmp_path / "batch.yaml"
+    batch.write_text(json.dumps({"batch": "b", "campaigns": listed}), encoding="utf-8")
+    for given in (batch, f"{folder}/sensor-*"):
+        line = refusal("lot", given, "--out", folder / "sensor-1/lot")
+        assert f"lies in the input {folder / 'sensor-1'}" in line
+    assert not (folder / "sensor-1/lot").exists()
+
+
+def test_campaigns_and_advice_are_those_of_the_commands(tmp_path):
+    words = ("--scheme", "faces-6", "--model", "bias", "--sigma", "1mm/s^2", "--interval", "none")
+    succeed("simulate-campaign", *words, "--out", tmp_path / "six", "--truth", tmp_path / "truth")
+    six = acs.simulate_campaign(
+        name="six", scheme="faces-6", model="bias", sigma=1e-3, interval=None
+    )
+    np.testing.assert_allclose(acs.read_campaign(tmp_path / "six").forces, six.forces, rtol=1e-13)
+    assert yaml.safe_load((tmp_path / "truth").read_text(encoding="utf-8")) == six.truth
+    acs.write_campaign(six, tmp_path / "copy")
+    with pytest.raises(acs.InputError, match="is not empty"):
+        acs.write_campaign(six, tmp_path / "copy")
+    assert acs.read_campaign(tmp_path / "copy").forces.tolist() == six.forces.tolist()
+
+    said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
+    advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")
+    assert (said.strip(), advice.state) == (advice.summary().strip(), "enough")
+    assert advice.to_frame().loc["roll", "wanted_rad"] == pytest.approx(np.pi / 200)
+    advice.save(tmp_path / "advice")
+    kept = json.loads((tmp_path / "advice/advice.json").read_text(encoding="utf-8"))
+    assert (kept["state"], kept["positions"]) == ("enough", [*range(1, 7)])
+
+
+def test_positions_and_a_data_sheet_are_those_of_the_commands(every, guide, tmp_path):
+    words = ("--positions", 4, "--model", "bias", "--approach", "gravity", "--starts", 1)
+    succeed("design", *words, "--roll", "-50gon", "50gon", "--out", tmp_path / "one.yaml")
+    (tmp_path / "function").mkdir()
+    every["design"].save(tmp_path / "function/one.yaml")
+    acs.write_campaign(guide["campaign"], tmp_path / "imu")
+    succeed("data-sheet", tmp_path / "imu", "--out", tmp_path / "sheet.yaml")
+    acs.data_sheet(tmp_path / "imu").save(tmp_path / "function/sheet.yaml")
+    for name in ("one.yaml", "sheet.yaml"):
+        assert len({path.read_bytes() for path in tmp_path.rglob(name)}) == 1
+
+
+def test_a_log_gives_what_the_commands_make_of_it(guide, tmp_path):
+    log, calibration = guide["folder"] / "imu.csv", guide["calibration"]
+    words = (*WORDS, "--gravity", 9.80795, "--window", "500ms", "--no-figure")
+    succeed("import", log, *words, "--out", tmp_path / "found")
+    kept = acs.read_campaign(tmp_path / "found")
+    holds = acs.find_holds(log, gravity="9.80795 m/s^2", window=0.5, **HOW)
+    assert (kept.name, kept.n_positions) == (holds.name, 24)
+    np.testing.assert_allclose(kept.forces, holds.forces, rtol=1e-13)
+    for range_ in (78.5, "78.5 m/s^2"):
+        assert acs.find_holds(log, range=range_, **HOW).full_range == 78.5
+
+    file = guide["folder"] / "calibrated/calibration.json"
+    succeed("apply", file, log, *WORDS, "--sigma", 0.01, "--out", tmp_path / "leveled.parquet")
+    leveled = pd.read_parquet(tmp_path / "leveled.parquet")
+    pd.testing.assert_frame_equal(acs.apply(calibration, log, sigma=0.01, **HOW), leveled)
+    again = calibration.apply(acs.read_log(log, **HOW), sigma="10 mm/s^2")
+    pd.testing.assert_frame_equal(again, leveled)
+    assert (leveled["sigma_roll_mgon"] > 1.5 * guide["leveled"]["sigma_roll_mgon"]).all()
+
+
+# --- a calibration -------------------------------------------------------------------------------
+
+
+def test_the_calibration_of_the_guide_finds_the_bias(guide):
+    found = guide["calibration"].parameters.loc[["b_x", "b_y", "b_z"]]
+    assert (abs(found["value"] - np.array(BIAS)) < 4 * found["sigma"]).all()
+    assert len(guide["leveled"]) == len(logged())
+
+
+def test_the_unit_of_angles_is_that_of_the_environment(guide, monkeypatch):
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
+    assert {"roll_deg", "sigma_pitch_mdeg"} <= {*guide["calibration"].apply(guide["log"])}
+    monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
+    with pytest.raises(acs.InputError, match="'grad' is no unit of angles; choose gon or deg"):
+        guide["calibration"].apply(guide["log"])
+
+
+def test_intervals_and_covariance_are_those_of_the_estimates(calibrations):
+    one = calibrations[0]
+    sigma = one.parameters["sigma"]
+    np.testing.assert_allclose(np.diag(one.covariance), sigma**2)
+    np.testing.assert_allclose(one.covariance, one.correlation * np.outer(sigma, sigma))
+    # Without a stated sigma it is estimated from the residuals, with their redundancy.
+    unknown = acs.simulate_campaign(seed=1, scheme="fibonacci-24", sigma=0.002, sigma_known=False)
+    other = acs.calibrate(unknown, approach="gravity")
+    for made, level, wanted in ((one, 0.99, stats.norm), (other, 0.9, stats.t(24 - 9))):
+        intervals = made.intervals(level)
+        assert [*intervals] == ["low", "high", "unit"]
+        half = (intervals["high"] - intervals["low"]) / 2
+        np.testing.assert_allclose(half / made.parameters["sigma"], wanted.ppf((1 + level) / 2))
+
+
+def test_a_calibration_that_is_read_is_as_before(calibrations, folder):
+    (one, other), path = calibrations[:2], folder / "calibrated-0"
+    read, columns = acs.read_calibration(path), ["fx", "fy", "fz"]
+    forces = pd.DataFrame(one.fit.campaign.forces, columns=columns)
+    log = acs.read_log(forces, rate=100, columns={axis: axis for axis in columns})
+    pd.testing.assert_frame_equal(read.apply(log), one.apply(log))
+    pd.testing.assert_frame_equal(read.covariance, one.covariance)
+    assert (read.state, read.verdict) == (one.state, one.verdict)
+    assert acs.compare(read, path / "calibration.json").state == "unchanged"
+    assert acs.compare(read, other).content == acs.compare(one, other).content
+    printed = call("export", path / "calibration.json", "--form", "matrix").output
+    assert acs.export(read, form="matrix") == printed
+    for ask in (lambda: read.residuals, read.tilt_error, read.plot):
+        with pytest.raises(acs.InputError, match="that was read from a file has none"):
+            ask()
+
+
+def test_files_of_the_first_versions_still_read():
+    """A campaign and its calibration.json as 0.1.0 and 0.2.0 wrote them, byte for byte alike."""
+    folder = ROOT / "tests/campaign/version_0_2"
+    new = acs.calibrate(folder, model="bias-scale", approach="gravity")
+    old = acs.read_calibration(folder)
+    assert {"date", "axes", "sigmas_95"} <= {*new.content} - {*old.content}
+    for table in ("parameters", "covariance", "correlation"):
+        pd.testing.assert_frame_equal(getattr(old, table), getattr(new, table), rtol=1e-9)
+    assert (old.state, acs.compare(old, new).state) == (new.state, "unchanged")
+    log = pd.DataFrame(new.fit.campaign.forces, columns=["fx", "fy", "fz"])
+    how = {"rate": 1, "columns": {axis: axis for axis in log}}
+    pd.testing.assert_frame_equal(acs.apply(old, log, **how), acs.apply(new, log, **how))
+    assert acs.export(old, form="c").startswith("/*")
+
+
+def test_the_tilt_error_is_that_of_the_report(calibrations):
+    one = calibrations[0]
+    stated = one.content["quality"]["tilt_rms_mgon"]
+    found = one.tilt_error() / (np.pi / 200 * 1e-3)
+    assert found.tolist() == pytest.approx([stated["roll"], stated["pitch"]])
+    in_degrees, in_rad = one.tilt_error("45 deg"), one.tilt_error(np.pi / 4)
+    assert in_degrees.tolist() == pytest.approx(in_rad.tolist())
+
+
+def test_sigmas_are_checked_as_by_the_command(folder):
+    table = acs.check_sigmas(folder / "sensor-0", replicates=200)
+    assert table["ratio"].between(0.8, 1.25).all()
+
+
+def test_what_reading_refuses_is_diagnosed(tmp_path):
+    given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
+    acs.write_campaign(given, tmp_path, plausible=False)
+    with pytest.raises(acs.InputError, match="look like g"):
+        acs.read_campaign(tmp_path)
+    assert acs.diagnose(acs.read_campaign(tmp_path, plausible=False)).state == "gross_error"
+
+
+# --- the front door ------------------------------------------------------------------------------
+
+
+def test_catalogues_are_tables():
+    for kind in ("effects", "noise effects", "gross errors", "models", "schemes", "approaches",
+                 "data sheets"):  # fmt: skip
+        table = acs.catalogue(kind)
+        assert len(table) > 0
+        assert table.index.is_unique
+    assert "warm_up" in acs.catalogue("effects").index
+
+
+def test_the_front_door_is_light_and_complete():
+    """All names are there, for type checkers, too, and none is imported before it is asked for."""
+    line = "import sys, accelstudy as a; print(len(a.__all__), 'numpy' in sys.modules)"
+    found = run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout
+    assert found.split() == [str(len(acs.__all__)), "False"]
+    source = (ROOT / "accelstudy/__init__.py").read_text(encoding="utf-8")
+    for name in acs.__all__:
+        assert getattr(acs, name).__doc__
+        assert f" import {name} as {name}\n" in source
+
+
+WRONG = {
+    "acs.read_log(3)": "log: expected a path or a DataFrame, not 3",
+    "acs.read_log('none.csv')": "none.csv: no such file",
+    r"acs.read_log('\0')": "no name of a file",
+    r"acs.read_log('a\ud800')": "no name of a file",
+    "acs.read_log('x' * 5000)": "too long for the name of a file",
+    "acs.read_log(table, rate='fast')": "rate: expected a number, as 2Hz",
+    "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
+    "acs.find_holds({'fx': 1})": "log: expected a path",
+    "acs.find_holds(acs.read_log(table, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
+    "acs.read_campaign(None)": "folder: expected a path, not None",
+    "acs.read_log(table.assign(note=[1, 'x'] * 6000))": "log: the DataFrame cannot be a log",
+    "acs.find_holds(table / 9.8)": "DataFrame: which column is time?",
+    "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g, not m/s^2; give `unit` g",
+    "acs.apply(one, acs.read_log(table, **HOW), sigma='loud')": "sigma: expected a number, as 2mm",
+    "acs.simulate_campaign(effects=3)": "effects: expected the name of an effect",
+    "acs.calibrate(3)": "campaign: expected a Campaign",
+    "acs.calibrate(folder / 'none')": "none",
+    "acs.diagnose({})": "campaign: expected a Campaign",
+    "acs.diagnose(folder / 'sensor-0', replicates=3)": "replicates: must be from 100",
+    "acs.read_calibration(folder)": "no such file",
+    "acs.compare(one, 3)": "second: expected what `calibrate` or",
+    "acs.compare(one, one, tilt_range='5 s')": "tilt_range:",
+    "acs.history(calibrations[:2])": "date",
+    "acs.history(calibrations[:3])": "date: missing",
+    "acs.history(calibrations[:3], dates=['2025-01-01'])": "1 date for 3 calibrations",
+    "acs.lot([folder / 'sensor-0'])": "two sensors or more",
+    "acs.export(one, form='x')": "unknown form 'x'",
+    "one.intervals(2.0)": "level: expected a probability",
+    "one.save(3)": "folder: expected a path",
+    "acs.catalogue('sensors')": "unknown catalogue 'sensors'",
+    "acs.plan(tilt_accuracy=1e-4)": "plan: give the sensor",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
+    "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected the name of a scheme",
+    "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",
+    "acs.simulate('bias', 'mclaren-24', 'robot', sigma=None)": "sigma: expected a number",
+    "acs.simulate('bias', [], 'robot', sigma=1e-3)": "scheme: none is given",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'s_x': 1})": "parameter of the truth",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'b_x': ''})": "truth: b_x: expected",
+    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, replicates=1)": "replicates: must be from 2",
+}
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_wrong_input_gets_one_line(line, folder, calibrations):
+    names = {"one": calibrations[0], "table": logged(), **globals(), **locals()}
+    with pytest.raises(acs.InputError) as error:
+        eval(line, names)
+    assert WRONG[line] in str(error.value)
+    assert "\n" not in str(error.value)
