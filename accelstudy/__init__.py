@@ -10,7 +10,6 @@ if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it i
     from accelstudy.api.advice import SessionAdvice as SessionAdvice
     from accelstudy.api.calibrations import Calibration as Calibration
     from accelstudy.api.catalogues import catalogue as catalogue
-    from accelstudy.api.designs import Design as Design
     from accelstudy.api.diagnoses import Diagnosis as Diagnosis
     from accelstudy.api.logs import Log as Log
     from accelstudy.api.lots import Lot as Lot
@@ -20,6 +19,7 @@ if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it i
     from accelstudy.campaign.session import Campaign as Campaign
     from accelstudy.epochs.output import Comparison as Comparison
     from accelstudy.epochs.output import History as History
+    from accelstudy.proposal.design import Design as Design
     from accelstudy.study.run import run_study as run_study
     from accelstudy.verbs.calibrations import apply as apply
     from accelstudy.verbs.calibrations import calibrate as calibrate
@@ -47,7 +47,6 @@ _NAMES = {
     "api.advice": "SessionAdvice",
     "api.calibrations": "Calibration",
     "api.catalogues": "catalogue",
-    "api.designs": "Design",
     "api.diagnoses": "Diagnosis",
     "api.logs": "Log",
     "api.lots": "Lot",
@@ -56,6 +55,7 @@ _NAMES = {
     "basics.errors": "InputError",
     "campaign.session": "Campaign",
     "epochs.output": "Comparison History",
+    "proposal.design": "Design",
     "study.run": "run_study",
     "verbs.calibrations": "apply calibrate check_sigmas diagnose export read_calibration",
     "verbs.campaigns": "find_holds read_campaign read_log simulate_campaign write_campaign",

@@ -276,7 +276,7 @@ ADVISE = Command(
 
 def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
     """Yield the file of a design."""
-    from accelstudy.api.designs import new_scheme
+    from accelstudy.proposal.design import new_scheme
 
     return new_scheme(*place, **how)
 

@@ -18,7 +18,8 @@ from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.reasons import limits
 from accelstudy.planning.wording import part_lines, positions_command, table_lines
-from accelstudy.proposal.proposal import field_order, write_design
+from accelstudy.proposal.design import write_design
+from accelstudy.proposal.order import field_order
 
 STUDY_HEAD = """\
 # The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their

@@ -193,7 +193,7 @@ def find_positions(
         accelstudy simulate-campaign --scheme my-scheme.yaml --out designed-campaign
     """
     given = {**locals()}
-    from accelstudy.api.designs import Design
+    from accelstudy.proposal.design import Design
 
     return Design.of(**given)
 

@@ -230,10 +230,10 @@ def test_the_calibration_of_the_guide_finds_the_bias(guide):
 
 def test_the_unit_of_angles_is_that_of_the_environment(guide, monkeypatch):
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "deg")
-    assert {"roll_deg", "sigma_pitch_mdeg"} <= {*guide["calibration"].apply(guide["log"])}
+    assert {"roll_deg", "sigma_pitch_mdeg"} <= {*guide["calibration"].apply(logged())}
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
     with pytest.raises(acs.InputError, match="'grad' is no unit of angles; choose gon or deg"):
-        guide["calibration"].apply(guide["log"])
+        guide["calibration"].apply(logged())
 
 
 def test_intervals_and_covariance_are_those_of_the_estimates(calibrations):

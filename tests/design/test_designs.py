@@ -14,7 +14,7 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.information import position_rows
 from accelstudy.design.task import Task
 from accelstudy.leveling.error import cap_forces, tilt_error
-from accelstudy.proposal.proposal import _drift_shown, field_order
+from accelstudy.proposal.order import _drift_shown, field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
 from accelstudy.sensors.models import get_model

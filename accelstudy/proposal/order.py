@@ -1,0 +1,101 @@
+"""The order in which to take positions in the field."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from accelstudy.design.criteria import RIDGE
+from accelstudy.design.information import position_rows
+from accelstudy.design.task import Task
+from accelstudy.positions.choice import first_best
+from accelstudy.sensors.models import compose
+from accelstudy.simulation.hold_plan import HoldPlan
+
+Array = NDArray[np.float64]
+Order = NDArray[np.int_]
+
+TOURS = 12
+MAX_TOUR_RATIO = 1.15
+"""Length, relative to the shortest tour found, up to which a tour that separates drifts better is
+taken."""
+
+
+def field_order(task: Task, directions: Array, groups: Order | None = None) -> Order:
+    """Order positions (n, 3) for the field.
+
+    The order is a round trip of small turns. The last position is near the first, so a steady
+    change with time is not mistaken for an effect of the attitude. Several round trips are tried,
+    each with several first positions. The one is taken in which a linear drift of the biases can be
+    told best from the parameters of the model.
+
+    Parameters
+    ----------
+    task : Task
+    directions : (n, 3) array of unit vectors
+    groups : (n,) array, optional
+        Positions of one group (mounting) stay together.
+    """
+    groups = np.zeros(len(directions), dtype=int) if groups is None else groups
+    angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
+    members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
+    rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
+    trips: list[tuple[float, Order]] = []
+    for _ in range(TOURS):
+        parts = [_round_trip(angles, rng.permutation(group)) for group in members]
+        trips.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
+    longest = MAX_TOUR_RATIO * min(length for length, _ in trips) + 1e-9
+    turns = range(len(directions) if len(members) == 1 else 1)
+    near = [[np.roll(tour, turn) for turn in turns] for length, tour in trips if length <= longest]
+    shown = np.concatenate([_drift_shown(task, directions[tours]) for tours in near])
+    return np.concatenate(near)[first_best(-shown)]
+
+
+def _length(angles: Array, tour: Order) -> float:
+    return float(angles[tour, np.roll(tour, -1)].sum())
+
+
+def _round_trip(angles: Array, tour: Order) -> Order:
+    """Shorten a round trip by reversing parts of it until no reversal shortens it (2-opt)."""
+    n, shorter = len(tour), True
+    while shorter and n > 3:
+        shorter = False
+        for i in range(n - 1):
+            ahead = np.roll(tour, -1)
+            j = np.arange(i + 1, n)
+            gain = (
+                angles[tour[i], ahead[i]]
+                + angles[tour[j], ahead[j]]
+                - angles[tour[i], tour[j]]
+                - angles[ahead[i], ahead[j]]
+            )
+            best = first_best(-gain)
+            if gain[best] > 1e-9:
+                tour = tour.copy()
+                tour[i + 1 : j[best] + 1] = tour[i + 1 : j[best] + 1][::-1]
+                shorter = True
+    return tour
+
+
+def _drift_shown(task: Task, directions: Array) -> Array:
+    """Share of a drift of the biases that the parameters cannot imitate; the smallest axis.
+
+    directions : (k, n, 3) array, of k orders. Returns (k,).
+    """
+    effects = [effect.spec for effect in task.model.effects]
+    model = compose("drifting", (*effects, "bias_drift"))
+    (k, n), u = directions.shape[:2], task.model.n_parameters
+    hold = HoldPlan().hold(n).take(np.tile(np.arange(n), k))
+    hold = replace(hold, time=np.tile(np.linspace(-1.0, 1.0, n), k))
+    fixed_gravity = replace(task.noise, sigma_gravity=0.0)
+    flat = directions.reshape(-1, 3)
+    rows = position_rows(model, task.approach, fixed_gravity, flat, task.gravity, hold)
+    rows = rows.reshape(k, -1, rows.shape[-1])
+    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    normal = rows.swapaxes(1, 2) @ rows
+    of_drift, cross = normal[:, u:, u:], normal[:, :u, u:]
+    inside = np.linalg.solve(normal[:, :u, :u] + RIDGE * np.eye(u), cross)
+    left = of_drift - cross.swapaxes(1, 2) @ inside
+    return np.asarray(np.diagonal(left, axis1=1, axis2=2).min(axis=1))
