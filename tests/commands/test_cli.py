@@ -6,6 +6,7 @@ import sys
 from itertools import pairwise
 
 import click
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -82,59 +83,70 @@ def test_help_imports_nothing_that_takes_long():
     assert run.stdout.splitlines()[-1] == "[]"
 
 
-# --- schemes -------------------------------------------------------------------------------------
+# --- what there is to choose from ----------------------------------------------------------------
 
 
 def rows_of(text, names):
-    return {
-        line.split()[0]: line.split() for line in text.splitlines() if line.strip() and
-        line.split()[0] in names
-    }  # fmt: skip
+    """Words of the lines that begin with one of the names."""
+    return {row[0]: row for row in map(str.split, text.splitlines()) if row and row[0] in names}
 
 
-def test_schemes_with_every_model_and_approach():
-    wanted = ("faces-6", "mclaren-24", "random-20-7")
-    for model in MODELS:
-        u = get_model(model).n_parameters
-        for approach, conditions in (("gravity", 1), ("robot", 3)):
-            text = output("schemes", "--model", model, "--approach", approach, *wanted)
-            assert f"model {model}, approach {approach}" in text
-            rows = rows_of(text, wanted)
-            assert [*rows] == [*wanted]
-            for name, row in rows.items():
-                n = get_scheme(name).n_positions
-                assert int(row[1]) == n
-                assert row[3].endswith(f"/{u}")
-                assert int(row[5]) == conditions * n - u
+@pytest.mark.parametrize(("model", "approach"), [("bias-scale", "gravity"), (NINE, "robot")])
+def test_schemes_with_a_model_and_an_approach(model, approach):
+    wanted, per_position = ("faces-6", "mclaren-24", "random-20-7"), 1 + 2 * (approach == "robot")
+    text = output("schemes", "--model", model, "--approach", approach, *wanted)
+    assert f"model {model}, approach {approach}" in text
+    rows, u = rows_of(text, wanted), get_model(model).n_parameters
+    assert [*rows] == [*wanted]
+    for name, row in rows.items():
+        n = get_scheme(name).n_positions
+        assert (int(row[1]), int(row[5])) == (n, per_position * n - u)
+        assert row[3].endswith(f"/{u}")
 
 
 def test_all_schemes_by_default():
-    text = output("schemes")
-    assert [*rows_of(text, scheme_names())] == [*scheme_names()]
-    for family in scheme_families():
-        assert family in text
-    faces = rows_of(text, scheme_names())["faces-6"]
-    assert faces[3:5] == ["6/9", "-"]
-    assert faces[-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
-    assert rows_of(text, scheme_names())["mclaren-24"][6] == "0.0667"  # m = 1/15
-    table = output("schemes", "--quiet").strip("\n")
+    text, table = output("schemes"), output("schemes", "--quiet").strip("\n")
+    rows = rows_of(text, scheme_names())
+    assert [*rows] == [*scheme_names()]
+    assert all(family in text for family in scheme_families())
+    assert rows["faces-6"][3:5] == ["6/9", "-"]
+    assert rows["faces-6"][-3:] == ["alpha_yz,", "alpha_zy,", "alpha_zx"]
+    assert rows["mclaren-24"][6] == "0.0667"  # m = 1/15
     assert table in text
     assert len(table.splitlines()) == 1 + len(scheme_names())
 
 
 def test_directions_of_a_scheme():
-    text = output("scheme", "faces-6")
-    head, *table = text.splitlines()
+    head, names, *lines = output("scheme", "faces-6").splitlines()
     assert head.startswith("# ")
     assert get_scheme("faces-6").source in head
-    assert table[0] == "position,x,y,z,roll_gon,pitch_gon"
-    numbers = pd.DataFrame([line.split(",") for line in table[1:]]).astype(float)
-    assert numbers.shape == (6, 6)
-    assert (numbers.iloc[:, 1:4] ** 2).sum(axis=1).tolist() == pytest.approx(6 * [1])
-    level = numbers[numbers[3] == 1].iloc[0]  # z down
-    assert level[[4, 5]].tolist() == pytest.approx([0, 0])
-    nose = numbers[numbers[1] == 1].iloc[0]  # x down
-    assert nose[5] == pytest.approx(-100)
+    assert names == "position,x,y,z,roll_gon,pitch_gon"
+    rows = [[float(cell) for cell in line.split(",")[1:]] for line in lines]
+    level, nose = (next(row[3:] for row in rows if row[axis] == 1) for axis in (2, 0))
+    assert (len(rows), level, nose[1]) == (6, [0, 0], -100)  # z down, and x down
+    assert all(np.linalg.norm(row[:3]) == pytest.approx(1) for row in rows)
+
+
+def test_models():
+    lines = output("models").splitlines()
+    for model in map(get_model, MODELS):
+        assert f"{model.name} ({model.n_parameters}): {', '.join(model.parameter_names)}" in lines
+    for preset in PRESETS:
+        line = f" *{re.escape(preset.source)} +{preset.model} in {preset.scheme}"
+        assert any(re.fullmatch(line, each) for each in lines)
+
+
+def test_effects():
+    """Each under its heading, with its equation; the golden set has the other lines."""
+    found = output("effects")
+    headings = ("Effects of the sensor", "Effects of the rig", "Noise effects", "Gross errors")
+    places = [found.index(f"{heading}\n") for heading in headings] + [len(found)]
+    of_sensor, of_rig, noise, gross = (
+        dict(re.findall(r"^(\w+): (.*)", found[a:b], re.M)) for a, b in pairwise(places)
+    )
+    assert of_sensor | of_rig == {name: get_effect(name).equation for name in effect_names()}
+    assert (noise.keys(), gross.keys()) == ({*noise_effect_names()}, {*gross_error_names()})
+    assert "base_tilt" in of_rig
 
 
 # --- the unit of angles --------------------------------------------------------------------------
@@ -169,34 +181,6 @@ def test_an_unknown_angle_unit(monkeypatch):
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
     result = call("models")
     assert (result.exit_code, result.stdout, result.stderr) == (2, "", line)
-
-
-# --- models and effects --------------------------------------------------------------------------
-
-
-def test_models():
-    text = output("models")
-    for name in MODELS:
-        model = get_model(name)
-        line = f"{name} ({model.n_parameters}): {', '.join(model.parameter_names)}"
-        assert line in text.splitlines()
-    for preset in PRESETS:
-        assert re.search(f"{re.escape(preset.source)} +{preset.model} in {preset.scheme}$", text, 8)
-    assert "s_x, s_y, s_z" in text
-
-
-def test_effects():
-    """Each under its heading, with its equation; the golden set has the other lines."""
-    found = output("effects")
-    headings = ("Effects of the sensor", "Effects of the rig", "Noise effects", "Gross errors")
-    places = [found.index(f"{heading}\n") for heading in headings] + [len(found)]
-    of_sensor, of_rig, noise, gross = (
-        re.findall(r"^(\w+): (.*)", found[a:b], re.M) for a, b in pairwise(places)
-    )
-    assert {*of_sensor, *of_rig} == {(n, get_effect(n).equation) for n in effect_names()}
-    assert {name for name, _ in noise} == set(noise_effect_names())
-    assert {name for name, _ in gross} == set(gross_error_names())
-    assert "base_tilt" in dict(of_rig)
 
 
 # --- a study -------------------------------------------------------------------------------------
