@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import glob
+import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
@@ -15,7 +15,7 @@ import pandas as pd
 from accelstudy.api.logs import Log, keys_of, log_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.given import each, path_of
-from accelstudy.basics.names import natural
+from accelstudy.basics.names import matches, natural
 from accelstudy.basics.units import UNITS
 from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
@@ -104,14 +104,13 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     for path in (path_of("log", one, "a path or a DataFrame") for one in given):
         if path.is_dir() and not (path / BAG_OF_FOLDER).is_file():
             inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
-        elif glob.has_magic(str(path)) and not path.exists():
-            inside = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]
+            inside.sort(key=natural)
         else:
-            files.append(path)
-            continue
+            found = matches(path, os.path.isfile)
+            inside = [path] if found is None else [*map(Path, found)]
         if not inside:
             raise InputError(f"{path}: no file there")
-        files += sorted(inside, key=natural)
+        files += inside
     if files == sorted(files):
         files.sort(key=natural)
     twice = [path for path in files if files.count(path) > 1]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from errno import ENAMETOOLONG
+from glob import glob, has_magic
 from pathlib import Path
 
 from accelstudy.basics.errors import InputError, shown
@@ -56,3 +58,10 @@ def natural(path: str | Path) -> list[tuple[int, str]]:
     """Key by which numbers in names count as such: sensor-2 comes before sensor-10."""
     parts = re.split(r"([0-9]+)", str(path))
     return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
+
+
+def matches(path: str | Path, wanted: Callable[[str], bool]) -> list[str] | None:
+    """Paths that match a pattern and are wanted, pos2 before pos10; None of a path that is none."""
+    if os.path.exists(path) or not has_magic(str(path)):
+        return None
+    return sorted(filter(wanted, glob(str(path))), key=natural)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -20,7 +19,7 @@ from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.given import path_of
-from accelstudy.basics.names import MAX_NAME_BYTES
+from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.units import (
     GON,
@@ -274,7 +273,7 @@ class Design(Result):
     def write(self, file: Path, place: Path) -> None:
         """Write a file that becomes `place`, by which the scheme is named."""
         extra = {"turn_about": self.axes} if self.axes else None
-        name = re.sub(r"[^\w.-]+", "-", place.stem).lstrip(".-")[: MAX_NAME_BYTES // 2] or "scheme"
+        name = path_name(place.stem, "scheme")
         kind = self.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {self.request.seed}"

@@ -133,24 +133,14 @@ def kind_of(said: Any) -> Any:
     return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
 
 
-def _text(name: str, value: Any) -> str:
-    of_type(name, value, str, expected="a text")
-    return str(value)
+def typed(expected: str, *types: type, made: Callable[[Any], Any] | None = None, **of: str) -> Kind:
+    """Return the kind of values of some types, of which `made` makes what the verb works with."""
 
+    def read(name: str, value: Any) -> Any:
+        of_type(name, value, *types, expected=expected)
+        return value if made is None else made(value)
 
-def _number(name: str, value: Any) -> str:
-    of_type(name, value, str, int, float, expected="a number, or a text with its unit")
-    return str(value)
-
-
-def _flag(name: str, value: Any) -> bool:
-    of_type(name, value, bool, expected="True or False")
-    return bool(value)
-
-
-def _column(name: str, value: Any) -> str | int:
-    of_type(name, value, str, int, expected="the name of a column or its number")
-    return value if isinstance(value, str) else int(value)
+    return Kind(read, **of)
 
 
 def _share(name: str, value: Any) -> float | None:
@@ -212,7 +202,12 @@ Quantity = float | str
 RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
 """Keywords of earlier versions, and what takes their place."""
 
-TEXT, FLAG, NUMBER = Kind(_text), Kind(_flag, "bool"), Kind(_number, "float or str")
+TEXT = typed("a text", str)
+FLAG = typed("True or False", bool, doc_type="bool")
+NUMBER = typed(
+    "a number, or a text with its unit", str, int, float, made=str, doc_type="float or str"
+)
+COLUMN = typed("the name of a column or its number", str, int, doc_type="str or int", name="column")
 PATH = FilePath(path_type=Path)
 SHARE_OR_RMS = Kind(_share, "float or str", "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
@@ -260,7 +255,7 @@ Columns = Annotated[
 ]
 Time = Annotated[
     str | int | None,
-    Kind(_column, "str or int", "column"),
+    COLUMN,
     "Column of the time, by name or number.",
 ]
 TimeUnit = Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from datetime import datetime
 from os import PathLike
@@ -173,21 +174,17 @@ def lot(
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
     """Folders of a pattern, or of the list of a batch; anything else stands for itself."""
-    from glob import glob, has_magic
-
-    from accelstudy.basics.names import natural
+    from accelstudy.basics.names import matches
 
     if not isinstance(given, str | PathLike):
         return [given]
     path = Path(given)
     if path.suffix in (".yaml", ".yml") and path.is_file():
         return [*_listed(path)]
-    if path.exists() or not has_magic(str(path)):
-        return [path]
-    found = sorted((path for path in map(Path, glob(str(path))) if path.is_dir()), key=natural)
-    if not found:
+    found = matches(path, os.path.isdir)
+    if found == []:
         raise InputError(f"{given}: no folder has such a name")
-    return [*found]
+    return [path] if found is None else [*map(Path, found)]
 
 
 def _listed(path: Path) -> list[Path]:

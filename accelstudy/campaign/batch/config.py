@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.names import natural, path_name
+from accelstudy.basics.names import matches, path_name
 from accelstudy.campaign.header import HEADER, TABLES
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
@@ -70,10 +69,10 @@ class Entry(Block):
         return self.public or os.path.normpath(self.campaign or self.log or "")
 
     @property
-    def is_pattern(self) -> bool:
-        """Whether it stands for what matches it."""
-        source = self.source
-        return self.public is None and glob.has_magic(source) and not os.path.exists(source)
+    def matching(self) -> list[str] | None:
+        """Paths that match a pattern; None if it names one thing."""
+        wanted = os.path.isdir if self.kind == "campaign" else os.path.isfile
+        return matches(self.source, wanted) if self.public is None else None
 
     def as_params(self) -> dict[str, Any]:
         """What was given, as parameters of a rule; the format of a log says the rest."""
@@ -144,17 +143,15 @@ class BatchConfig(Configuration):
             If nothing matches a pattern.
         """
         tasks = []
-        named = {entry.source for entry in self.campaigns if not entry.is_pattern}
-        for index, entry in enumerate(self.campaigns):
-            sources = [entry.source]
-            if entry.is_pattern:
-                wanted = os.path.isdir if entry.kind == "campaign" else os.path.isfile
-                matching = sorted(filter(wanted, glob.glob(sources[0])), key=natural)
-                if not matching:
-                    what = "folder" if entry.kind == "campaign" else "file"
-                    raise InputError(f"campaigns.{index}: no {what} matches {sources[0]}")
-                sources = [path for path in matching if path not in named]
-            for source in sources:
+        found = [entry.matching for entry in self.campaigns]
+        named = {e.source for e, paths in zip(self.campaigns, found, strict=True) if paths is None}
+        for index, (entry, paths) in enumerate(zip(self.campaigns, found, strict=True)):
+            if paths == []:
+                what = "folder" if entry.kind == "campaign" else "file"
+                raise InputError(f"campaigns.{index}: no {what} matches {entry.source}")
+            for source in [entry.source] if paths is None else paths:
+                if paths is not None and source in named:
+                    continue
                 path = Path(os.path.abspath(source))
                 names = {"campaign": path.name, "log": path.stem, "public": source}
                 inherited = {
