@@ -13,12 +13,12 @@ if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it i
     from accelstudy.api.diagnoses import Diagnosis as Diagnosis
     from accelstudy.api.logs import Log as Log
     from accelstudy.api.lots import Lot as Lot
-    from accelstudy.api.plans import Plan as Plan
     from accelstudy.api.simulations import Simulation as Simulation
     from accelstudy.basics.errors import InputError as InputError
     from accelstudy.campaign.session import Campaign as Campaign
     from accelstudy.epochs.output import Comparison as Comparison
     from accelstudy.epochs.output import History as History
+    from accelstudy.planning.plan import Plan as Plan
     from accelstudy.proposal.design import Design as Design
     from accelstudy.study.run import run_study as run_study
     from accelstudy.verbs.calibrations import apply as apply
@@ -50,11 +50,11 @@ _NAMES = {
     "api.diagnoses": "Diagnosis",
     "api.logs": "Log",
     "api.lots": "Lot",
-    "api.plans": "Plan",
     "api.simulations": "Simulation",
     "basics.errors": "InputError",
     "campaign.session": "Campaign",
     "epochs.output": "Comparison History",
+    "planning.plan": "Plan",
     "proposal.design": "Design",
     "study.run": "run_study",
     "verbs.calibrations": "apply calibrate check_sigmas diagnose export read_calibration",

@@ -104,7 +104,7 @@ def plan(
         accelstudy plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2
     """
     given = {**locals()}
-    from accelstudy.api.plans import Plan
+    from accelstudy.planning.plan import Plan
 
     return Plan.of(**given)
 

@@ -69,7 +69,7 @@ def told():
         return plans[0]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("accelstudy.api.plans.answer", kept)
+        patch.setattr("accelstudy.planning.plan.answer", kept)
         printed = succeed(*QUESTION.split()).stdout
     return plans[0], printed
 

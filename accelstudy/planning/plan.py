@@ -1,4 +1,4 @@
-"""Plans of a program."""
+"""A plan: the cheapest calibrations for an accuracy, as it is printed, drawn and written."""
 
 from __future__ import annotations
 
@@ -7,24 +7,37 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
+import yaml
 
 from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.plugins import as_a_key
 from accelstudy.basics.progress import begin, say, show
 from accelstudy.basics.suggested import study_again
+from accelstudy.basics.units import MGON
 from accelstudy.data_sheets import of_sigma
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
+from accelstudy.leveling.distribution import NOISE
 from accelstudy.pages.result import Result
 from accelstudy.planning import question, wording
 from accelstudy.planning.answer import Answer, answer
-from accelstudy.planning.output import plan_files, plan_table
+from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.question import Equipment, Question
+from accelstudy.planning.reasons import limits
+from accelstudy.proposal.design import write_design
+from accelstudy.proposal.order import field_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
+STUDY_HEAD = """\
+# The simulated candidates of a plan as a study, made by `accelstudy plan`. It reproduces their
+# numbers: {command}
+"""
+ANGLES = ("roll", "pitch")
 
 
 class Plan(Result):
@@ -101,8 +114,12 @@ class Plan(Result):
 
     @cached_property
     def compared(self) -> pd.DataFrame:
-        """All calibrations that were compared, with their units in the names of the columns."""
-        return plan_table(self.answer)
+        """All calibrations that were compared, with their units in the names of the columns.
+
+        Angles are in mgon, whatever unit the user chose; rank is that in the table of the plan.
+        """
+        rows = [_row(self.answer, candidate) for candidate in self.answer.compared]
+        return pd.DataFrame(rows).astype({"rank": "Int64"})
 
     @property
     def table(self) -> pd.DataFrame:
@@ -121,21 +138,62 @@ class Plan(Result):
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy plan` does; raises `InputError` if nothing is reached."""
+        # Slow to import, and not needed for what is printed.
+        import matplotlib as mpl
+
+        from accelstudy.drawing.saving import save
+        from accelstudy.drawing.style import DPI, STYLE
+        from accelstudy.files.tables import write_table
+        from accelstudy.planning.figure import plan_figure
+
         if not self.answer.ranked:
             raise InputError(self.verdict)
-        plan_files(self.answer, folder, {"config_hash": None, "seed": self.answer.seed}, place)
+        provenance = {"config_hash": None, "seed": self.answer.seed}
+        write_table(folder / "plan.parquet", self.compared, provenance)
+        head = STUDY_HEAD.format(command=study_again(place / "study.yaml"))
+        study = {**as_a_key(), **self.answer.study, "study": "plan"}
+        content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
+        (folder / "study.yaml").write_text(head + content, encoding="utf-8")
+        (folder / "plan.md").write_text(self._page(), encoding="utf-8")
+        self._write_positions(folder / "positions.yaml")
+        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+            figure = plan_figure(self.answer)
+        save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+
+    def _write_positions(self, path: Path) -> None:
+        """Write the recommended positions as a scheme, in the order in which to take them."""
+        question, first = self.answer.question, self.answer.first
+        directions = first.scheme.directions
+        if first.request is not None:
+            directions = directions[field_order(first.request.task, directions)]
+        command, made = wording.positions_command(question, first), {"made_by": "accelstudy plan"}
+        write_design(path, "plan", "of plan", command, directions, made)
+
+    def _parts(self) -> tuple[str, ...]:
+        """What to do, how to, the table, the reasons and the assumptions, as text."""
+        answer, how_to, reasons, assumptions = (
+            "\n".join(wording.part_lines(part, self.answer))
+            for part in ("answer", "how_to", "reasons", "assumptions")
+        )
+        return answer, how_to, "\n".join(wording.table_lines(self.answer)), reasons, assumptions
+
+    def _page(self) -> str:
+        """The plan as a page in Markdown."""
+        answer, how_to, table, reasons, assumptions = self._parts()
+        first, _, rest = answer.partition("\n")
+        figure = "![Tilt accuracy over effort](plan.svg)"
+        assumed = "\n".join(f"* {line}" for line in assumptions.splitlines())
+        parts = f"# {first}", rest, how_to, f"```\n{table}\n```", figure, f"```\n{reasons}\n```"
+        return "\n\n".join([*parts, assumed]) + "\n"
 
     def tell(self, place: Path | None) -> None:
         """Print the answer, the table and the assumptions."""
         if not self.answer.ranked:
             show(self.verdict)
             return
-        answer, how_to, reasons, assumptions = (
-            "\n".join(wording.part_lines(part, self.answer))
-            for part in ("answer", "how_to", "reasons", "assumptions")
-        )
+        answer, how_to, table, reasons, assumptions = self._parts()
         show(f"{answer}\n\n{how_to}")
-        say("\n".join(["", *wording.table_lines(self.answer), "", reasons]))
+        say(f"\n{table}\n\n{reasons}")
         say(f"\n{assumptions}\n")
         if place is None:
             study = "a study that makes the numbers again"
@@ -143,3 +201,38 @@ class Plan(Result):
         else:
             say(f"plan, table and figure: {place}")
             say(f"the same numbers again: {study_again(place / 'study.yaml')}")
+
+
+def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
+    rank = answer.ranked.index(c) + 1 if c in answer.ranked else None
+    expected = {"rms": c.tilt.rms, "noise": np.sqrt(c.tilt.squares[NOISE])}
+    found, of_both = dict.fromkeys(("rms", "rms_error", "rms_q95"), np.full(2, np.nan)), np.nan
+    if c.simulated is not None:
+        values = c.simulated.rms, c.simulated.error, c.simulated.quantile(0.95)
+        found, of_both = dict(zip(found, values, strict=True)), c.simulated.of_both(0.95)
+    return {
+        "equipment": c.equipment.name,
+        "model": c.model.name,
+        "n_parameters": c.model.n_parameters,
+        "scheme": c.scheme.name,
+        "n_positions": c.scheme.n_positions,
+        "hold_s": c.hold,
+        "sensor_sigma_mps2": c.sigma,
+        "minutes": c.seconds / 60,
+        "redundancy": c.redundancy,
+        **{
+            f"{angle}_{what}_mgon": float(values[i]) / MGON
+            for i, angle in enumerate(ANGLES)
+            for what, values in expected.items()
+        },
+        "reaches": answer.question.reached_by(c.tilt),
+        "rank": rank,
+        "limited_by": limits(answer.question, c) if rank else None,
+        "cell": None if c.simulated is None else c.simulated.cell,
+        **{
+            f"{angle}_{what}_simulated_mgon": float(values[i]) / MGON
+            for what, values in found.items()
+            for i, angle in enumerate(ANGLES)
+        },
+        "both_rms_q95_simulated_mgon": of_both / MGON,
+    }
