@@ -110,7 +110,7 @@ class Command(click.Command):
         )
         del self.params  # the list of all commands does without them
         self._options = optional, out, [*options], [*shared]
-        self._retired = retired or {}
+        self._retired = dict(retired or {})
 
     @cached_property
     def params(self) -> list[click.Parameter]:  # type: ignore[override]
@@ -173,14 +173,16 @@ class Command(click.Command):
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            name = error.option_name
-            keyword = kinds.keywords(self.verb).get(
-                kinds.RENAMED.get(name[2:].replace("-", "_"), "")
-            )
-            instead = self._retired.get(name, keyword and f"{keyword.option} takes it")
-            if instead is None:
+            keywords = kinds.keywords(self.verb)
+            retired = self._retired | {
+                f"--{old.replace('_', '-')}": f"{keywords[new].option} takes it"
+                for old, new in kinds.RENAMED.items()
+                if new in keywords
+            }
+            if error.option_name not in retired:
                 raise
-            raise InputError(f"{name}: no longer an option; {instead}") from None
+            instead = retired[error.option_name]
+            raise InputError(f"{error.option_name}: no longer an option; {instead}") from None
 
     def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
         with feedback(quiet), angles_in(angle_unit):
