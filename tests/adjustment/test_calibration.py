@@ -13,10 +13,18 @@ import pytest
 from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
-from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
+from quality_helpers import (
+    BOTH,
+    GRAVITY,
+    NINE,
+    ROBOT,
+    STANDARD_ERRORS,
+    TRUTH,
+    draw,
+    ideal_session,
+)
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
-from study_helpers import PAPER_TRUTH
 
 from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.approaches import get_approach
@@ -30,25 +38,11 @@ from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
 G = STANDARD_GRAVITY
-# Thalmann & Neuner (2018), section 4; other effects get what is typical of them.
-TRUTH = {
-    **PAPER_TRUTH,
-    **{"alpha_xz": 20 * MGON, "alpha_xy": -15 * MGON, "alpha_yx": 30 * MGON},
-    **{"k2_x": 300e-6, "k2_y": -200e-6, "k2_z": 100e-6},
-    **{"k3_x": -400e-6, "k3_y": 500e-6, "k3_z": 300e-6},
-}
-
-
-def true_session(scheme="mclaren-24", model=NINE, hold=None, gravity=G, **more):
-    truth = model.vector({**TRUTH, **more})
-    return session(model, truth, get_scheme(scheme).directions, gravity, hold), truth
+X = NINE.vector(TRUTH)
 
 
 def simulate(approach, replicates, seed, scheme="mclaren-24", noise=None):
-    noise = noise or Noise()
-    ideal, truth = true_session(scheme)
-    observed = ideal.draw(noise, replicates, np.random.default_rng(seed))
-    return calibrate(NINE, approach, observed), truth
+    return calibrate(NINE, approach, draw(seed, scheme, noise=noise, replicates=replicates))
 
 
 # --- derivatives ---------------------------------------------------------------------------------
@@ -59,7 +53,7 @@ def simulate(approach, replicates, seed, scheme="mclaren-24", noise=None):
 @pytest.mark.parametrize("name", MODELS)
 def test_derivatives_against_finite_differences(name, approach, estimates_gravity):
     model = get_model(name)
-    ideal, truth = true_session(model=model)
+    ideal, truth = ideal_session(model=model), model.vector(TRUTH)
     rng = np.random.default_rng(3)
     forces = ideal.forces + 0.01 * rng.standard_normal(ideal.forces.shape)
     l = np.concatenate([forces, ideal.angles], axis=1)[:, : 5 if approach.uses_angles else 3]
@@ -112,10 +106,10 @@ def paper_conditions(x, l):
 
 def test_robot_adjustment_is_that_of_the_papers_equations():
     noise = Noise()
-    ideal, _ = true_session()
+    ideal = ideal_session()
     # Turn the first position upside down: the noise scatters its roll about ±200 gon.
     scheme = get_scheme("mclaren-24").rotated([ideal.angles[0, 0] - np.pi, 0, 0])
-    ideal = session(NINE, NINE.vector(TRUTH), scheme.directions)
+    ideal = session(NINE, X, scheme.directions)
     observed = ideal.draw(noise, 20, np.random.default_rng(10))
     observed = replace(observed, angles=wrapped(observed.angles))
     of_forces = np.arctan2(-observed.forces[..., 1], -observed.forces[..., 2])
@@ -148,25 +142,21 @@ def test_robot_adjustment_is_that_of_the_papers_equations():
 ])  # fmt: skip
 def test_exact_data_return_the_truth(name, approach):
     model = get_model(name)
-    ideal, truth = true_session(model=model)
-    result = calibrate(model, approach, ideal.observations(Noise()))
+    result = calibrate(model, approach, ideal_session(model=model).observations(Noise()))
     assert result.converged.all()
-    np.testing.assert_allclose(result.parameters[0], truth, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(result.parameters[0], model.vector(TRUTH), rtol=0, atol=1e-10)
     assert result.omega[0] < 1e-12
 
 
 def test_gravity_cannot_calibrate_cross_axis_misalignment():
     model = get_model("bias-scale-nonorthogonality-crossaxis")
-    ideal, _ = true_session(model=model)
-    observed = ideal.draw(Noise(), 3, np.random.default_rng(0))
-    result = calibrate(model, GRAVITY, observed)
+    result = calibrate(model, GRAVITY, draw(0, model=model, replicates=3))
     assert not result.converged.any()
     assert np.isnan(result.parameters).all()
 
 
 def test_robot_angles_are_needed():
-    ideal, _ = true_session()
-    observed = replace(ideal.observations(Noise()), angles=None)
+    observed = replace(draw(0), angles=None)
     assert calibrate(NINE, GRAVITY, observed).converged.all()
     with pytest.raises(InputError, match="robot's roll and pitch"):
         calibrate(NINE, ROBOT, observed)
@@ -190,17 +180,17 @@ CASES = pytest.mark.parametrize("case", COMBINED, ids="-".join)
 @CASES
 def test_estimates_are_unbiased(monte_carlo, case):
     """At the poles too: two of the faces have the x axis vertical, where roll has no meaning."""
-    result, truth = monte_carlo[case]
+    result = monte_carlo[case]
     assert result.converged.all()
-    errors = (result.parameters - truth) / result.sigma_priori
+    errors = (result.parameters - X) / result.sigma_priori
     # The mean of 9 parameters each; the paper's numbers leave a non-linear bias far below this.
     assert np.abs(errors.mean(axis=0)).max() < STANDARD_ERRORS / math.sqrt(REPLICATES)
 
 
 @CASES
 def test_spread_of_the_estimates_is_the_sigma_of_the_adjustment(monte_carlo, case):
-    result, truth = monte_carlo[case]
-    errors = (result.parameters - truth) / result.sigma_priori
+    result = monte_carlo[case]
+    errors = (result.parameters - X) / result.sigma_priori
     np.testing.assert_allclose(
         errors.std(axis=0), 1, rtol=0, atol=STANDARD_ERRORS / math.sqrt(2 * REPLICATES)
     )
@@ -208,8 +198,8 @@ def test_spread_of_the_estimates_is_the_sigma_of_the_adjustment(monte_carlo, cas
 
 def test_a_perfect_robot_improves_the_spread_by_the_closed_form():
     noise = Noise(sigma_angle=0.0)
-    robot, _ = simulate(ROBOT, 1000, 5, noise=noise)
-    gravity, _ = simulate(GRAVITY, 1000, 6, noise=noise)
+    robot = simulate(ROBOT, 1000, 5, noise=noise)
+    gravity = simulate(GRAVITY, 1000, 6, noise=noise)
     ratio = perfect_robot_ratio(get_scheme("mclaren-24").directions)
     expected = np.repeat([ratio[e] for e in ("bias", "scale", "nonorthogonality")], 3)
     np.testing.assert_allclose(
@@ -224,7 +214,7 @@ def test_a_perfect_robot_improves_the_spread_by_the_closed_form():
 
 @CASES
 def test_omega_is_chi_square_distributed(monte_carlo, case):
-    result, _ = monte_carlo[case]
+    result = monte_carlo[case]
     r = result.redundancy
     standard_error = math.sqrt(2 * r / REPLICATES)
     assert abs(result.omega.mean() - r) < STANDARD_ERRORS * standard_error
@@ -234,10 +224,10 @@ def test_omega_is_chi_square_distributed(monte_carlo, case):
 @CASES
 @pytest.mark.parametrize("which", ["priori", "posteriori"])
 def test_intervals_cover_the_truth_in_95_percent(monte_carlo, case, which):
-    result, truth = monte_carlo[case]
+    result = monte_carlo[case]
     quantile = norm.ppf(0.975) if which == "priori" else t.ppf(0.975, result.redundancy)
     sigma = getattr(result, f"sigma_{which}")
-    coverage = np.mean(np.abs(result.parameters - truth) < quantile * sigma, axis=0)
+    coverage = np.mean(np.abs(result.parameters - X) < quantile * sigma, axis=0)
     limit = STANDARD_ERRORS * math.sqrt(0.95 * 0.05 / REPLICATES)
     np.testing.assert_allclose(coverage, 0.95, rtol=0, atol=limit)
 
@@ -248,10 +238,10 @@ def test_intervals_cover_the_truth_in_95_percent(monte_carlo, case, which):
 @BOTH
 def test_observed_gravity_spreads_the_mean_scale_as_theory_says(approach):
     noise = Noise(sigma_gravity=0.002)
-    result, truth = simulate(approach, 1000, 8, noise=noise)
-    fixed, _ = simulate(approach, 1, 8)
+    result = simulate(approach, 1000, 8, noise=noise)
+    fixed = simulate(approach, 1, 8)
     assert result.redundancy == fixed.redundancy  # one unknown and one observation more
-    mean = result.parameters[:, 3:6].mean(axis=1) - truth[3:6].mean()
+    mean = result.parameters[:, 3:6].mean(axis=1) - X[3:6].mean()
     expected = math.sqrt(
         fixed.cofactors[0, 3:6, 3:6].mean() + (noise.sigma_gravity / G * (1 + 200e-6)) ** 2
     )
@@ -264,17 +254,16 @@ def test_observed_gravity_spreads_the_mean_scale_as_theory_says(approach):
 
 @BOTH
 def test_a_wrong_gravity_is_a_common_scale_and_nothing_else(approach):
-    ideal, truth = true_session()
-    observed = ideal.observations(Noise(gravity_error=1e-3))
+    observed = ideal_session().observations(Noise(gravity_error=1e-3))
     result = calibrate(NINE, approach, observed)
-    expected = truth.copy()
-    expected[3:6] = (1 + truth[3:6]) * G / (G + 1e-3) - 1
+    expected = X.copy()
+    expected[3:6] = (1 + X[3:6]) * G / (G + 1e-3) - 1
     np.testing.assert_allclose(result.parameters[0], expected, rtol=0, atol=1e-10)
     assert result.omega[0] < 1e-12
 
 
 def test_gravity_that_is_held_fixed_is_one_number():
-    observed = replace(noisy(0), gravity=np.array([9.80, 9.81]))
+    observed = replace(draw(0, replicates=2), gravity=np.array([9.80, 9.81]))
     with pytest.raises(InputError, match="gravity differs between the sessions"):
         calibrate(NINE, GRAVITY, observed)
 
@@ -282,11 +271,6 @@ def test_gravity_that_is_held_fixed_is_one_number():
 # --- invariances ---------------------------------------------------------------------------------
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def noisy(seed):
-    ideal, _ = true_session()
-    return ideal.draw(Noise(), 2, np.random.default_rng(seed))
 
 
 def assert_same_estimates(result, expected):
@@ -300,7 +284,7 @@ def assert_same_estimates(result, expected):
 @BOTH
 @given(seed=SEEDS, order=st.permutations(range(24)))
 def test_the_order_of_the_positions_does_not_matter(approach, seed, order):
-    observed = noisy(seed)
+    observed = draw(seed, replicates=2)
     permuted = replace(observed, forces=observed.forces[:, order], angles=observed.angles[:, order])
     expected = calibrate(NINE, approach, observed)
     result = calibrate(NINE, approach, permuted)
@@ -313,7 +297,7 @@ def test_the_order_of_the_positions_does_not_matter(approach, seed, order):
 @given(seed=SEEDS, rotation=SEEDS)
 def test_gravity_residuals_do_not_know_the_orientation_of_the_sensor(seed, rotation):
     """A turned triad has another bias and another triangle T S⁻¹, but the same ellipsoid."""
-    observed = noisy(seed)
+    observed = draw(seed, replicates=2)
     matrix = Rotation.random(random_state=np.random.default_rng(rotation)).as_matrix()
     turned = replace(observed, forces=observed.forces @ matrix.T)
     result, expected = calibrate(NINE, GRAVITY, turned), calibrate(NINE, GRAVITY, observed)
@@ -331,7 +315,7 @@ def test_gravity_residuals_do_not_know_the_orientation_of_the_sensor(seed, rotat
 def test_any_choice_of_nine_parameters_gives_the_same_gravity_residuals(seed):
     """The lower triangle of T is another gauge of the same ellipsoid."""
     lower = SensorModel.of("lower", ("bias", "scale", "cross_axis_misalignment"))
-    observed = noisy(seed)
+    observed = draw(seed, replicates=2)
     result, expected = calibrate(lower, GRAVITY, observed), calibrate(NINE, GRAVITY, observed)
     np.testing.assert_allclose(result.omega, expected.omega, rtol=1e-9)
     np.testing.assert_allclose(result.residuals, expected.residuals, rtol=0, atol=1e-5 * 0.002)
@@ -343,7 +327,7 @@ def test_any_choice_of_nine_parameters_gives_the_same_gravity_residuals(seed):
 @BOTH
 @given(seed=SEEDS, factor=st.floats(1e-4, 1e4))
 def test_the_unit_of_force_does_not_matter(approach, seed, factor):
-    observed = noisy(seed)
+    observed = draw(seed, replicates=2)
     scaled = replace(
         observed,
         forces=factor * observed.forces,
@@ -358,7 +342,7 @@ def test_the_unit_of_force_does_not_matter(approach, seed, factor):
 
 @given(seed=SEEDS, factor=st.floats(0.1, 10))
 def test_a_common_factor_of_the_noise_changes_only_the_variances(seed, factor):
-    observed = noisy(seed)
+    observed = draw(seed, replicates=2)
     scaled = replace(
         observed,
         sigma_force=factor * observed.sigma_force,

@@ -9,7 +9,7 @@ from study_helpers import PAPER_TRUTH
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.basics.units import STANDARD_GRAVITY
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
@@ -19,11 +19,18 @@ GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 SIGMA = Noise().sigma_force
 STANDARD_ERRORS = 4.5
+TRUTH = {
+    **PAPER_TRUTH,
+    **{"alpha_xz": 20 * MGON, "alpha_xy": -15 * MGON, "alpha_yx": 30 * MGON},
+    **{"k2_x": 300e-6, "k2_y": -200e-6, "k2_z": 100e-6},
+    **{"k3_x": -400e-6, "k3_y": 500e-6, "k3_z": 300e-6},
+}
+"""The sensor of the paper; effects that it does not have get what is typical of them."""
 
 
 def ideal_session(scheme="mclaren-24", model=NINE, hold=None):
     directions = get_scheme(scheme).directions
-    return session(model, model.vector(PAPER_TRUTH), directions, STANDARD_GRAVITY, hold)
+    return session(model, model.vector(TRUTH), directions, STANDARD_GRAVITY, hold)
 
 
 def draw(seed, scheme="mclaren-24", model=NINE, noise=None, replicates=1):
