@@ -102,25 +102,22 @@ def test_the_package_has_all_its_files(environment):
 
 # --- a geodesist with a table and a CSV ----------------------------------------------------------
 
-NOISE = 0.005
-"""Of a sample, m/s²."""
+GRAVITY = 9.80795
+AXES = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
 
 
-def write_log(path, directions):
-    """Write a log of 6 s in each position, with errors of a sensor; return the true forces."""
-    rng = np.random.default_rng(1)
-    forces = -9.80795 * directions
-    parts = []
-    for force in forces:
-        shaken = force + rng.normal(0, 2, (100, 3))
-        parts += [shaken, np.tile(force, (600, 1))]
+def read(force):
+    """What a sensor with errors of its own reads, but for its noise."""
+    return force @ AXES.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
+
+
+def logged(seed, directions, moving, still):
+    """True forces of a session, and its readings: each position is shaken before it rests."""
+    rng, parts = np.random.default_rng(seed), []
+    for force in -GRAVITY * directions:
+        parts += [force + rng.normal(0, 2, (moving, 3)), np.tile(force, (still, 1))]
     true = np.concatenate(parts)
-    axes = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
-    read = true @ axes.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
-    read += rng.normal(0, NOISE, read.shape)
-    timed = np.column_stack([0.01 * np.arange(len(read)), read])
-    np.savetxt(path, timed, "%.5f", delimiter=",", header="t,ax,ay,az", comments="")
-    return true
+    return true, read(true) + rng.normal(0, 0.005, true.shape)
 
 
 def test_a_geodesist_levels_a_log(typed_in):
@@ -130,8 +127,10 @@ def test_a_geodesist_levels_a_log(typed_in):
     design, imported, calibrate, apply, advise = commands
     typed_in(design)
     positions = yaml.safe_load(Path("my-positions.yaml").read_text(encoding="utf-8"))
-    true = write_log("calibration.csv", np.array(positions["directions"]))
-    assert "campaign: my-campaign (18 positions)" in typed_in(f"{imported} --gravity 9.80795")
+    true, readings = logged(1, np.array(positions["directions"]), 100, 600)
+    timed = np.column_stack([0.01 * np.arange(len(true)), readings])
+    np.savetxt("calibration.csv", timed, "%.5f", delimiter=",", header="t,ax,ay,az", comments="")
+    assert "campaign: my-campaign (18 positions)" in typed_in(f"{imported} --gravity {GRAVITY}")
     said = typed_in(calibrate)
     assert "ACCEPTED" in said
     promised = [float(x) for x in re.findall(r"([\d.]+) mgon in (?:roll|pitch)", said)]
@@ -172,19 +171,11 @@ int main(void)
 
 def test_a_robotics_engineer_takes_a_bag_to_a_controller(typed_in, tmp_path):
     """A bag of rests in ROS axes, and C that is compiled and gets the readings of the sensor."""
-    rng, rate = np.random.default_rng(2), 50
-    forces = -9.80795 * get_scheme("fibonacci-24").directions
-    steps = [(rng.normal(0, 2, (50, 3)), np.tile(force, (300, 1))) for force in forces]
-    true = np.concatenate([part for shaken, rest in steps for part in (shaken + rest[:1], rest)])
-    axes = np.array([[1, 1e-3, -5e-4], [0, 1, 8e-4], [0, 0, 1]])
-
-    def read(force):
-        return force @ axes.T * [1.003, 0.998, 1.001] + [0.05, -0.02, 0.03]
-
     flu = np.array([1, -1, -1])  # x forward, y left, z up, as in ROS
-    logged = (read(true) + rng.normal(0, NOISE, true.shape)) * flu
-    write_bag(tmp_path / "session.bag", np.arange(len(true)) / rate, {"/imu/data": logged})
-    said = typed_in("accelstudy import session.bag --gravity 9.80795 --out arm")
+    _, readings = logged(2, get_scheme("fibonacci-24").directions, 50, 300)
+    time = np.arange(len(readings)) / 50
+    write_bag(tmp_path / "session.bag", time, {"/imu/data": readings * flu})
+    said = typed_in(f"accelstudy import session.bag --gravity {GRAVITY} --out arm")
     assert "campaign: arm (24 positions)" in said
     assert "ACCEPTED" in typed_in("accelstudy calibrate arm --out calibrated")
     header = typed_in("accelstudy export calibrated/calibration.json --form c")
@@ -192,7 +183,7 @@ def test_a_robotics_engineer_takes_a_bag_to_a_controller(typed_in, tmp_path):
     Path("controller.c").write_text(CONTROLLER, encoding="utf-8")
     compile_it = "cc -std=c99 -Wall -Wextra -Werror controller.c -o controller -lm"
     subprocess.run(shlex.split(compile_it), check=True)
-    tilted = -9.80795 * get_scheme("mclaren-24").directions
+    tilted = -GRAVITY * get_scheme("mclaren-24").directions
     lines = "\n".join(" ".join(map(repr, row)) for row in (read(tilted) * flu).tolist())
     done = subprocess.run(["./controller"], input=lines, capture_output=True,
                           text=True, check=True)  # fmt: skip
