@@ -17,8 +17,8 @@ from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.given import each, path_of
 from accelstudy.basics.names import matches, natural
 from accelstudy.basics.units import UNITS
+from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
 from accelstudy.campaign.importing.logs import import_sensors
-from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.reference_log import ReferenceLog, open_reference

@@ -15,7 +15,7 @@ from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html

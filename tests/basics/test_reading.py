@@ -9,7 +9,7 @@ from calling import refused
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
-from accelstudy.campaign.importing.opening import open_source
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.files import reading
 from accelstudy.files.parquet import read_frame
 from accelstudy.files.reading import read_layer

@@ -17,10 +17,10 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.detection import Holds, find_blocks, find_holds
+from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.means import read_means
 from accelstudy.campaign.importing.names import thermometers
 from accelstudy.campaign.importing.noise import shown, steps_text
-from accelstudy.campaign.importing.opening import open_source
 from accelstudy.campaign.importing.recording import AXES, SDS, Log, Recording, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile

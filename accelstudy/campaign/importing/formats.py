@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.importing.recorded import BAG_OF_FOLDER, open_bag, open_ulog
+from accelstudy.campaign.importing.bags import BAG_OF_FOLDER, open_bag, open_ulog
 from accelstudy.campaign.importing.sources import LogFile, Source, open_matlab, open_parquet
 from accelstudy.campaign.importing.text import GZIP, TextSource
 from accelstudy.files.reading import readable
