@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,45 +27,6 @@ def write_frame(path: str | Path, frame: pd.DataFrame) -> None:
     """Write a table of pandas without its index, whole or not at all."""
     with whole_file(path) as temporary:
         write_parquet(temporary, pa.Table.from_pandas(frame, preserve_index=False))
-
-
-def read_frame(
-    path: str | Path,
-    remedy: str = "",
-    columns: Sequence[str] | None = None,
-    rows: tuple[str, Collection[str]] | None = None,
-) -> pd.DataFrame:
-    """Read a table of pandas; errors as in `whole_parquet`.
-
-    Parameters
-    ----------
-    path, remedy : as in `whole_parquet`
-    columns : names; by default all
-    rows : name of a column, and texts of which it must have one; by default all rows
-    """
-    with whole_parquet(path, remedy) as file:
-        if rows is None:
-            return file.read(columns).to_pandas()
-        import pyarrow.compute as pc  # slow to import
-
-        name, texts = rows
-        wanted = file.schema_arrow.names if columns is None else list(columns)
-        groups = [i for i in range(file.num_row_groups) if _may_have(file, i, name, texts)]
-        table = file.read_row_groups(groups, list(dict.fromkeys([*wanted, name])))
-        chosen = pc.is_in(table[name], pa.array([*texts], pa.string()))
-        return table.filter(chosen).select(wanted).to_pandas()
-
-
-def _may_have(file: pq.ParquetFile, group: int, name: str, texts: Collection[str]) -> bool:
-    """Whether a group of rows may have one of some texts in a column.
-
-    Arrow itself skips no group of a column that is stored as a dictionary.
-    """
-    column = file.metadata.row_group(group).column(file.schema_arrow.get_field_index(name))
-    known = column.statistics
-    if known is None or not known.has_min_max:
-        return True
-    return any(known.min <= text <= known.max for text in texts)
 
 
 @contextmanager

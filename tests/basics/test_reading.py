@@ -11,11 +11,18 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.files import reading
-from accelstudy.files.parquet import read_frame
+from accelstudy.files.parquet import whole_parquet
 from accelstudy.files.reading import read_layer
 
 UNREADABLE = Path("/proc/self/mem")  # it opens, and its first byte cannot be read
-READERS = (read_layer, read_calibration, open_source, read_frame)
+
+
+def read_parquet(path):
+    with whole_parquet(path) as file:
+        return file.read()
+
+
+READERS = (read_layer, read_calibration, open_source, read_parquet)
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
@@ -20,7 +21,6 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL, POWER
 from accelstudy.epochs.course import Course
-from accelstudy.files.parquet import read_frame
 from accelstudy.sensors.models import get_model
 
 N = 500
@@ -173,7 +173,7 @@ def test_the_command_writes_what_it_says(per_year, tmp_path):
     assert content["interval"]["until"] in told
     assert (content["interval"]["years"] < 0.5) == bool(per_year)
     assert (out / "figures/interval.svg").is_file()
-    table = read_frame(out / "history.parquet")
+    table = pd.read_parquet(out / "history.parquet")
     assert len(table) == 5 * 9
     page = (out / "report.html").read_text(encoding="utf-8")
     assert_sound(page)

@@ -118,8 +118,8 @@ def summarise_campaigns(
     write_table(campaigns, table, provenance)
     long = pd.DataFrame(values, columns=list(PARAMETER_COLUMNS)).astype(PARAMETER_COLUMNS)
     write_table(parameters, long, provenance)
-    known = table.astype(object).where(table.notna(), None).to_dict("records")
-    rows = [{**row, "folder": folder} for row, folder in zip(known, paths, strict=True)]
+    records = table.astype(object).where(table.notna(), None).to_dict("records")
+    rows = [{**row, "folder": folder} for row, folder in zip(records, paths, strict=True)]
     with whole_file(page) as path:
         path.write_text(_page(batch, rows, Path(page).parent), encoding="utf-8")
     return table

@@ -98,8 +98,9 @@ def campaign_of(task: Task, folder: str | Path) -> Campaign:
     InputError
         If it cannot be read, or could not be imported.
     """
-    own = _read(task) if task.settings is None else read_campaign(Path(folder) / "campaign")
-    return replace(own, name=task.name)
+    imported = Path(folder) / "campaign"
+    campaign = _read(task) if task.settings is None else read_campaign(imported)
+    return replace(campaign, name=task.name)
 
 
 def _read(task: Task) -> Campaign:

@@ -63,8 +63,8 @@ def px4_parameters(calibration: SensorCalibration) -> str:
             values |= {f"TC_A0_X{k}_{i}": x if k else 0.0 for k, x in enumerate(powers)}
     shown = {name: _positional(value) for name, value in sorted(values.items())}
     axes = calibration.usual_layout.axes
-    of_file = lines(TEMPLATE, "parameters", calibration, __version__, lost, axes, is_warmed, shown)
-    return "\n".join(of_file) + "\n"
+    content = calibration, __version__, lost, axes, is_warmed, shown
+    return "\n".join(lines(TEMPLATE, "parameters", *content)) + "\n"
 
 
 def _positional(value: float) -> str:
@@ -86,8 +86,8 @@ def px4_losses(calibration: SensorCalibration) -> list[str]:
     warmed = [each for each in calibration.model.effects if each.family == "temperature"]
     lags = [(effect.name, tau) for effect in warmed if (tau := effect.settings.get("tau"))]
     is_lost = largest.max() > MIN_LOSS
-    said = rms / MGON, largest / MGON, parts, lags, MAX_TILT_GON
-    return lines(TEMPLATE, "losses", is_lost, *said)
+    sizes = rms / MGON, largest / MGON
+    return lines(TEMPLATE, "losses", is_lost, *sizes, parts, lags, MAX_TILT_GON)
 
 
 def _is_warmed(calibration: SensorCalibration) -> bool:
