@@ -8,7 +8,6 @@ import subprocess
 from dataclasses import replace
 from functools import cache
 from io import StringIO
-from itertools import product
 
 import numpy as np
 import pytest
@@ -104,19 +103,19 @@ def readings_of(calibration, forces, hold):
 
 
 class Library:
-    """Functions of headers, all compiled together, in one precision."""
+    """Functions of calibrations, all compiled together, in one precision."""
 
-    def __init__(self, headers, folder, double):
+    def __init__(self, calibrations, folder, double):
+        self.calibrations = calibrations
         self.real = ctypes.c_double if double else ctypes.c_float
-        self.columns = {}
-        texts = []
-        for name, header in headers.items():
-            header = header.replace("ACCEL_CALIBRATION_H", f"{name}_H")
+        self.names, self.columns, texts = {}, {}, []
+        for i, (key, calibration) in enumerate(calibrations.items()):
+            name = self.names[key] = f"some{i}"
+            header = c_header(calibration).replace("ACCEL_CALIBRATION_H", f"{name}_H")
             texts.append(re.sub(r"\baccel_(\w+)", rf"{name}_\1", header))
             signature = re.search(rf"{name}_calibrate\(([^)]*)\)", texts[-1].split("*/", 1)[1])[1]
-            names = [argument.split()[-1] for argument in signature.split(",")[1:-1]]
-            self.columns[name] = names
-            given = "".join(f", known[{k} * n + i]" for k in range(len(names)))
+            self.columns[key] = [part.split()[-1] for part in signature.split(",")[1:-1]]
+            given = "".join(f", known[{k} * n + i]" for k in range(len(self.columns[key])))
             texts.append(
                 f"void run_{name}(int n, const {name}_real *reading, const {name}_real *known,"
                 f" {name}_real *out)\n{{\n    int i;\n    (void)known;\n"
@@ -130,111 +129,103 @@ class Library:
         subprocess.run([*command, *(["-DACCEL_DOUBLE"] if double else [])], check=True)
         self._library = ctypes.CDLL(str(library))
 
-    def __call__(self, name, readings, known):
-        """Forces (n, 3)."""
+    def __call__(self, key, readings, known):
+        """Forces (n, 3); what lags behind the thermometer is as warm if it is not known."""
         pointer, n = ctypes.POINTER(self.real), len(readings)
-        of = [known[column] for column in self.columns[name]] or [np.zeros(n)]
-        arrays = [np.ascontiguousarray(a, dtype=self.real) for a in (readings, np.stack(of))]
+        of = [
+            known["temperature"] if "lagged" in column and column not in known else known[column]
+            for column in self.columns[key]
+        ]
+        arrays = [np.ascontiguousarray(a, self.real) for a in (readings, of or [np.zeros(n)])]
         out = np.full((n, 3), np.nan, dtype=self.real)
         reading, columns, result = (a.ctypes.data_as(pointer) for a in (*arrays, out))
-        getattr(self._library, f"run_{name}")(n, reading, columns, result)
+        getattr(self._library, f"run_{self.names[key]}")(n, reading, columns, result)
         return out.astype(float)
 
 
+LAG, CLIPS, FRAMES = ("thermal_bias(tau=300)",), ("saturation(knee=9)",), ("flu", "rfu")
+TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+COUNTS = {"scale": [0.002, 0.0021, 0.0019], "offset": [33000.3, 33100.4, 32900.2]}
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc)")
 
 
 @pytest.fixture(scope="module")
-def compiled(tmp_path_factory):
-    """Function that compiles calibrations of effects, and returns them with their library."""
-
-    def of(effects, *, double):
-        made = {f"some{i}": calibration_with(specs) for i, specs in enumerate(effects)}
-        headers = {name: c_header(each) for name, each in made.items()}
-        return made, Library(headers, tmp_path_factory.mktemp("c"), double)
-
-    return of
+def double(tmp_path_factory):
+    """Each effect by itself, in double precision."""
+    made = {specs: calibration_with(specs) for specs in ALONE}
+    return Library(made, tmp_path_factory.mktemp("c"), double=True)
 
 
-def settled(known, library, name):
-    """Conditions in which what lags behind the thermometer is as warm."""
-    lagged = [column for column in library.columns[name] if column.startswith("temperature_lagged")]
-    return known | {column: known["temperature"] for column in lagged}
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    """Pairs of effects, one that clips, and one that takes counts, in single precision."""
+    made = {specs: calibration_with(specs) for specs in PAIRS}
+    made[CLIPS] = calibration_with(CLIPS, values=[1.0, 1.0, 1.0])
+    linear = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
+    mended = {**CONTENT, "mended": {"matrix": TURN.tolist(), "reason": "x is y"}}
+    for frame in FRAMES:
+        layout = LogLayout(unit="counts", frame=frame, **COUNTS)
+        made[frame] = replace(linear, log=layout, content=mended)
+    return Library(made, tmp_path_factory.mktemp("c"), double=False)
 
 
 @needs_cc
-def test_c_of_each_effect_is_what_apply_does(compiled):
+@pytest.mark.parametrize("specs", ALONE, ids=" ".join)
+def test_c_of_each_effect_is_what_apply_does(specs, double):
     """Forces; also after the session, when drifts have ended."""
-    made, library = compiled(ALONE, double=True)
-    known = conditions(60, until=2000.0)
+    calibration, known = double.calibrations[specs], conditions(60, until=2000.0)
     known["temperature"] = np.full(60, 27.0)  # nothing lags behind it
-    for name, calibration in made.items():
-        hold = holds(known)
-        readings = readings_of(calibration, attitudes(60), hold)
-        force = library(name, readings, settled(known, library, name))
-        expected = calibration.correct(readings, hold)
-        assert np.isfinite(expected).all()
-        np.testing.assert_allclose(force, expected, rtol=0, atol=2e-6)
+    readings = readings_of(calibration, attitudes(60), holds(known))
+    expected = calibration.correct(readings, holds(known))
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(double(specs, readings, known), expected, rtol=0, atol=2e-6)
 
 
 @needs_cc
-def test_c_of_each_pair_gives_the_force_that_made_the_reading(compiled):
+@pytest.mark.parametrize("specs", PAIRS, ids=" ".join)
+def test_c_of_each_pair_gives_the_force_that_made_the_reading(specs, single):
     """Readings are composed by NumPy; the error is below what the head of a header says."""
-    made, library = compiled(PAIRS, double=False)
     known = conditions(40)
-    for size, (name, calibration) in product((0.6, 1.45), made.items()):
+    for size in (0.6, 1.45):
         forces = attitudes(40, size)
-        readings = readings_of(calibration, forces, holds(known))
-        force = library(name, readings, settled(known, library, name))
-        np.testing.assert_allclose(
-            force, forces, rtol=0, atol=size * 1.1e-5, err_msg=str(calibration.model)
-        )
+        readings = readings_of(single.calibrations[specs], forces, holds(known))
+        force = single(specs, readings, known)
+        np.testing.assert_allclose(force, forces, rtol=0, atol=size * 1.1e-5)
 
 
 @needs_cc
-def test_c_follows_a_lag_as_its_head_says(tmp_path):
-    calibration = calibration_with(("thermal_bias(tau=300)",))
-    library = Library({"lag": c_header(calibration)}, tmp_path, double=True)
+def test_c_follows_a_lag_as_its_head_says(double):
     time = np.arange(0.0, 1000.0)
     temperature = 20 + 15 * (time / 1000)
     lagged, factor = [temperature[0]], 1 - np.exp(-1 / 300)
     for now in temperature[1:]:
         lagged.append(lagged[-1] + (now - lagged[-1]) * factor)
-    hold = HoldConditions(time=time, temperature=temperature)
     readings = np.tile([0.0, 0.0, -G], (len(time), 1))
-    force = library("lag", readings, {"temperature_lagged_300": np.array(lagged)})
-    expected = calibration.correct(readings, hold)
+    force = double(LAG, readings, {"temperature_lagged_300": np.array(lagged)})
+    hold = HoldConditions(time=time, temperature=temperature)
+    expected = double.calibrations[LAG].correct(readings, hold)
     largest = 0.007 * 0.5 * 15 / 1000  # half a second behind a straight line, at 7 mm/s²/K
     np.testing.assert_allclose(force, expected, rtol=0, atol=1.1 * largest)
 
 
 @needs_cc
-def test_c_has_no_force_where_apply_has_none(tmp_path):
+def test_c_has_no_force_where_apply_has_none(single):
     """Hard clipping: nothing is known of what lies beyond the knee."""
-    calibration = calibration_with(("saturation(knee=9)",), values=[1.0, 1.0, 1.0])
-    library = Library({"clips": c_header(calibration)}, tmp_path, double=False)
     readings = np.array([[0.0, 0.0, -8.0], [0.0, 9.5, 0.0]])
-    force = library("clips", readings, {})
+    force = single(CLIPS, readings, {})
     np.testing.assert_allclose(force[0], [0, 0, -8], atol=1e-5)
     assert np.isnan(force[1]).all()
-    assert np.isnan(calibration.correct(readings)[1]).any()
+    assert np.isnan(single.calibrations[CLIPS].correct(readings)[1]).any()
 
 
 @needs_cc
-@pytest.mark.parametrize("frame", ["flu", "rfu"])
-def test_c_takes_counts_in_the_axes_of_the_log(frame, tmp_path):
+@pytest.mark.parametrize("frame", FRAMES)
+def test_c_takes_counts_in_the_axes_of_the_log(frame, single):
     """A large offset costs no digits: the first thing that is done is to take it away."""
-    calibration = calibration_with(("bias", "scale", "nonorthogonality", "quadratic_scale"))
-    turn, axes = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), parse_frame(frame)
-    scale, offset = [0.002, 0.0021, 0.0019], [33000.3, 33100.4, 32900.2]
-    layout = LogLayout(unit="counts", scale=scale, offset=offset, frame=frame)
-    mended = {**CONTENT, "mended": {"matrix": turn.tolist(), "reason": "x is y"}}
-    header = c_header(replace(calibration, log=layout, content=mended))
-    library = Library({"log": header}, tmp_path, double=False)
-    forces, hold = attitudes(30), HoldConditions()
-    sensed = axes.from_frd(readings_of(calibration, forces, hold) @ turn)
-    counts = sensed / scale + offset
-    force = library("log", counts, {})
+    forces, axes = attitudes(30), parse_frame(frame)
+    read = readings_of(single.calibrations[frame], forces, HoldConditions()) @ TURN
+    counts = axes.from_frd(read) / COUNTS["scale"] + COUNTS["offset"]
+    force = single(frame, counts, {})
     np.testing.assert_allclose(force, axes.from_frd(forces), rtol=0, atol=2e-5)
 
 
