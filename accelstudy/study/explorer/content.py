@@ -19,7 +19,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.drawing.style import model_title, shown
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
-from accelstudy.study.figures.panels import ANGLES, by_cell, group_sds
+from accelstudy.study.figures.panels import ANGLES, by_cell, group_sds, in_shown_units
 from accelstudy.study.figures.registry import Tables
 from accelstudy.study.statistics import TILTS
 
@@ -117,12 +117,8 @@ def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
     summary = _numbered(cells, tables["summary"]).join(ends, on=["cell", "parameter"])
     summary.columns = summary.columns.str.replace("_ci95_", "_")
     stems = summary.columns.str.replace("_(low|high)$", "", regex=True)
-    values = summary.loc[:, stems.isin(IN_UNITS)].astype(float)
-    units = summary["unit"].astype(str)
-    for unit in units.unique():
-        values.loc[units == unit] = shown(values[units == unit], unit)[0]
-    labels = summary.loc[:, stems.isin(["i", "approach", "parameter", *SHARES])]
-    return labels.join(values).assign(unit=[shown([], unit)[1] for unit in units])
+    table = in_shown_units(summary, *summary.columns[stems.isin(IN_UNITS)])
+    return table.loc[:, stems.isin(["i", "approach", "parameter", "unit", *SHARES, *IN_UNITS])]
 
 
 def correlations(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
