@@ -11,8 +11,8 @@ from accelstudy.study.claims.quantities import Evidence
 from accelstudy.study.claims.verdicts import judge
 from accelstudy.study.config import Study, read_study
 from accelstudy.study.replicates import Replicates, estimates_table
-from accelstudy.study.results import simulated_tables
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
+from accelstudy.study.tables import simulated_tables
 
 
 def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:

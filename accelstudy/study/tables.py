@@ -1,8 +1,9 @@
-"""The tables of a study: what came of its cells, and their estimates as they are stored."""
+"""The tables of a study: cells are simulated, and what came of them is tabled and stored."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,18 +15,81 @@ from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
 from accelstudy.design import closed_forms
 from accelstudy.effects import get_effect
-from accelstudy.files.tables import read_table
+from accelstudy.files.tables import parquet_writer, read_table, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import UNKNOWN, Estimates
-from accelstudy.study.statistics import ANGLES, TILT, TILTS, CellStatistics
+from accelstudy.study.replicates import ESTIMATES, Replicates, estimates_table
+from accelstudy.study.statistics import (
+    ANGLES,
+    TILT,
+    TILTS,
+    CellStatistics,
+    simulated_statistics,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
 
+log = logging.getLogger(__name__)
+
 TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 """Tables that each cell contributes to."""
+
+
+def simulated_tables(
+    cells: Sequence[Cell],
+    seed: int,
+    keep: Callable[[Cell, Replicates], object],
+) -> dict[str, pd.DataFrame]:
+    """Simulate cells one after the other; return each of `TABLES`.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    seed : int, of the study
+    keep : function that gets each cell that is estimable with its replicates
+    """
+
+    def results() -> Iterator[CellStatistics]:
+        for number, cell in enumerate(cells, 1):
+            found = simulated_statistics(cell, seed)
+            if found.replicates is not None:
+                keep(cell, found.replicates)
+            failed = found.simulated - found.converged
+            said = f"{found.simulated} replicates, {failed} not converged"
+            said = cell.estimability.reason or said
+            log.info("%d/%d %s: %s", number, len(cells), cell.name, said)
+            yield found
+
+    return tables_of(results())
+
+
+def simulate_cells(
+    cells: Sequence[Cell],
+    outputs: Mapping[str, str | Path],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Simulate cells, and write their estimates and what came of them.
+
+    Cells that are not estimable leave no estimates; the table of cells says why.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    outputs : paths of `estimates` and of each of `TABLES`
+    provenance : see `accelstudy.files.tables.origin`; its seed is that of the study
+    """
+    measured = ("estimate", "linear_estimate", "sigma_priori")
+    with parquet_writer(outputs["estimates"], ESTIMATES, provenance, measured) as write:
+        tables = simulated_tables(
+            cells,
+            provenance["seed"],
+            lambda cell, replicates: write(estimates_table(cell, replicates)),
+        )
+    for name in TABLES:
+        write_table(outputs[name], tables[name], provenance)
 
 
 def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:

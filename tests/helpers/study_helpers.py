@@ -2,7 +2,7 @@
 
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
-from accelstudy.study import results
+from accelstudy.study import tables as of_cells
 from accelstudy.study.cell import fanned_out
 from accelstudy.study.config import parse_study
 from accelstudy.study.replicates import Replicates, simulate
@@ -54,7 +54,7 @@ def plain(cell, seed):
 def simulate_cells(folder, cells, seed=1):
     """Simulate cells as a job; the paths of the estimates and the tables."""
     paths = {name: folder / f"{name}.parquet" for name in ("estimates", *TABLES)}
-    results.simulate_cells([*cells], paths, {**PROVENANCE, "seed": seed})
+    of_cells.simulate_cells([*cells], paths, {**PROVENANCE, "seed": seed})
     return paths
 
 

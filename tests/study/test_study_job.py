@@ -119,7 +119,7 @@ def left_out(snakefile, name):
     return [f"accelstudy.{room.replace('/', '.')}" for room in rooms]
 
 
-SIMULATE = "accelstudy.jobs, accelstudy.study.results"
+SIMULATE = "accelstudy.jobs, accelstudy.study.tables"
 SENSITIVITY = f"{SIMULATE}, accelstudy.study.sensitivity"
 START = "accelstudy.jobs, accelstudy.study.config, accelstudy.study.figures"
 

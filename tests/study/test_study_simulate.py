@@ -29,7 +29,7 @@ from accelstudy.files.tables import (
     read_table,
     write_table,
 )
-from accelstudy.study import results as module
+from accelstudy.study import tables as module
 from accelstudy.study.cell import memory
 from accelstudy.study.replicates import ESTIMATES
 from accelstudy.study.statistics import simulated_statistics
