@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,11 +73,16 @@ class Information:
         """Normal matrix RᵀR, (u, u)."""
         return np.asarray(self.rows.T @ self.rows)
 
+    @cached_property
+    def _root(self) -> Array | None:
+        """Errors of all parameters, (u, u), if all are estimated; None if not determined."""
+        return self.errors(range(self.rows.shape[1]))
+
     @property
     def covariance(self) -> Array:
         """Covariance matrix of all parameters, (u, u), at unit weight; NaN if not determined."""
-        errors = self.errors(range(self.rows.shape[1]))
-        return np.full_like(self.normal, np.nan) if errors is None else errors @ errors.T
+        root = self._root
+        return np.full_like(self.normal, np.nan) if root is None else root @ root.T
 
     def beside(self, unknown: int) -> Information:
         """Information on the other parameters if the first ones are unknown, too."""
@@ -172,7 +178,7 @@ class Information:
         -------
         (k,) array; NaN if the parameters are not determined
         """
-        root = self.errors(range(self.rows.shape[1]))
+        root = self._root
         if root is None:
             return np.full(len(candidates), np.nan)
         seen = candidates @ root

@@ -109,7 +109,7 @@ def simulate(
     truth *= rng.choice([-1.0, 1.0], truth.shape)  # of sensors, anywhere between typical sizes
     forces, angles = np.zeros((sessions, 0, 3)), np.zeros((sessions, 0, 2))
     last: list[Array | None] = [None] * sessions
-    going, ended = np.arange(sessions), []  # numbers of the sessions that have not ended
+    going, ended = np.arange(sessions), []
     while True:
         known, result = _known(approach, forces, angles)
         rms, n = np.array([chooser.rms(each) for each in known]), forces.shape[1]
@@ -119,21 +119,21 @@ def simulate(
             assert result is not None  # so many positions determine the model
             outcome = _outcome(chooser, rule, result, truth[going], np.flatnonzero(over))
             ended.append(outcome.set_index(going[over]).assign(kept=kept[over], positions=n))
-        if over.all():
+        further, going = np.flatnonzero(~over), going[~over]
+        if not len(going):
             break
-        left = np.flatnonzero(~over)
-        going = going[left]
-        chosen = [chooser.choose(known[i], rms[i], last[i]) for i in left]
-        # Of each session, also of one that has ended: so they do not depend on what ends when.
-        drawn = [rng.standard_normal((sessions, k))[going] for k in (3, 3, 2)]
-        taken = chooser.directions[chosen] + PLACING * drawn[0]
+        chosen = [chooser.choose(known[i], rms[i], last[i]) for i in further]
+        # Drawn for all sessions, so that those of one do not depend on when others end.
+        placing, of_force, of_angle = (rng.standard_normal((sessions, k))[going] for k in (3, 3, 2))
+        taken = chooser.directions[chosen] + PLACING * placing
         taken /= np.linalg.norm(taken, axis=1, keepdims=True)
         last, f_b = [*taken], -units.STANDARD_GRAVITY * taken[:, None]
         angle = angles_of(f_b)
-        force = MODEL.sense(f_b, truth[going]) + NOISE.sigma_force * drawn[1][:, None]
+        force = MODEL.sense(f_b, truth[going]) + NOISE.sigma_force * of_force[:, None]
         angle = angle + MODEL.reading_errors(angle, truth[going])
-        angle = angle + NOISE.sigma_angle * drawn[2][:, None]
-        forces, angles = np.hstack([forces[left], force]), np.hstack([angles[left], angle])
+        angle = angle + NOISE.sigma_angle * of_angle[:, None]
+        forces = np.hstack([forces[further], force])
+        angles = np.hstack([angles[further], angle])
     table = pd.concat(ended).sort_index()
     table[LABELS] = approach, rule, multiple, promise.accuracy
     return table

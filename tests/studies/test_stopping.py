@@ -19,7 +19,7 @@ from studies.positions.stopping import (
     summary_table,
 )
 
-SETTINGS = [*product(("gravity", "robot"), RULES, (1.0,), (0,), (250,))]
+SETTINGS = [*product(("gravity", "robot"), RULES, (1.0,), (0,), (150,))]
 
 
 @pytest.fixture(scope="module")
