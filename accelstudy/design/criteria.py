@@ -17,7 +17,6 @@ All criteria but the one with neglected effects are convex, so they have a lower
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -104,29 +103,58 @@ class Estimator:
         return np.asarray(slope)
 
 
-class Criterion(ABC):
-    """A criterion.
+@dataclass(frozen=True)
+class Criterion:
+    """The mean square of errors, or the power mean of several.
+
+    A high power stands for the larger one. It has a derivative also where two mean squares are
+    equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most. A power mean of
+    log-convex functions is log-convex, and never above the larger one, so its lower bound holds for
+    that one, too.
 
     Attributes
     ----------
     name : str
     text : str, what it minimises, for people
     estimators : tuple of Estimator, whose parameters the positions must determine
-    degree : int, of e^criterion as a function of the variances
+    power : int, of the power mean
     """
 
     name: str
     text: str
     estimators: tuple[Estimator, ...]
-    degree: int
+    power: int = 1
 
-    @abstractmethod
+    @property
+    def degree(self) -> int:
+        """Degree of e^criterion as a function of the variances."""
+        return 1
+
+    def squares(self, normal: Array) -> Array:
+        """All mean squares, (a, ...)."""
+        each = [one.squares(*one.covariances(normal)) for one in self.estimators]
+        return each[0] if len(each) == 1 else np.concatenate(each)
+
     def value(self, normal: Array) -> Array:
         """Values, (...), of normal matrices (..., u, u)."""
+        squares = self.squares(normal)
+        if len(squares) == 1:
+            return np.asarray(np.log(squares[0]))
+        logs = self.power * np.log(squares)
+        return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / self.power)
 
-    @abstractmethod
     def gradient(self, normal: Array) -> Array:
         """Derivative by a symmetric normal matrix (u, u), symmetric."""
+        errors = [one.covariances(normal) for one in self.estimators]
+        squares = [one.squares(*at) for one, at in zip(self.estimators, errors, strict=True)]
+        whole = np.concatenate(squares)
+        relative = whole / whole.max()
+        weights = relative ** (self.power - 1) / np.sum(relative**self.power) / whole.max()
+        slope, first = np.zeros_like(normal), 0
+        for one, at in zip(self.estimators, errors, strict=True):
+            slope += one.gradient(*at, weights[first : first + len(one.forms)])
+            first += len(one.forms)
+        return slope
 
     def efficiency(self, value: float, best: float) -> float:
         """Share of the positions that would suffice if the bound were reached."""
@@ -134,25 +162,30 @@ class Criterion(ABC):
 
     @property
     def convex(self) -> Criterion:
-        """A convex criterion that is never above this one."""
-        return self
+        """A convex criterion that is never above this one: that of the estimated parameters."""
+        alone = (Estimator(each.estimated, each.forms) for each in self.estimators)
+        return replace(self, estimators=tuple(alone))
 
     def bound(self, convex: float) -> float:
-        """Lower bound of this criterion, given that of `convex`."""
-        return convex
+        """Lower bound of this criterion, given that of `convex`.
+
+        What no shift of the estimates can compensate is added: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂.
+        """
+        one = self.estimators[0]
+        if not len(one.neglected):
+            return convex
+        form, (rows, columns) = one.forms[0], one._block
+        inverse = np.linalg.pinv(form[rows, columns], rcond=1e-9, hermitian=True)
+        across = form[rows, one.neglected]
+        remains = np.diag(form)[one.neglected] - np.sum(across * (inverse @ across), axis=0)
+        return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * one.variance)))
 
 
-@dataclass(frozen=True)
 class Determinant(Criterion):
     """D: the volume of the confidence ellipsoid of the estimated parameters."""
 
-    estimators: tuple[Estimator, ...]
-
-    name: str = "D"
-    text: str = "determinant of the covariance matrix of the parameters"
-
     @property
-    def degree(self) -> int:  # type: ignore[override]
+    def degree(self) -> int:
         """The determinant has one of each parameter."""
         return len(self.estimators[0].estimated)
 
@@ -163,72 +196,6 @@ class Determinant(Criterion):
     def gradient(self, normal: Array) -> Array:
         """− N⁻¹."""
         return -self.estimators[0].cofactors(normal)
-
-
-@dataclass(frozen=True)
-class MeanSquare(Criterion):
-    """A mean square of errors, or the power mean of several.
-
-    A high power stands for the larger one. It has a derivative also where two mean squares are
-    equal; where one is larger, it is below that one by ln 2 / 16, 4 %, at most. A power mean of
-    log-convex functions is log-convex, and never above the larger one, so its lower bound holds for
-    that one, too.
-
-    Attributes
-    ----------
-    name, text, estimators : see `Criterion`
-    power : int, of the power mean
-    """
-
-    name: str
-    text: str
-    estimators: tuple[Estimator, ...]
-    power: int = 1
-
-    degree = 1
-
-    def squares(self, normal: Array) -> Array:
-        """All mean squares, (a, ...)."""
-        each = [one.squares(*one.covariances(normal)) for one in self.estimators]
-        return each[0] if len(each) == 1 else np.concatenate(each)
-
-    def value(self, normal: Array) -> Array:
-        """Logarithm of the mean square, or of the power mean."""
-        squares = self.squares(normal)
-        if len(squares) == 1:
-            return np.asarray(np.log(squares[0]))
-        logs = self.power * np.log(squares)
-        return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / self.power)
-
-    def gradient(self, normal: Array) -> Array:
-        """Derivative of the logarithm."""
-        errors = [one.covariances(normal) for one in self.estimators]
-        squares = [one.squares(*at) for one, at in zip(self.estimators, errors, strict=True)]
-        whole = np.concatenate(squares)
-        relative = whole / whole.max()
-        weights = relative ** (self.power - 1) / np.sum(relative**self.power) / whole.max()
-        slope = np.zeros_like(normal)
-        for one, at in zip(self.estimators, errors, strict=True):
-            own, weights = np.split(weights, [len(one.forms)])
-            slope += one.gradient(*at, own)
-        return slope
-
-    @property
-    def convex(self) -> Criterion:
-        """The mean square of the estimated parameters."""
-        alone = (Estimator(each.estimated, each.forms) for each in self.estimators)
-        return replace(self, estimators=tuple(alone))
-
-    def bound(self, convex: float) -> float:
-        """Add the part that no shift of the estimates can compensate: W₂₂ − W₂₁ W₁₁⁻¹ W₁₂."""
-        one = self.estimators[0]
-        if not len(one.neglected):
-            return convex
-        form, (rows, columns) = one.forms[0], one._block
-        inverse = np.linalg.pinv(form[rows, columns], rcond=1e-9, hermitian=True)
-        across = form[rows, one.neglected]
-        remains = np.diag(form)[one.neglected] - np.sum(across * (inverse @ across), axis=0)
-        return float(np.log(np.exp(convex) + np.sum(np.maximum(remains, 0.0) * one.variance)))
 
 
 def get_criterion(name: str, task: Task) -> Criterion:
@@ -242,30 +209,23 @@ def get_criterion(name: str, task: Task) -> Criterion:
     places, left = np.flatnonzero(task.estimated), np.flatnonzero(~task.estimated)
     unit, angles = np.eye(len(task.names)), task.tilt_weights
     mean, own = angles.mean(axis=0)[None], np.diag(task.estimated * 1.0)[None]
-    use = "roll and pitch over the tilt range"
-    if name == "D":
-        return Determinant((Estimator(places, own),))
     if name == DISCRIMINATE:
         first, second = (task.places(effect) for effect in task.neglected)
-        return MeanSquare(
-            name,
-            "mean square of the sizes at which the two effects can be told from each other",
-            tuple(
-                Estimator(np.array([*places, *rival, one]), np.diag(unit[one])[None])
-                for mine, rival in ((first, second), (second, first))
-                for one in mine
-            ),
-        )
-    texts = {
-        "I": f"mean variance of {use}",
-        "A": "mean variance of the scaled parameters",
-        MINIMAX: "variance of roll or of pitch over the tilt range, whichever is larger",
-        ROBUST: "mean square of roll and pitch, the neglected effects included",
-    }
-    if name not in texts:
-        raise UnknownNameError("criterion", name, (*CRITERIA, ROBUST))
+        text = "mean square of the sizes at which the two effects can be told from each other"
+        pairs = [(rival, one) for mine, rival in ((first, second), (second, first)) for one in mine]
+        parts = (Estimator(np.array([*places, *r, i]), np.diag(unit[i])[None]) for r, i in pairs)
+        return Criterion(name, text, tuple(parts))
     if name == ROBUST:
-        estimator = Estimator(places, mean, left, task.neglected_sigmas**2)
-    else:
-        estimator = Estimator(places, {"I": mean, "A": own, MINIMAX: angles}[name])
-    return MeanSquare(name, texts[name], (estimator,), POWER if name == MINIMAX else 1)
+        text = "mean square of roll and pitch, the neglected effects included"
+        return Criterion(name, text, (Estimator(places, mean, left, task.neglected_sigmas**2),))
+    known: dict[str, tuple[str, Array]] = {
+        "I": ("mean variance of roll and pitch over the tilt range", mean),
+        "D": ("determinant of the covariance matrix of the parameters", own),
+        "A": ("mean variance of the scaled parameters", own),
+        MINIMAX: ("variance of roll or of pitch over the tilt range, whichever is larger", angles),
+    }
+    if name not in known:
+        raise UnknownNameError("criterion", name, (*CRITERIA, ROBUST))
+    text, forms = known[name]
+    kind = Determinant if name == "D" else Criterion
+    return kind(name, text, (Estimator(places, forms),), POWER if name == MINIMAX else 1)

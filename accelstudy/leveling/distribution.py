@@ -140,7 +140,7 @@ class TiltDistribution:
         wanted = special.ndtri(np.asarray(probabilities, dtype=float))
         start = np.log(self.approximate_quantile(special.ndtr(wanted)))
         if not self._central:
-            return np.exp(_solved(self._normal_scores, start, wanted)[0])
+            return np.exp(_solved(self._scores_with_offset, start, wanted)[0])
 
         def scores(angle: int) -> Callable[[Array], Array]:
             return lambda at: np.asarray(special.ndtri(self._exact(angle, np.exp(at))))
@@ -173,30 +173,16 @@ class TiltDistribution:
         each = np.sqrt(special.chdtri(freedom, beyond) * factor)
         return np.vstack([each, each.max(axis=0)])
 
-    def share_below(self, bounds: Array) -> Array:
-        """Shares of the errors of roll, of pitch and of the larger that are below bounds.
-
-        Parameters
-        ----------
-        bounds : (3, k) array, rad
-
-        Returns
-        -------
-        (3, k) array
-        """
-        if self._central:
-            each = [self._exact(angle, bounds[angle]) for angle in (0, 1)]
-        else:
-            each = [self._shares(self._ends(bounds[a])[:, a]).mean(axis=1) for a in (0, 1)]
-        return np.array([*each, self._share_of_both(bounds[2])])
+    def _scores_with_offset(self, at: Array) -> Array:
+        """Normal scores of the shares below bounds exp(at) of roll, of pitch and of the larger."""
+        roll, pitch, (near, far) = (self._ends(bounds) for bounds in np.exp(at))
+        ends = np.stack([roll[:, 0], pitch[:, 1], [near.max(axis=0), far.min(axis=0)]], axis=1)
+        below = self._length(ends[1]) - (self._length(ends[0]) if ends[0].any() else 0.0)
+        return np.asarray(special.ndtri(np.maximum(below, 0.0).mean(axis=2)))
 
     def _share_of_both(self, bounds: Array) -> Array:
-        """Share of the larger error that is below bounds (k,)."""
-        near, far = self._ends(bounds)
-        if not self._central:
-            both = self._shares(np.stack([near.max(axis=0), far.min(axis=0)]))
-            return np.asarray(both.mean(axis=1))
-        single = self._length(far)
+        """Share of the larger error that is below bounds (k,), without offset."""
+        single = self._length(self._ends(bounds)[1])
         both, mean = single.min(axis=0), single.mean(axis=2)
         larger, exact = both.mean(axis=1), [self._exact(angle, bounds) for angle in (0, 1)]
         for i, each in enumerate(both):
@@ -212,14 +198,6 @@ class TiltDistribution:
         half = np.sqrt(np.maximum(root, 0.0))
         far = np.where(root > 0, np.maximum((half - linear) / square, 0.0), 0.0)
         return np.stack([np.maximum((-linear - half) / square, 0.0), far])
-
-    def _shares(self, ends: Array) -> Array:
-        """Shares of y whose length is between ends (2, ..., direction)."""
-        near, far = ends
-        return np.maximum(self._length(far) - (self._length(near) if near.any() else 0.0), 0.0)
-
-    def _normal_scores(self, at: Array) -> Array:
-        return np.asarray(special.ndtri(self.share_below(np.exp(at))))
 
     @cached_property
     def _forms(self) -> tuple[Array, Array]:

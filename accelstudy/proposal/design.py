@@ -33,7 +33,6 @@ from accelstudy.basics.units import (
     to_recorded,
 )
 from accelstudy.basics.wording import amount
-from accelstudy.design.criteria import MeanSquare
 from accelstudy.design.search import rounded
 from accelstudy.design.spaces import Mountings, attitudes
 from accelstudy.drawing.style import FULL
@@ -144,7 +143,6 @@ class Design(Result):
         criterion, task = self.request.chosen, self.request.task
         if not self.request.discriminate:
             return {}
-        assert isinstance(criterion, MeanSquare)
         size = np.sqrt(noncentrality(1) * criterion.squares(task.normal(directions)))
         places = np.concatenate([task.places(effect) for effect in task.neglected])
         units = {p.name: p.unit for p in task.extended.parameters}

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import whitened_jacobian
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
@@ -223,32 +222,26 @@ def _knowledge(
     prior: Prior | None,
 ) -> tuple[Knowledge, Array]:
     """What is known so far, and parameters near it: those of the calibration if there is one."""
-    observed = campaign_observations(campaign)
-    adjustment = None if fit is None else fit.adjustment
+    problem = CalibrationProblem.of(model, approach, campaign_observations(campaign))
+    adjustment, x = None if fit is None else fit.adjustment, problem.direct.copy()
     if prior is not None:
-        adjustment = prior.calibrate(model, approach, observed)
-        start = prior.mean
+        problem = prior.beside(problem)
+        adjustment, x = problem.adjusted(), problem.direct
     elif campaign.n_positions:
-        start = initial_values(model, campaign.forces, campaign.gravity)
-    else:
-        start = model.vector({name: mean for name, (mean, _) in observed.known.items()})
+        x[0, : model.n_parameters] = initial_values(model, campaign.forces, campaign.gravity)
     if adjustment is not None and adjustment.converged[0]:
         information = Information.of_covariance(adjustment.cofactors[0])
-        known = Knowledge(information, True, float(adjustment.omega[0]), adjustment.redundancy)
+        known = Knowledge(information, float(adjustment.omega[0]), adjustment.redundancy)
         return known, adjustment.parameters[0, : model.n_parameters]
     # The raw readings at the first values of the parameters, and what is known beforehand.
-    if campaign.n_positions:
-        rows = [whitened_jacobian(model, approach, observed, start)]
-    else:
-        weights = CalibrationProblem.of(model, approach, observed).weights
-        rows = [np.diag(np.sqrt(weights))[weights > 0]]
-    if prior is not None:
-        more = rows[0].shape[1] - model.n_parameters
-        rows.append(np.pad(prior.information.rows, ((0, 0), (0, more))))
-    information = Information.of(*rows)
-    redundancy = information.conditions - rows[0].shape[1]
+    weights = problem.weights
+    before = np.diag(np.sqrt(weights)) if prior is None else np.linalg.cholesky(weights).T
+    rows = problem.rows(x) if campaign.n_positions else ()
+    information = Information.of(before[before.any(axis=1)], *rows)
     determined = campaign.n_positions == 0 and information.determined
-    return Knowledge(information, determined, 0.0 if determined else np.nan, redundancy), start
+    redundancy = information.conditions - len(before)
+    known = Knowledge(information, 0.0 if determined else np.nan, redundancy)
+    return known, x[0, : model.n_parameters]
 
 
 def _undetermined(

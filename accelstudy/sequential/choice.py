@@ -90,15 +90,18 @@ class Knowledge:
     ----------
     information : Information, at unit weight, on u' unknowns: the parameters, and what is estimated
         with them
-    determined : bool, whether all of them are
     omega : float, Ω; NaN if they are not determined
     redundancy : int, conditions, with what was known beforehand, less unknowns; negative at first
     """
 
     information: Information
-    determined: bool
     omega: float
     redundancy: int
+
+    @property
+    def determined(self) -> bool:
+        """Whether all parameters are."""
+        return not np.isnan(self.omega)
 
 
 @dataclass(frozen=True)
@@ -124,10 +127,8 @@ class Chooser:
 
     def rms(self, known: Knowledge) -> Array:
         """Rms of roll and of pitch so far, (2,), rad; infinite where it is not known."""
-        variance = (
-            float(self.variance(known.omega, known.redundancy)) if known.determined else np.inf
-        )
-        if not np.isfinite(variance):
+        variance = float(self.variance(known.omega, known.redundancy))
+        if not (known.determined and np.isfinite(variance)):
             return np.full(2, np.inf)
         u = len(self.error.reference)
         return self.error.rms_of_all(variance * known.information.covariance[:u, :u])
@@ -167,12 +168,9 @@ class Chooser:
             last, information = self.directions[chosen], known.information
             information = Information.of(information.rows, self.rows[chosen])
             redundancy = known.redundancy + self.rows.shape[1]
-            known = Knowledge(
-                information,
-                known.determined or information.determined,
-                variance * max(redundancy, 0),
-                redundancy,
-            )
+            determined = known.determined or information.determined
+            omega = variance * max(redundancy, 0) if determined else np.nan
+            known = Knowledge(information, omega, redundancy)
             rms = self.rms(known)
             if self.promise.reached(rms):
                 return n

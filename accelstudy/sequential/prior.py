@@ -7,11 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from accelstudy.adjustment import Adjustment, Observations
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.approaches import Approach
 from accelstudy.design.information import Information
-from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
@@ -40,17 +37,11 @@ class Prior:
         """
         return cls(np.asarray(mean, dtype=float), Information.of_covariance(covariance))
 
-    def calibrate(
-        self, model: SensorModel, approach: Approach, observed: Observations
-    ) -> Adjustment:
-        """Calibrate sessions, as `accelstudy.adjustment.calibrate`, together with what is known.
-
-        The sessions may have no positions yet.
-        """
-        problem = CalibrationProblem.of(model, approach, observed)
-        of_model = slice(model.n_parameters)
+    def beside(self, problem: CalibrationProblem) -> CalibrationProblem:
+        """The problem of sessions together with what is known; they may have no positions yet."""
+        of_model = slice(len(self.mean))
         # Observed gravity, and 0 ± 1 of errors that angles share, are known beforehand, too.
         weights, direct = np.diag(problem.weights), problem.direct.copy()
         weights[of_model, of_model] = self.information.normal
         direct[:, of_model] = self.mean
-        return replace(problem, initial=direct, direct=direct, weights=weights).adjusted()
+        return replace(problem, initial=direct, direct=direct, weights=weights)

@@ -152,9 +152,9 @@ def _known(
     for i, of_readings in enumerate(rows):
         if result is not None and result.converged[i]:
             information = Information.of_covariance(result.cofactors[i])
-            known.append(choice.Knowledge(information, True, float(result.omega[i]), redundancy))
+            known.append(choice.Knowledge(information, float(result.omega[i]), redundancy))
         else:
-            known.append(choice.Knowledge(Information.of(of_readings), False, np.nan, redundancy))
+            known.append(choice.Knowledge(Information.of(of_readings), np.nan, redundancy))
     return known, result
 
 

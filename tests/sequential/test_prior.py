@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from accelstudy.adjustment import calibrate, gauss_helmert
+from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.schemes import get_scheme
@@ -22,6 +23,10 @@ def converged_to_the_end(monkeypatch):
     monkeypatch.setattr(gauss_helmert, "STEP_TOLERANCE", 1e-11)
 
 
+def adjusted(prior, model, approach, so_far):
+    return prior.beside(CalibrationProblem.of(model, approach, so_far)).adjusted()
+
+
 def observed(model, sessions=SESSIONS):
     order = np.random.default_rng(1).permutation(N)
     ideal = session(model, model.vector(VALUES), get_scheme(f"fibonacci-{N}").directions[order])
@@ -33,7 +38,7 @@ def test_a_factory_calibration_is_observations_of_the_parameters(n):
     so_far = observed(NINE).take(np.arange(n))
     mean = NINE.vector({"b_x": 0.04, "s_x": 1e-4})
     sigma = np.repeat([0.02, 1e-3, 2e-3], 3)
-    found = Prior.of_covariance(mean, np.diag(sigma**2)).calibrate(NINE, GRAVITY, so_far)
+    found = adjusted(Prior.of_covariance(mean, np.diag(sigma**2)), NINE, GRAVITY, so_far)
     assert found.redundancy == n
     assert found.converged.all()
     if n == 0:  # and nothing else is known
@@ -62,7 +67,7 @@ def test_a_covariance_matrix_says_more_than_its_sigmas():
     alone = observed(model, sessions=1)
     first = calibrate(model, approach, alone.take(np.arange(12)))
     earlier = Prior.of_covariance(first.parameters[0], first.cofactors[0])
-    later = earlier.calibrate(model, approach, alone.take(np.arange(12, N)))
+    later = adjusted(earlier, model, approach, alone.take(np.arange(12, N)))
     whole = calibrate(model, approach, alone)
     sigma = np.sqrt(np.diagonal(whole.cofactors[0]))
     # The same but for the place at which the first half is linearised.

@@ -75,7 +75,7 @@ def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
 
 
 def known(rows, determined):
-    return Knowledge(Information.of(rows), determined, np.nan, len(rows) - 9)
+    return Knowledge(Information.of(rows), 0.0 if determined else np.nan, len(rows) - 9)
 
 
 def test_of_positions_that_are_as_good_the_first_is_chosen():
