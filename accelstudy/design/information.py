@@ -292,8 +292,3 @@ def position_rows(
     at = conditions.linearise(x, observed.T[:, None], force.T[:, None])
     rows = whitened_design(at, variance.T)[:, :, 0]
     return np.ascontiguousarray(rows.transpose(2, 0, 1))
-
-
-def information(rows: Array) -> Array:
-    """Normal matrices RᵀR, (k, u, u), of the rows (k, c, u) of k positions."""
-    return np.einsum("kcu,kcw->kuw", rows, rows)

@@ -13,7 +13,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
-from accelstudy.design.information import Information, information, position_rows
+from accelstudy.design.information import Information, position_rows
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, TiltError, cap_forces, tilt_error
 from accelstudy.positions.points import evenly_spread
 from accelstudy.positions.scheme import Scheme
@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 
 SPHERE = 300
 """Attitudes that stand for the whole sphere."""
-WELL_ABOVE_NOISE = 50.0
-"""Where each combination of scaled parameters shows by so much, as a root mean square over the
-positions and over the relative noise of a reading, it shows above noise without a closer look."""
 LOOKING_BACK = ("step_x", "step_y", "step_z", "order")
 
 
@@ -115,7 +112,8 @@ class Task:
 
     def informations(self, directions: ArrayLike) -> Array:
         """Scaled information of each of k positions, (k, u, u)."""
-        return information(self._rows(np.asarray(directions, dtype=float)) / self.scale)
+        rows = self._rows(np.asarray(directions, dtype=float)) / self.scale
+        return np.einsum("kcu,kcw->kuw", rows, rows)
 
     @cached_property
     def _before(self) -> Array:
@@ -185,11 +183,6 @@ class Task:
 
     def missing(self, directions: Array) -> str:
         """Why readings in positions do not determine the model; empty if they do."""
-        told = (self.information(directions).rows / self.scale)[:, self.estimated]
-        least = np.linalg.svd(told, compute_uv=False)[-1] if len(told) >= told.shape[1] else 0.0
-        noise = self.noise.sigma_force / self.gravity
-        if least > WELL_ABOVE_NOISE * noise * np.sqrt(len(directions)):
-            return ""
         measured = directions
         if self.measured is not None:
             measured = np.concatenate([self.measured, directions])

@@ -193,7 +193,7 @@ def advise(
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
         state="" if assessed is None else assessed.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
-        vague=_vague(model, known) if known.determined else (),
+        vague=_vague(model, known.information) if known.determined else (),
         noise=_noise_taken(known, campaign, trusted, noise.sigma_force),
         rms=rms if np.isfinite(rms).all() else None,
         next=directions[chooser.choose(known, rms, last)],
@@ -237,7 +237,7 @@ def _knowledge(
     weights = problem.weights
     before = np.diag(np.sqrt(weights)) if prior is None else np.linalg.cholesky(weights).T
     rows = problem.rows(x) if campaign.n_positions else ()
-    information = Information.of(before[before.any(axis=1)], *rows)
+    information = Information.of(np.asarray(before)[before.any(axis=1)], *rows)
     determined = campaign.n_positions == 0 and information.determined
     redundancy = information.conditions - len(before)
     known = Knowledge(information, 0.0 if determined else np.nan, redundancy)
@@ -248,21 +248,20 @@ def _undetermined(
     campaign: Campaign, model: SensorModel, approach: Approach, known: Knowledge
 ) -> tuple[str, ...]:
     """Parameters that the positions do not determine better than their typical size."""
-    names, rows = model.parameter_names, known.information.rows
-    sizes = typical_sizes(model, rows.shape[1])
-    sigma = np.sqrt(np.diag(Information.of(rows, np.diag(1 / sizes)).covariance))
-    vague = [n for n, s, size in zip(names, sigma, sizes, strict=False) if s > KNOWN_RATIO * size]
-    if vague or not campaign.n_positions:
-        return tuple(vague)
+    rows = known.information.rows
+    with_sizes = Information.of(rows, np.diag(1 / typical_sizes(model, rows.shape[1])))
+    hardly = _vague(model, with_sizes, KNOWN_RATIO)
+    if hardly or not campaign.n_positions:
+        return hardly
     theory = campaign_estimability(campaign, model, approach, sigma_to_show_above(campaign))
-    return tuple(name for name in theory.not_estimable if name in names)
+    return tuple(name for name in theory.not_estimable if name in model.parameter_names)
 
 
-def _vague(model: SensorModel, known: Knowledge) -> tuple[str, ...]:
-    """Parameters that are known less well than they are of any cheap sensor."""
-    names, sigma = model.parameter_names, np.sqrt(np.diag(known.information.covariance))
-    sizes = typical_sizes(model, len(names))
-    return tuple(n for n, s, size in zip(names, sigma, sizes, strict=False) if s > size)
+def _vague(model: SensorModel, information: Information, ratio: float = 1.0) -> tuple[str, ...]:
+    """Parameters whose sigma is a larger part of their size in a cheap sensor."""
+    sigma = np.sqrt(np.diag(information.covariance))[: model.n_parameters]
+    large = sigma > ratio * typical_sizes(model, model.n_parameters)
+    return tuple(np.array(model.parameter_names)[large].tolist())
 
 
 def _noise_taken(known: Knowledge, campaign: Campaign, trusted: bool, unit: float) -> NoiseTaken:

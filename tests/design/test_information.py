@@ -2,16 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from accelstudy.approaches import get_approach
-from accelstudy.design.estimability import estimability
 from accelstudy.design.information import Information, rank_of
-from accelstudy.design.task import Task
 from accelstudy.leveling.error import TiltError
-from accelstudy.positions.scheme import Scheme
-from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise
 
 RNG = np.random.default_rng(1)
 UNITS = 10.0 ** RNG.uniform(-4, 4, 8)
@@ -107,22 +100,3 @@ def test_the_tilt_error_of_draws():
     np.testing.assert_allclose(np.sqrt(squares.mean(axis=0)), tilt.rms, rtol=0.01)
     assert [*tilt.squares] == ["noise", "bent", "bumped"]
     assert Information.of(ROWS[:, :1, :2].repeat(4, 2)).tilt(error, estimated) is None
-
-
-@pytest.mark.parametrize("sigma", [2e-4, 2e-3, 0.05, 0.3])
-@pytest.mark.parametrize("approach", ["gravity", "robot"])
-def test_positions_that_need_no_closer_look_are_determined(approach, sigma):
-    """The condition alone says so of good positions; of others noise is weighed."""
-    model, noise = get_model("bias-scale-nonorthogonality"), Noise(sigma)
-    task, rng, found = Task(model, get_approach(approach), noise), np.random.default_rng(4), []
-    turn = Rotation.from_euler("xyz", [0.3, 0.5, 0.7]).as_matrix()  # away from the roll pole
-    for scatter in np.repeat([1e-4, 1e-3, 1e-2, 0.1, 1.0], 8):
-        near = np.concatenate([np.eye(3), -np.eye(3), np.eye(3)]) @ turn
-        directions = near + scatter * rng.standard_normal((9, 3))
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        scheme = Scheme("near", "near", directions, "generated", "")
-        theory = estimability(scheme, model, task.approach, noise, blur=sigma)
-        assert task.missing(directions) == theory.reason
-        found.append(theory.estimable)
-    assert any(found) or sigma == 0.3
-    assert not all(found) or approach == "robot"

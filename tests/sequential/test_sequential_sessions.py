@@ -31,27 +31,6 @@ def rows_of(approach, scheme):
 # --- the choice of a position --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("approach", ["gravity", "robot"])
-def test_the_gain_is_what_the_position_brings(approach):
-    measured = rows_of(approach, "fibonacci-12").reshape(-1, 9)
-    rows = rows_of(approach, "faces-edges-18")
-    promise = Promise(10 * MGON, 30 * GON)
-    error = promise.tilt_error(NINE)
-    weight = promise.weight(error, np.full(2, 20 * MGON))
-    so_far = measured.T @ measured
-    before = np.linalg.inv(so_far)
-    by_leveling = Information.of(measured).gain(rows, weight)
-    sizes = typical_sizes(NINE, 9)
-    information = so_far + np.diag(sizes**-2)
-    by_parameters = Information.of(measured, np.diag(1 / sizes)).gain(rows)
-    for row, leveling, parameters in zip(rows, by_leveling, by_parameters, strict=True):
-        after = np.linalg.inv(so_far + row.T @ row)
-        fall = np.mean(error.rms_of_all(before) ** 2 - error.rms_of_all(after) ** 2)
-        assert leveling == pytest.approx(fall, rel=1e-6)
-        grown = np.linalg.slogdet(information + row.T @ row)[1] - np.linalg.slogdet(information)[1]
-        assert parameters == pytest.approx(grown, rel=1e-6)
-
-
 def test_only_what_is_not_yet_accurate_enough_counts():
     promise = Promise(10.0, 30 * GON)
     error = promise.tilt_error(NINE)
