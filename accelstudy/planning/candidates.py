@@ -134,40 +134,36 @@ def in_scheme(
     """Candidates in one scheme, with each equipment, of `PLANNED_MODELS` or other models."""
     models = models or [get_model(name) for name in PLANNED_MODELS]
     for equipment in question.equipment:
-        yield from _with_equipment(question, equipment, scheme, models, request)
+        n, single = scheme.n_positions, equipment.name == "gravity"
+        tilts = cache(partial(_tilts, question, equipment, scheme, models))
+        for hold in question.holds:
+            if equipment.seconds(n, hold) > question.most_seconds:
+                continue
+            sigma = sigma_of(question, equipment, n, hold)
+            # With a single noise, errors are in proportion to it.
+            for model, tilt, redundancy in tilts(1.0 if single else sigma):
+                own = tilt.with_noise(sigma) if single else tilt
+                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy, request)
 
 
-def _with_equipment(
+def _tilts(
     question: Question,
     equipment: Equipment,
     scheme: Scheme,
     models: Sequence[SensorModel],
-    request: Request | None,
-) -> Iterator[Candidate]:
-    if equipment.reference is not None:  # the rotation between the sensors is unknown
-        models = [model for model in models if ROTATIONS & {*names_of(model)}]
-    n, single = scheme.n_positions, equipment.name == "gravity"
-
-    @cache
-    def tilts(sigma: float) -> list[tuple[SensorModel, Tilt | None, int]]:
-        """What each of the models that are checked leaves, and its redundancy."""
-        information = information_of(question, equipment, scheme.directions, sigma)
-        left = {model: information.conditions - model.n_parameters for model in models}
-        return [
-            (model, tilt_of(question, information, model, question.sizes), r)
-            for model, r in left.items()
-            if r >= LEAST_REDUNDANCY * information.conditions
-        ]
-
-    for hold in question.holds:
-        if equipment.seconds(n, hold) > question.most_seconds:
-            continue
-        sigma = sigma_of(question, equipment, n, hold)
-        # With a single noise, errors are in proportion to it.
-        for model, tilt, redundancy in tilts(1.0 if single else sigma):
-            if tilt is not None:
-                own = tilt.with_noise(sigma) if single else tilt
-                yield Candidate(equipment, model, scheme, hold, sigma, own, redundancy, request)
+    sigma: float,
+) -> list[tuple[SensorModel, Tilt, int]]:
+    """What each model leaves that is determined and checked, and its redundancy."""
+    information = information_of(question, equipment, scheme.directions, sigma)
+    found = []
+    for model in models:
+        # Beside a reference the rotation between the sensors is unknown.
+        rotated = equipment.reference is None or ROTATIONS & {*names_of(model)}
+        redundancy = information.conditions - model.n_parameters
+        if rotated and redundancy >= LEAST_REDUNDANCY * information.conditions:
+            tilt = tilt_of(question, information, model, question.sizes)
+            found += [] if tilt is None else [(model, tilt, redundancy)]
+    return found
 
 
 @cache

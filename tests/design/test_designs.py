@@ -61,15 +61,15 @@ def test_a_design_says_what_it_brings(made):
     assert f"\n        2 {rolls[1]:8.2f}" in said
 
 
-def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(made, tmp_path):
-    path, _ = made
+def test_a_design_is_made_again_to_the_bit_and_replaces_nothing(tmp_path):
+    asked = ["design", "--positions", 9, "--starts", 1, "--attitudes", "cube", "--out"]
+    path, copy = tmp_path / "mine.yaml", tmp_path / "other/mine.yaml"
+    copy.parent.mkdir()
+    succeed(*asked, path)
     before = path.read_bytes()
-    again = ["design", "--positions", 8, "--tilt-range", "30gon", "--starts", 1, "--least-angle",
-             "15gon", "--roll", "-110gon", "110gon", "--out"]  # fmt: skip
-    assert "is there already; --force replaces it" in refusal(*again, path)
+    assert "is there already; --force replaces it" in refusal(*asked, path)
     assert path.read_bytes() == before
-    copy = tmp_path / "mine.yaml"
-    succeed(*again, copy)
+    succeed(*asked, copy)
     assert copy.read_bytes() == before
     told = refusal("design", "--after", path, "--out", path, "--force")
     assert "is the input" in told

@@ -244,8 +244,8 @@ def test_orders_keep_a_drift_apart_from_the_parameters(name):
 # Families
 
 
-@given(n=st.integers(1, 500))
-@settings(deadline=None, max_examples=50)
+@given(n=st.integers(1, 300))
+@settings(deadline=None, max_examples=25)
 def test_fibonacci(n):
     found = get_scheme(f"fibonacci-{n}")
     assert found.n_positions == n
@@ -256,8 +256,8 @@ def test_fibonacci(n):
         assert angles(found.directions).min() * np.sqrt(n) > 2.5
 
 
-@given(n=st.integers(2, 500))
-@settings(deadline=None, max_examples=50)
+@given(n=st.integers(2, 300))
+@settings(deadline=None, max_examples=25)
 def test_antipodal_free(n):
     directions = get_scheme(f"antipodal-free-{n}").directions
     between_axes = np.minimum(angles(directions), np.pi - angles(directions))
