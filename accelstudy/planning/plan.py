@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import yaml
 
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -26,10 +25,10 @@ from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.candidates import Candidate
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.planning.reasons import limits
-from accelstudy.proposal.design import write_design
 from accelstudy.proposal.order import field_order
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
 SHOWN = ["equipment", "model", "scheme", "n_positions", "hold_s", "minutes"]
@@ -118,6 +117,8 @@ class Plan(Result):
 
         Angles are in mgon, whatever unit the user chose; rank is that in the table of the plan.
         """
+        import pandas as pd  # slow to import, and not needed for what is printed
+
         rows = [_row(self.answer, candidate) for candidate in self.answer.compared]
         return pd.DataFrame(rows).astype({"rank": "Int64"})
 
@@ -162,6 +163,8 @@ class Plan(Result):
 
     def _write_positions(self, path: Path) -> None:
         """Write the recommended positions as a scheme, in the order in which to take them."""
+        from accelstudy.proposal.design import write_design
+
         question, first = self.answer.question, self.answer.first
         directions = first.scheme.directions
         if first.request is not None:
