@@ -19,7 +19,7 @@ from accelstudy.basics.progress import show
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import usual_approach
-from accelstudy.campaign.of_type import SensorType, read_type
+from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import ADVICE
 from accelstudy.leveling.angles import angles_of

@@ -24,7 +24,7 @@ from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.of_type import with_type
+from accelstudy.campaign.sensor_type import with_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import CALIBRATION
 from accelstudy.leveling.error import MAX_TILT_GON

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import counted
 from accelstudy.campaign.header import COLUMNS, LogLayout
-from accelstudy.campaign.of_type import SensorType
 from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.conversion import Conversion
 
@@ -41,7 +41,7 @@ class Campaign:
     angles : (n, 2) array, rad, robot's roll and pitch; None without a robot
     sigma_angle : float, rad, of a level hold; None without a robot
     reference : ReferenceSensor, optional, which gave the angles instead of a robot
-    of_type : SensorType, optional, what other sensors of the type tell of this one
+    sensor_type : SensorType, optional, what other sensors of the type tell of this one
     n_samples : (n,) int array, optional
     sd : (n, 3) array, m/s², optional, sd of the samples within the holds
     time, temperature, vibration, yaw : (n,) arrays in s, °C, m/s², rad, optional
@@ -82,7 +82,7 @@ class Campaign:
     left_out: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
-    of_type: SensorType | None = None
+    sensor_type: SensorType | None = None
 
     def __repr__(self) -> str:
         return f"Campaign({self.name!r}, {counted(self.n_positions, 'position')})"
@@ -112,7 +112,7 @@ class Campaign:
     @property
     def prior(self) -> str | None:
         """File that tells what is known a priori; None if there is none."""
-        return None if self.of_type is None else self.of_type.file
+        return None if self.sensor_type is None else self.sensor_type.file
 
     @property
     def hold(self) -> HoldConditions:

@@ -13,7 +13,7 @@ from typing import Any
 from accelstudy.basics.errors import InputError, UnknownNameError, shown
 from accelstudy.basics.plugins import installed, label, one_line
 from accelstudy.basics.units import parse_quantity
-from accelstudy.campaign.of_type import TYPE_KEYS
+from accelstudy.campaign.sensor_type import TYPE_KEYS
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
 from accelstudy.files.reading import read_layer
 

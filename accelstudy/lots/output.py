@@ -21,7 +21,7 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import json_number, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
-from accelstudy.campaign.of_type import TYPE_FILE
+from accelstudy.campaign.sensor_type import TYPE_FILE
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
     FULL,

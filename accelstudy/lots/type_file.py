@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from accelstudy.basics.plugins import as_a_key
-from accelstudy.campaign.of_type import TYPE_FILE, TypeFile, TypicalParameter
+from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import DataSheet
 from accelstudy.files.outputs import whole_file
 from accelstudy.lots.calibrated import CalibratedLot, TypeParameter

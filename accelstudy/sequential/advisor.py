@@ -23,7 +23,7 @@ from accelstudy.campaign.calibration.fit import (
     initial_values,
     sigma_to_show_above,
 )
-from accelstudy.campaign.of_type import SensorType
+from accelstudy.campaign.sensor_type import SensorType
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.design.information import Information, position_rows
@@ -152,7 +152,7 @@ def advise(
     """
     _check(campaign, model, approach, prior is not None)
     earlier = prior if isinstance(prior, Prior) else None
-    campaign = replace(campaign, of_type=prior if isinstance(prior, SensorType) else None)
+    campaign = replace(campaign, sensor_type=prior if isinstance(prior, SensorType) else None)
     assessed = _assessed(campaign, model, approach)
     fit = None if assessed is None or earlier is not None else assessed.fit
     known, at = _knowledge(campaign, model, approach, fit, earlier)

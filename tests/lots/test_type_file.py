@@ -14,7 +14,7 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.of_type import SensorType, read_type
+from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.lots.calibrated import CalibratedLot
@@ -68,7 +68,7 @@ def test_intervals_with_a_type_hold_the_truth(scatter, types, tmp_path):
         of_type = read_type(type_of(sensors, tmp_path), MODEL)
         held = []
         for truth in draws[10:]:
-            fit = fitted(replace(measured("faces-6", truth, rng), of_type=of_type))
+            fit = fitted(replace(measured("faces-6", truth, rng), sensor_type=of_type))
             held.append(abs(fit.parameters - truth) < fit.sigmas_95 * fit.sigma)
         inside.append(np.mean(held))
     # The scatter of a type is taken at its bound: never too certain.
@@ -85,7 +85,7 @@ def test_a_type_is_an_observation_of_the_parameters():
     mean, sigma = rng.normal(0, 1e-3, 9), 10 ** rng.uniform(-4, -3, 9)
     known = dict(zip(MODEL.parameter_names, zip(mean, sigma, strict=True), strict=True))
     free, bound = (
-        fitted(one) for one in (campaign, replace(campaign, of_type=SensorType("t", 9, known)))
+        fitted(one) for one in (campaign, replace(campaign, sensor_type=SensorType("t", 9, known)))
     )
     assert bound.adjustment.redundancy == free.adjustment.redundancy + 9
     cofactors = np.linalg.inv(np.linalg.inv(free.adjustment.cofactors[0]) + np.diag(sigma**-2))
@@ -99,7 +99,7 @@ def test_a_sensor_that_is_not_of_the_type_is_refused():
     known = dict.fromkeys(MODEL.parameter_names, (0.0, 1e-3))
     other = measured("mclaren-24", np.full(9, 1e-2), rng)
     assert fitted(other).global_test.accepted
-    assert not fitted(replace(other, of_type=SensorType("t", 9, known))).global_test.accepted
+    assert not fitted(replace(other, sensor_type=SensorType("t", 9, known))).global_test.accepted
 
 
 def test_each_command_takes_a_type(tmp_path):

@@ -47,8 +47,8 @@ def calibration_document(fit: CampaignFit) -> dict[str, Any]:
         if fit.by_reference is None or campaign.reference is None
         else campaign.reference.model_dump(include={"calibration", "frame", "sigma_mps2"}),
         "type": None
-        if campaign.of_type is None
-        else {"file": campaign.of_type.file, "sensors": campaign.of_type.sensors},
+        if campaign.sensor_type is None
+        else {"file": campaign.sensor_type.file, "sensors": campaign.sensor_type.sensors},
         "axes": FRD.name,
         "unit": campaign.unit,
         "nominal": None

@@ -227,7 +227,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
 
 def _known(campaign: Campaign) -> Known:
     """What is known a priori of the parameters."""
-    return {} if campaign.of_type is None else campaign.of_type.known
+    return {} if campaign.sensor_type is None else campaign.sensor_type.known
 
 
 def least_sigma(campaign: Campaign, approach: Approach) -> float:

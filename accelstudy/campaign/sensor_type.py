@@ -103,4 +103,4 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
 
 def with_type(campaign: Campaign, path: str | Path | None, model: SensorModel) -> Campaign:
     """Campaign of a sensor whose type is known; as it is if there is no file of its type."""
-    return campaign if path is None else replace(campaign, of_type=read_type(path, model))
+    return campaign if path is None else replace(campaign, sensor_type=read_type(path, model))
