@@ -19,7 +19,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.gross_errors.recognition import check_plausible
-from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MAX_VALUE, TABLES, Header
+from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MAX_CELL, TABLES, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
@@ -33,7 +33,7 @@ Columns = Mapping[str, Sequence[Any]]
 
 MOST_NAMED = 5
 """Unknown columns of which each has a line."""
-MAX_FORCE = 1000
+MAX_GRAVITIES = 1000
 """Times gravity; a mean beyond it is no measurement."""
 _OF_HEADER = {
     "name": "name",
@@ -319,16 +319,16 @@ def _check_forces(
     """Check that forces (n, 3), m/s², can be calculated with and, if asked, that none is absurd."""
     where, gravity = f"{path}: fx, fy, fz", header.gravity.value_mps2
     norm = usual_norm(forces)
-    if not (norm > 1 / MAX_VALUE and np.max(abs(forces)) < MAX_VALUE):
+    if not (norm > 1 / MAX_CELL and np.max(abs(forces)) < MAX_CELL):
         raise InputError(
             f"{where}: their norm is about {norm:.3g} m/s², which no unit makes gravity, "
             f"{gravity:g} m/s²; correct the columns"
         )
-    absurd = np.linalg.norm(forces, axis=1) > MAX_FORCE * max(gravity, norm)
+    absurd = np.linalg.norm(forces, axis=1) > MAX_GRAVITIES * max(gravity, norm)
     if plausible and absurd.any():
         label = labels[int(np.argmax(absurd))]
         raise InputError(
-            f"{where}: {label}: more than {MAX_FORCE} times gravity; "
+            f"{where}: {label}: more than {MAX_GRAVITIES} times gravity; "
             "correct the mean, or leave out the hold"
         )
 

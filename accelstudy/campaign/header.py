@@ -43,9 +43,9 @@ Array = NDArray[np.float64]
 HEADER = "campaign.yaml"
 TABLES = ("positions.csv", "positions.parquet")
 
-MAX_VALUE = 1e12
+MAX_CELL = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""
-ANY = Range(-MAX_VALUE, MAX_VALUE)
+ANY = Range(-MAX_CELL, MAX_CELL)
 
 
 class Columns(NamedTuple):
@@ -92,7 +92,7 @@ COLUMNS = {
         ("sd_fx", "sd_fy", "sd_fz"),
         "standard deviations of the samples within the hold",
         "unit",
-        Range(0.0, MAX_VALUE),
+        Range(0.0, MAX_CELL),
     ),
     "temperature": Columns(("temperature_degC",), "mean temperature", "°C", bounds.TEMPERATURE),
     "angles": Columns(
@@ -240,12 +240,12 @@ class Header(Block):
     nominal: Nominal | None = None
     gravity: _Gravity
     sensor_noise: _SensorNoise | None = None
-    range_mps2: Annotated[Positive, Field(le=MAX_VALUE)] | None = Field(
+    range_mps2: Annotated[Positive, Field(le=MAX_CELL)] | None = Field(
         None, description="the sensor measures ± this; where it can saturate"
     )
-    resolution_mps2: (
-        Annotated[list[Annotated[NotNegative, Field(le=MAX_VALUE)]], PerAxis] | None
-    ) = Field(None, description="steps in which x, y and z are read; where rounding counts")
+    resolution_mps2: Annotated[list[Annotated[NotNegative, Field(le=MAX_CELL)]], PerAxis] | None = (
+        Field(None, description="steps in which x, y and z are read; where rounding counts")
+    )
     excluded: Annotated[list[Exclusion], Field(min_length=1)] | None = None
     robot: _Robot | None = None
     reference: ReferenceSensor | None = None
