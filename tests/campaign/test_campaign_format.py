@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -223,14 +224,12 @@ def columns(**changes):
 
     def change(folder):
         path = folder / "positions.csv"
-        rows = [line.split(",") for line in path.read_text().splitlines()]
-        table = {name: list(values) for name, *values in zip(*rows, strict=True)}
+        table = pd.read_csv(path, dtype=str)
         for name, new in changes.items():
-            old = table.pop(name, [""] * len(ROLL))
+            old = [*table.pop(name)] if name in table else [""] * len(ROLL)
             if new is not None:
-                table[name] = list(map(str, new(old)))
-        lines = [",".join(row) for row in zip(*([k, *v] for k, v in table.items()), strict=True)]
-        path.write_text("\n".join(lines) + "\n")
+                table[name] = [*map(str, new(old))]
+        table.to_csv(path, index=False)
 
     return change
 

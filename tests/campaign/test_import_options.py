@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import call, refusal, succeed
-from log_helpers import RATE, G, open_log, session, shared, write
+from log_helpers import RATE, G, open_log, session, write
+from places import DATA, needs_data
 from stand_ins import drawn
 
 from accelstudy.api.campaigns import files_of
@@ -13,18 +14,11 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, import_sensors, write_imported
+from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
-XSENS = {
-    "columns": {"fx": 1, "fy": 2, "fz": 3},
-    "time": 0,
-    "unit": "counts",
-    "scale": [1 / 414.4, 1 / 412.0, 1 / 414.6],
-    "offset": [33124, 33275, 32365],
-    "gravity": {"value_mps2": 9.81744},
-}
 SINCE_1970 = {"s": 1.7e9, "ms": 1.7e12, "us": 1_700_000_000_123_456, "ns": 17 * 10**17 + 1}
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
@@ -154,17 +148,17 @@ def test_the_figure_shows_forces_without_the_offset_that_was_found(tmp_path, tur
     assert 5 < high < 30
 
 
+@needs_data
 def test_sigma_does_not_depend_on_the_offset():
-    path = shared("imu_tk_xsens/xsens_acc.mat")
-    sigmas = []
-    for offset in (None, 32768, XSENS["offset"]):
-        settings = {k: v for k, v in XSENS.items() if k != "offset"}
-        campaign, holds = import_log(path, parse_settings(settings | {"offset": offset}))
+    path, settings = public_file("xsens-mti", DATA), import_settings("xsens-mti")
+    right, sigmas = [33124, 33275, 32365], []
+    for offset in (None, [32768], right):
+        campaign, holds = import_log(path, settings.model_copy(update={"offset": offset}))
         sigmas.append(campaign.sigma_force)
         assert holds.noise.directed
         np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), 9.8, atol=2)
         if offset is None:
-            np.testing.assert_allclose(campaign.nominal.offset, XSENS["offset"], atol=10)
+            np.testing.assert_allclose(campaign.nominal.offset, right, atol=10)
             assert any("from the positions, as none was given" in note for note in campaign.notes)
     np.testing.assert_allclose(sigmas, sigmas[0], rtol=0.01)
 

@@ -4,8 +4,6 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-import pytest
-from places import SHARED
 
 import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY
@@ -59,14 +57,6 @@ def opened(folder, forces, time=None, **options):
 
 def find_holds(log, **options):
     return detection.find_holds([log], parse_settings(options))[0]
-
-
-def shared(name):
-    """Path of public data."""
-    path = SHARED / "data" / name
-    if not path.exists():
-        pytest.skip(f"needs {path}; set ACCELSTUDY_SHARED")
-    return path
 
 
 # --- 50 numbered rows ----------------------------------------------------------------------------
