@@ -14,7 +14,7 @@ from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.data_sheets import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
-from accelstudy.effects import effect_names, get_effect
+from accelstudy.effects import get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
@@ -50,54 +50,48 @@ def effects(part):
     """Effects of a part, sensor or rig, one a line."""
     rows = [
         (f"[`{e.name}`](#{e.name})", _equation(e), len(e.parameters), e.family)
-        for e in map(get_effect, effect_names())
-        if e.part == part
+        for e in map(get_effect, EFFECTS.index[EFFECTS["part"] == part])
     ]
     return table(("effect", "what it adds", "parameters", "family"), rows)
 
 
-def each_effect():
-    """All effects, one after the other: those of the sensor, then those of the rig."""
-    parts, known = [], accelstudy.catalogue("effects")
-    for name, row in known.sort_values("part", ascending=False, kind="stable").iterrows():
-        effect = get_effect(name)
-        low, high = map(number, to_display(effect.typical, row["unit"]))
-        facts = {
-            "Adds": _equation(effect),
-            "Parameters": ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters),
-            "Typical size": f"{low} … {high} {unit_label(display_unit(row['unit']))}",
-            "Needs of each hold": row["needs"].replace(" and the ", ", "),
-            "Family": effect.family,
-        }
-        parts.append(_entry(effect, facts))
-    return page(*parts)
+def each(kind):
+    """All of a kind, one after the other."""
+    get, names, facts = KINDS[kind]
+    return page(*(_entry(thing, facts(thing)) for thing in map(get, names())))
 
 
-def noise_effects():
-    """Noise effects."""
-    parts = []
-    for effect in map(get_noise_effect, noise_effect_names()):
-        low, high = map(number, effect.typical)
-        first = effect.takes[0]
-        typical = f"{code(first.name)} is typically {low} … {high} {_unit(first.unit)}".strip()
-        parts.append(_entry(effect, {"Noise": _equation(effect), "Typical size": typical}))
-    return page(*parts)
+def _of_effect(effect):
+    unit = effect.parameters[0].unit
+    low, high = map(number, to_display(effect.typical, unit))
+    return {
+        "Adds": _equation(effect),
+        "Parameters": ", ".join(f"{p.symbol} {code(p.name)}" for p in effect.parameters),
+        "Typical size": f"{low} … {high} {unit_label(display_unit(unit))}",
+        "Needs of each hold": EFFECTS["needs"][effect.name].replace(" and the ", ", "),
+        "Family": effect.family,
+    }
 
 
-def gross_errors():
-    """Gross errors."""
-    errors = map(get_gross_error, gross_error_names())
-    return page(*(_entry(error, {"Data": _equation(error)}) for error in errors))
+def _of_noise_effect(effect):
+    first, (low, high) = effect.takes[0], map(number, effect.typical)
+    typical = f"{code(first.name)} is typically {low} … {high} {_unit(first.unit)}".strip()
+    return {"Noise": _equation(effect), "Typical size": typical}
 
 
-def approaches():
-    """Approaches."""
-    outside = {True: "roll and pitch", False: "none"}
-    return page(*(
-        _entry(one, {"Conditions per position": one.n_conditions,
-                     "Angles from outside": outside[one.uses_angles]})
-        for one in map(get_approach, approach_names())
-    ))  # fmt: skip
+def _of_approach(approach):
+    outside = "roll and pitch" if approach.uses_angles else "none"
+    return {"Conditions per position": approach.n_conditions, "Angles from outside": outside}
+
+
+EFFECTS = accelstudy.catalogue("effects").sort_values("part", ascending=False, kind="stable")
+"""Those of the sensor, then those of the rig."""
+KINDS = {
+    "effects": (get_effect, lambda: EFFECTS.index, _of_effect),
+    "noise effects": (get_noise_effect, noise_effect_names, _of_noise_effect),
+    "gross errors": (get_gross_error, gross_error_names, lambda e: {"Data": _equation(e)}),
+    "approaches": (get_approach, approach_names, _of_approach),
+}
 
 
 def models():

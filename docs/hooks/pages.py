@@ -12,10 +12,11 @@ import quotes
 import schemas
 from mkdocs.structure.files import File
 
-MODULES = (catalogue, file_formats, gallery, help_texts, quotes, schemas)
-CALL = re.compile(
-    rf"^<!-- ({'|'.join(module.__name__ for module in MODULES)})\.(\w+)\((.*)\) -->$", re.MULTILINE
-)
+MODULES = {
+    module.__name__: module
+    for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
+}
+CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
 
 
 def on_files(files, config):
@@ -31,5 +32,4 @@ def on_page_markdown(markdown, **_):
 
 def _called(call):
     module, function, arguments = call.groups()
-    (module,) = (each for each in MODULES if each.__name__ == module)
-    return getattr(module, function)(*literal_eval(f"[{arguments}]")).strip("\n")
+    return getattr(MODULES[module], function)(*literal_eval(f"[{arguments}]")).strip("\n")
