@@ -228,24 +228,20 @@ class SensorCalibration:
             return forces, share
         time = hold.column("time")
         kept = np.clip(time, 0.0, self.ranges["time_s"][1])
-        first = 0
+        part = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[:, None]
+        before_last, first = np.zeros_like(forces), 0
         for effect in self.model.effects:
             columns = slice(first, first := first + len(effect.parameters))
-            if effect.drifts:
+            if effect.drifts:  # in proportion to time
                 f, p = tuple(forces.T), tuple(self.parameters[columns])
-                then, end = (
-                    np.stack(effect.output(f, p, self.gravity, HoldConditions(time=t), np), axis=-1)
-                    for t in (time, kept)
-                )
-                change = (then - end)[..., None]
-                if any(later.last for later in self.model.effects):
-                    f_a = self.model.sensitive_force(forces, self.parameters, self.gravity, hold)
-                    change = self.model.slope_of_last(f_a, self.parameters, hold) @ change
-                forces = forces + change[..., 0]
-                share[:, 0, columns] = np.divide(
-                    kept, time, out=np.ones_like(time), where=time != 0
-                )[:, None]
-        return forces, share
+                added = np.stack(effect.output(f, p, self.gravity, hold, np), axis=-1)
+                before_last += (1 - part) * added
+                share[:, 0, columns] = part
+        change = before_last[..., None]
+        if any(effect.last for effect in self.model.effects):
+            f_a = self.model.sensitive_force(forces, self.parameters, self.gravity, hold)
+            change = self.model.slope_of_last(f_a, self.parameters, hold) @ change
+        return forces + change[..., 0], share
 
 
 class _Parameter(BaseModel):
