@@ -153,32 +153,45 @@ def level(
         _leveled(calibration, read, forces[some], hold.take(some), noise)
         for some in track([rows[i : i + ROWS] for i in range(0, len(rows), ROWS)], "leveling")
     )
+    return Leveled(read, added, _warnings(calibration, read, hold, added, mends, start is None))
+
+
+def _warnings(
+    calibration: SensorCalibration,
+    log: Log,
+    hold: HoldConditions,
+    added: pa.Table,
+    mends: bool,
+    assumes_start: bool,
+) -> tuple[str, ...]:
+    """What the user should know of the calibration and of the rows."""
     lost = added.column(0).is_null().to_numpy()
-    needs = [(effect, column) for effect, column in calibration.needs if start is None]
-    warmed = {effect for effect, column in needs if column == "temperature"}
-    timed = [effect for effect, column in needs if column == "time"]
-    end = calibration.ranges.get("time_s", [0.0, np.inf])[1]
-    late = hold.time is not None and calibration.drifts and hold.time > (1 + RANGE_MARGIN) * end
-    moved = {effect for effect, column in calibration.needs if column.startswith("step_")}
+    needs = calibration.needs
+    timed = [effect for effect, column in needs if assumes_start and column == "time"]
+    lagging = [effect for effect in timed if (effect, "temperature") in needs]
+    moved = {effect for effect, column in needs if column.startswith("step_")}
+    late = 0
+    if calibration.drifts and hold.time is not None and "time_s" in calibration.ranges:
+        late = int(np.sum(hold.time > (1 + RANGE_MARGIN) * calibration.ranges["time_s"][1]))
     warnings = lines(
         "campaign/calibration/leveling.txt.j2",
         "warnings",
         sensor=calibration,
-        log=read,
+        log=log,
         mends=mends,
-        timed=[effect for effect in timed if effect not in warmed],
-        lagging=[effect for effect in timed if effect in warmed],
+        timed=[effect for effect in timed if effect not in lagging],
+        lagging=lagging,
         moved=[effect for effect in calibration.model.effects if effect.name in moved],
-        rows=len(rows),
+        rows=len(added),
         empty=int(lost.sum()),
-        reason=_reason(calibration, read, int(np.argmax(lost))) if lost.any() else "",
+        reason=_reason(calibration, log, int(np.argmax(lost))) if lost.any() else "",
         near=pc.sum(added[NEAR_POLE]).as_py(),
         vertical=np.pi / 2,
-        after=int(np.sum(late)),
+        after=late,
         many=MANY_SIGMAS,
-        beyond=[*_beyond_ranges(calibration.ranges, read, added, hold)],
+        beyond=[*_beyond_ranges(calibration.ranges, log, added, hold)],
     )
-    return Leveled(read, added, tuple(warnings))
+    return tuple(warnings)
 
 
 def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]) -> Log:
