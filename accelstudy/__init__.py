@@ -12,12 +12,12 @@ if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it i
     from accelstudy.api.catalogues import catalogue as catalogue
     from accelstudy.api.diagnoses import Diagnosis as Diagnosis
     from accelstudy.api.logs import Log as Log
-    from accelstudy.api.lots import Lot as Lot
     from accelstudy.api.simulations import Simulation as Simulation
     from accelstudy.basics.errors import InputError as InputError
     from accelstudy.campaign.session import Campaign as Campaign
-    from accelstudy.epochs.output import Comparison as Comparison
-    from accelstudy.epochs.output import History as History
+    from accelstudy.epochs.comparison import Comparison as Comparison
+    from accelstudy.epochs.history import History as History
+    from accelstudy.lots.output import Lot as Lot
     from accelstudy.planning.plan import Plan as Plan
     from accelstudy.proposal.design import Design as Design
     from accelstudy.study.run import run_study as run_study
@@ -49,11 +49,12 @@ _NAMES = {
     "api.catalogues": "catalogue",
     "api.diagnoses": "Diagnosis",
     "api.logs": "Log",
-    "api.lots": "Lot",
     "api.simulations": "Simulation",
     "basics.errors": "InputError",
     "campaign.session": "Campaign",
-    "epochs.output": "Comparison History",
+    "epochs.comparison": "Comparison",
+    "epochs.history": "History",
+    "lots.output": "Lot",
     "planning.plan": "Plan",
     "proposal.design": "Design",
     "study.run": "run_study",

@@ -129,7 +129,7 @@ def judged(job):
             classes.setdefault(effect.name, {effect.name}).update(same)
     if case.noise is not None:
         classes = {case.noise: {NOISES[case.noise][0]}}
-    told = [found for found, _ in lot.effects] if lot.explained else []
+    told = lot.effects if lot.explained else ()
     told = [found for found in told if not found.names[0].startswith(UNNAMED)]
     right = {
         name: found for name, same in classes.items() for found in told if same & {*found.names}
@@ -146,7 +146,7 @@ def judged(job):
         "shares": [f.share_ci95[0] <= np.mean(has[n]) <= f.share_ci95[1] for n, f in right.items()
                    if kind.shares],
         "sensors": [
-            bool({*names} & classes[case.effect[0]]) for _, names, _ in lot.each()
+            bool({*one.names} & classes[case.effect[0]]) for one in lot.each
         ] if kind.shares == (1.0,) and kind.named else [],
         "oracle": same_effects(lot_oracle(asked, made).told, [*classes.values()])
                   if kind.named and len(kind.shares) == 1 and of_type and not kind.mixed else None,

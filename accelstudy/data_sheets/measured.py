@@ -18,7 +18,7 @@ from accelstudy.campaign.importing.logs import import_sensors
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
-from accelstudy.epochs.history import YEAR
+from accelstudy.epochs.course import YEAR
 from accelstudy.files.reading import read_json
 from accelstudy.files.validation import Finite, NotNegative, Number, checked
 

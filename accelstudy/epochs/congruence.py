@@ -65,7 +65,7 @@ class Test:
 
 
 @dataclass(frozen=True)
-class Epochs:
+class Differences:
     """Differences of p parameters between two epochs.
 
     Attributes
@@ -89,11 +89,12 @@ class Epochs:
         """Sigmas of the differences, (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    def of(self, chosen: Sequence[int]) -> Epochs:
+    def of(self, chosen: Sequence[int]) -> Differences:
         """Differences of some of the parameters, whatever the others do."""
         first, second = (c[np.ix_(chosen, chosen)] for c in self.covariances)
-        return Epochs(self.differences[chosen], (first, second), self.dof)
+        return Differences(self.differences[chosen], (first, second), self.dof)
 
+    @cached_property
     def test(self) -> Test:
         """Test of congruence."""
         p = len(self.differences)
@@ -125,10 +126,10 @@ class Epochs:
         needed then is taken back.
         """
         left, found = list(range(len(self.differences))), list[int]()
-        while not self.of(left).test().congruent:
+        while not self.of(left).test.congruent:
             found.append(left.pop(self._explains_most(left)))
         for i in found[:-1]:
-            if self.of(sorted([*left, i])).test().congruent:
+            if self.of(sorted([*left, i])).test.congruent:
                 left, found = sorted([*left, i]), [k for k in found if k != i]
         return tuple(sorted(found))
 
@@ -136,12 +137,13 @@ class Epochs:
         """Parameters that may have changed instead of one of `changed`."""
         others = [i for i in range(len(self.differences)) if i not in self.changed]
         kept = [[*(i for i in others if i != other), one] for other in others]
-        tests = [self.of(sorted(each)).test() for each in kept]
+        tests = [self.of(sorted(each)).test for each in kept]
         return tuple(other for other, test in zip(others, tests, strict=True) if test.congruent)
 
+    @cached_property
     def detectable(self) -> Array:
         """Changes (p,) of one parameter alone that the test finds with a probability of `POWER`."""
-        p, nu = self.test().dof
+        p, nu = self.test.dof
         return np.sqrt(noncentrality(p, nu) / np.diag(np.linalg.inv(self.covariance)))
 
     def _explains_most(self, left: Sequence[int]) -> int:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,33 @@ from accelstudy.adjustment.random_effects import RandomEffects
 from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, noncentrality, tail
 
 Array = NDArray[np.float64]
+
+YEAR = 365.25 * 86400.0
+"""s"""
+
+
+class Rate(NamedTuple):
+    """A rate per year, with its sigma, which has some degrees of freedom."""
+
+    per_year: float
+    sigma: float
+    dof: int
+
+    @property
+    def sigmas_95(self) -> float:
+        """Number of sigmas on either side that hold 95 %."""
+        return float(stats.t.isf(0.025, self.dof))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval that holds the rate with a probability of 95 %."""
+        half = self.sigmas_95 * self.sigma
+        return self.per_year - half, self.per_year + half
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a larger estimate where there is no rate."""
+        return 2 * float(stats.t.sf(abs(self.per_year) / self.sigma, self.dof))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +88,14 @@ class Course:
         return RandomEffects(self.values, self.variances, np.ones((len(self.years), 1)))
 
     @property
-    def rate(self) -> tuple[float, float]:
-        """Rate and its sigma, per year."""
-        return float(self.line.estimates[1]), float(np.sqrt(self.line.covariance[1, 1]))
-
-    @property
-    def sigmas_95(self) -> float:
-        """Number of sigmas on either side of the line that hold 95 %."""
-        return float(stats.t.isf(0.025, self.line.dof))
-
-    @property
-    def rate_interval(self) -> tuple[float, float]:
-        """Interval that holds the rate with a probability of 95 %, if sessions are independent."""
-        (rate, sigma), half = self.rate, self.sigmas_95
-        return rate - half * sigma, rate + half * sigma
+    def rate(self) -> Rate:
+        """Rate per year, if sessions are independent."""
+        variance = self.line.covariance[1, 1]
+        return Rate(float(self.line.estimates[1]), float(np.sqrt(variance)), self.line.dof)
 
     @cached_property
-    def wandering_rate(self) -> tuple[float, float]:
-        """Rate and its sigma, per year, if the parameter walks at random instead of scattering."""
+    def wandering_rate(self) -> Rate:
+        """Rate per year, if the parameter walks at random instead of scattering."""
         design, f = self.line.design, self.line.dof
         since = self.years - self.years.min()
         noise, walk = np.diag(self.variances), np.minimum.outer(since, since)
@@ -97,24 +115,12 @@ class Course:
             q = optimize.brentq(too_many, 0.0, most)
         weighted = np.linalg.solve(noise + q * walk, design).T
         covariance = np.linalg.inv(weighted @ design)
-        return float((covariance @ weighted @ self.values)[1]), float(np.sqrt(covariance[1, 1]))
-
-    @property
-    def wandering_interval(self) -> tuple[float, float]:
-        """Interval of the rate as `rate_interval`, if the parameter walks at random."""
-        (rate, sigma), half = self.wandering_rate, self.sigmas_95
-        return rate - half * sigma, rate + half * sigma
-
-    def may_wander(self, level: float) -> bool:
-        """Whether a random walk without any rate would explain it as well, at some level."""
-        rate, sigma = self.wandering_rate
-        return abs(rate) <= float(stats.t.isf(level / 2, self.line.dof)) * sigma
+        rate = float((covariance @ weighted @ self.values)[1])
+        return Rate(rate, float(np.sqrt(covariance[1, 1])), f)
 
     def p_values(self, level: float = LEVEL) -> tuple[float, float, float]:
         """Whether nothing changes, nothing drifts, and nothing scatters; exact at some level."""
-        rate, sigma = self.rate
-        drifts = 2 * float(stats.t.sf(abs(rate) / sigma, self.line.dof))
-        return self._exceeds(self.mean, level), drifts, self._exceeds(self.line, level)
+        return self._exceeds(self.mean, level), self.rate.p_value, self._exceeds(self.line, level)
 
     def found(self, level: float) -> tuple[str, ...]:
         """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""

@@ -1,136 +1,104 @@
-"""Two or more calibrations of one sensor: what changed, what drifts, and what scatters.
-
-Calibrations by different models are brought to the effects that all of them have. If one has more,
-its sensor is calibrated again without them, as another one was: noise-free readings that it would
-give in evenly spread attitudes, under the conditions of the other session, by the approach of that.
-"""
+"""Three or more calibrations of one sensor over time: what drifts, and what scatters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import calibrate
-from accelstudy.approaches import get_approach
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.wording import comma_list, counted
-from accelstudy.campaign.calibration.applying import KNOWN, USUAL, SensorCalibration
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.session import Campaign
-from accelstudy.effects import Parameter
-from accelstudy.epochs.congruence import LEVEL, Epochs
-from accelstudy.epochs.course import Course
-from accelstudy.leveling.angles import angles_of
-from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
-from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.models import compose, composition_name
-from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise
+from accelstudy.basics.units import GON, MGON, to_display
+from accelstudy.basics.wording import counted
+from accelstudy.campaign.calibration.applying import SensorCalibration
+from accelstudy.drawing.style import FULL, group_colour, group_of
+from accelstudy.epochs.calibrations import (
+    STATES,
+    Calibrations,
+    change_text,
+    largest_texts,
+    size_text,
+)
+from accelstudy.epochs.congruence import LEVEL
+from accelstudy.epochs.course import YEAR, Course
+from accelstudy.epochs.interval import SHOWN_YEARS, Interval, interval_figure
+from accelstudy.files.outputs import HISTORY
+from accelstudy.files.parquet import write_frame
+from accelstudy.pages import lines
 
-Array = NDArray[np.float64]
-
-YEAR = 365.25 * 86400.0
-"""s"""
 MIN_CALIBRATIONS = 3
 """Calibrations of which a line leaves a degree of freedom."""
-MIN_DIFFERENCE = 1e-12
-"""rad, difference that is rounding alone."""
-POSITIONS = 60
-"""Attitudes of the calibration that leaves out effects."""
-STEP = 1e-2
-"""Step of its derivatives, of the sigmas."""
-GOLDEN = (np.sqrt(5) - 1) / 2
+LINE_POINTS = 50
+"""Points of a line."""
 
 
-@dataclass(frozen=True, eq=False)
-class History:
-    """Calibrations of one sensor in the order of time, and what they have in common.
-
-    Two of them are a comparison: what changed is told by all parameters together, with their whole
-    covariance matrices. Three or more have rates, and a scatter, of each parameter.
+class History(Calibrations):
+    """Calibrations of one sensor over time: what drifts, and what scatters.
 
     Attributes
     ----------
-    calibrations : tuple of n SensorCalibration
+    calibrations : tuple of n SensorCalibration, in the order of time
     model : SensorModel, the effects that all have
-    values : (n, p) array, SI
+    estimates : (n, p) array, SI
     covariances : (n, p, p) array
-    dates : tuple of n datetime; empty in a comparison
+    dates : tuple of n datetime
+    interval : accelstudy.epochs.interval.Interval, how long the last calibration stays good enough;
+        None if no accuracy was given
+    sensor : str, what was calibrated; None if no campaign says it
     """
 
-    calibrations: tuple[SensorCalibration, ...]
-    model: SensorModel
-    values: Array
-    covariances: Array
-    dates: tuple[datetime, ...] = ()
+    kind = HISTORY
+    size = FULL, 70.0
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters that all have."""
-        return self.model.parameters
-
-    @property
-    def dof(self) -> Array:
-        """Degrees of freedom by which the noise was estimated, (n,); inf if it is known."""
-        return np.array([one.dof for one in self.calibrations])
-
-    @property
-    def sigmas(self) -> Array:
-        """Sigmas of `values`."""
-        return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
-
-    def left_out(self, one: SensorCalibration) -> list[str]:
-        """Effects of the sensor that a calibration has, and another one lacks."""
-        common = [effect.spec for effect in self.model.effects]
-        return [spec for spec in _effects(one) if spec not in common]
-
-    @cached_property
-    def change(self) -> Epochs:
-        """The last calibration less the first, for the test of congruence."""
-        first, *_, last = self.dof.tolist()
-        covariances = self.covariances[0], self.covariances[-1]
-        return Epochs(self.values[-1] - self.values[0], covariances, (first, last))
-
-    def instead_of(self, place: int) -> list[str]:
-        """Names of parameters that may have changed instead of one that did."""
-        return [self.model.parameter_names[i] for i in self.change.instead_of(place)]
-
-    def tilt(self, tilt_range: float) -> Array:
-        """Rms by which roll and pitch differ, and that which chance would give, (2, 2), rad.
-
-        Readings are those of the sensor as it was at first; they are leveled as if it had not
-        changed, and as it is at last.
+    def __init__(
+        self,
+        calibrations: Sequence[SensorCalibration],
+        dates: Sequence[datetime],
+        wanted: tuple[float, float, float] | None = None,
+    ) -> None:
+        """Put calibrations in the order of time.
 
         Parameters
         ----------
-        tilt_range : float, rad
-        """
-        last, first = self.calibrations[-1], self.values[0]
-        g, forces = last.gravity, cap_forces(tilt_range, ATTITUDES, last.gravity)
-        hold = session_like(last, -forces / g).hold
-        error = tilt_error(self.model, first, self.model, self.values[-1], forces, g, hold)
-        by_chance = np.einsum("auw,uw->a", error.quadratic, self.change.covariance)
-        return np.sqrt(
-            [np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0), by_chance]
-        )
+        calibrations, dates : of one sensor
+        wanted : accuracy, tilt range and confidence, as in `Interval`
 
-    @cached_property
-    def years(self) -> Array:
-        """Time before the last calibration, (n,), negative."""
-        return np.array([(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates])
+        Raises
+        ------
+        InputError
+            If they are fewer than three, of one date, or cannot be brought to common effects.
+        """
+        if len(calibrations) < MIN_CALIBRATIONS:
+            raise InputError(
+                f"CALIBRATION: a history has {MIN_CALIBRATIONS} or more, not {len(calibrations)}; "
+                "`compare` takes two"
+            )
+        if len(set(dates)) < 2:
+            raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
+        super().__init__(calibrations)
+        order = sorted(range(len(dates)), key=dates.__getitem__)
+        self.calibrations = tuple(calibrations[i] for i in order)
+        self.estimates, self.covariances = self.estimates[order], self.covariances[order]
+        self.dates = tuple(dates[i] for i in order)
+        self.interval = None if wanted is None else Interval(self, *wanted)
+        sensors = (one.content["sensor"] for one in self.calibrations)
+        self.sensor: str | None = next(filter(None, sensors), None)
+        self.name = self.sensor or self.calibrations[0].content["campaign"]
 
     @cached_property
     def courses(self) -> tuple[Course, ...]:
         """Each parameter over time."""
-        variances = np.diagonal(self.covariances, axis1=1, axis2=2)
-        each = zip(self.values.T, variances.T, strict=True)
-        return tuple(Course(self.years, *parameter, self.dof) for parameter in each)
+        years = [(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates]
+        each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
+        return tuple(Course(np.array(years), *parameter, self.dof) for parameter in each)
 
     @property
     def level(self) -> float:
@@ -142,24 +110,163 @@ class History:
         """What each parameter does over time, in words, at one level for all."""
         return tuple(course.found(self.level) for course in self.courses)
 
+    @cached_property
+    def said(self) -> list[str]:
+        """What drifts and what scatters; the verdict comes first."""
+        each, level = list(zip(self.courses, self.parameters, self.found, strict=True)), self.level
+        drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
+        least = (
+            [course.detectable_rate(level) for course in self.courses],
+            [course.detectable_scatter(level) for course in self.courses],
+        )
+        return lines(
+            "epochs/wording.txt.j2",
+            "history",
+            self,
+            rates=[change_text(parameter, *course.rate[:2]) for course, parameter in drifting],
+            unsure=[
+                change_text(parameter, *course.wandering_rate[:2])
+                for course, parameter in drifting
+                if course.wandering_rate.p_value >= level
+            ],
+            scatters=[
+                f"{parameter.name} by {size_text(course.line.scatter, parameter.unit)}"
+                for course, parameter, found in each
+                if "scatters" in found
+            ],
+            others=[parameter.name for _, parameter, found in each if "changed" in found],
+            least=[largest_texts(self.parameters, sizes) for sizes in least],
+        )
 
-def compare(first: SensorCalibration, second: SensorCalibration) -> History:
-    """Compare two calibrations of one sensor, the older one first.
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of history.json, in SI but for keys that name another unit; per year."""
+        interval, level = self.interval, self.level
+        return {
+            "schema_version": 1,
+            "sensor": self.sensor,
+            "calibrations": [
+                {
+                    "campaign": one.content["campaign"],
+                    "date": date.isoformat(),
+                    "left_out": self.left_out(one),
+                }
+                for one, date in zip(self.calibrations, self.dates, strict=True)
+            ],
+            "effects": [effect.spec for effect in self.model.effects],
+            "state": STATES[not any(self.found)],
+            "level": LEVEL,
+            "parameters": [
+                {
+                    "name": parameter.name,
+                    "unit": parameter.unit,
+                    "value": float(course.line.estimates[0]),
+                    "sigma": float(np.sqrt(course.line.covariance[0, 0])),
+                    "found": found,
+                    "p_value": course.p_values(level)[0],
+                    "rate": {
+                        "per_year": course.rate.per_year,
+                        "sigma": course.rate.sigma,
+                        "ci95": course.rate.interval,
+                        "ci95_wandering": course.wandering_rate.interval,
+                        "p_value": course.rate.p_value,
+                        "detectable": course.detectable_rate(level),
+                    },
+                    "scatter": {
+                        "sd": course.line.scatter,
+                        "ci95": course.line.scatter_interval(),
+                        "p_value": course.p_values(level)[2],
+                        "detectable": course.detectable_scatter(level),
+                    },
+                }
+                for course, parameter, found in zip(
+                    self.courses, self.parameters, self.found, strict=True
+                )
+            ],
+            "interval": interval
+            and {
+                "years": interval.years,
+                "until": interval.until.date().isoformat(),
+                "accuracy_mgon": interval.accuracy / MGON,
+                "max_tilt_gon": interval.tilt_range / GON,
+                "confidence": interval.confidence,
+                "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN_YEARS],
+            },
+            "verdict": " ".join(self.said),
+        }
 
-    Raises
-    ------
-    InputError
-        As `history_of`.
-    """
-    return _in_common((first, second))
+    @cached_property
+    def values(self) -> pd.DataFrame:
+        """Value and sigma of each parameter in each calibration, as history.parquet has them."""
+        n, p = self.estimates.shape
+        return pd.DataFrame({
+            "calibration": np.repeat(np.arange(1, n + 1), p),
+            "campaign": np.repeat([one.content["campaign"] for one in self.calibrations], p),
+            "date": np.repeat([date.isoformat() for date in self.dates], p),
+            "parameter": self.model.parameter_names * n,
+            "value": self.estimates.ravel(),
+            "sigma": self.sigmas.ravel(),
+            "unit": [parameter.unit for parameter in self.parameters] * n,
+        })  # fmt: skip
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return value, rate a year and scatter of each parameter, and what was found."""
+        rows = pd.json_normalize([*self.content["parameters"]]).set_index("name")
+        rows["found"] = rows["found"].str.join(", ")
+        rates = {
+            "rate.per_year": "rate_per_year",
+            "rate.sigma": "sigma_rate",
+            "scatter.sd": "scatter",
+        }
+        return rows[["value", "sigma", *rates, "unit", "found"]].rename(columns=rates)
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy history` does."""
+        title = "Calibrations and lines with 95 % intervals; dotted: no drift found"
+        figures = {"history": lambda: self.parameters_figure(title, self._at, self._draw_line)}
+        if (interval := self.interval) is not None:
+            figures["interval"] = lambda: interval_figure(interval)
+        write_frame(folder / "history.parquet", self.values)
+        self._write(folder, figures)
+
+    @property
+    def _at(self) -> NDArray[np.datetime64]:
+        """Dates as figures take them."""
+        return np.array(self.dates, dtype="datetime64[us]")
+
+    def _draw_line(self, ax: Axes, k: int) -> None:
+        """Draw the line of a parameter over time, with the band that holds 95 %."""
+        parameter, course = self.parameters[k], self.courses[k]
+        colour, unit = group_colour(group_of(parameter.name)), parameter.unit
+        years = np.linspace(course.years[0], 0.0, LINE_POINTS)
+        design = np.column_stack([np.ones(LINE_POINTS), years])
+        between = self._at[-1] + (years * YEAR * 1e6).astype("timedelta64[us]")
+        line = to_display(design @ course.line.estimates, unit)
+        variance = np.einsum("iu,uw,iw->i", design, course.line.covariance, design)
+        half = to_display(course.rate.sigmas_95 * np.sqrt(variance), unit)
+        seen = ax.get_ylim()
+        ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
+        ax.plot(between, line, "-" if "drifts" in self.found[k] else ":", color=colour)
+        # The band of a few calibrations would dwarf them.
+        ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
+        locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
+        formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+        ax.xaxis.set(major_locator=locator, major_formatter=formatter)
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the deviation of each parameter from the first calibration, over its sigma."""
+        off = (self.estimates - self.estimates[0]) / self.sigmas
+        ax.plot(self._at, off, "o-", markersize=3, label=self.model.parameter_names)
+        ax.set(xlabel="date", ylabel="change since the first / sigma")
+        ax.legend(ncols=4)
 
 
-def follow(
+def dated(
     calibrations: Sequence[SensorCalibration],
     dates: Sequence[str | datetime],
     names: Sequence[str],
-) -> History:
-    """Follow a sensor by dates that are given, or by those of the campaigns.
+) -> list[datetime]:
+    """Dates of calibrations that are given, or those of the campaigns.
 
     Parameters
     ----------
@@ -170,7 +277,7 @@ def follow(
     Raises
     ------
     InputError
-        If a date is missing or wrong, a calibration is given twice, or as by `history_of`.
+        If a date is missing or wrong, or a calibration is given twice.
     """
     if dates and len(dates) != len(calibrations):
         raise InputError(
@@ -186,7 +293,7 @@ def follow(
             raise InputError(f"{name}: has the numbers of {same}; each counts once")
     where = [key("dates")] * len(dates) or [f"{name}: date" for name in names]
     stated = dates or [one.content["date"] for one in calibrations]
-    return history_of(calibrations, [_date(*each) for each in zip(stated, where, strict=True)])
+    return [_date(*each) for each in zip(stated, where, strict=True)]
 
 
 def _date(given: str | datetime | None, where: str) -> datetime:
@@ -201,120 +308,3 @@ def _date(given: str | datetime | None, where: str) -> datetime:
         return read_date(given)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-
-
-def history_of(calibrations: Sequence[SensorCalibration], dates: Sequence[datetime]) -> History:
-    """Put calibrations of one sensor in the order of time, and bring them to common effects.
-
-    Raises
-    ------
-    InputError
-        If they are fewer than three or of one date; if one of them has no sigmas, if they have no
-        effect in common, or if their parameters do not mean the same because the readings were
-        converted in another way. The line names the calibration by its number and its campaign.
-    """
-    if len(calibrations) < MIN_CALIBRATIONS:
-        raise InputError(
-            f"CALIBRATION: a history has {MIN_CALIBRATIONS} or more, not {len(calibrations)}; "
-            "`compare` takes two"
-        )
-    if len(set(dates)) < 2:
-        raise InputError(f"{key('dates')}: all are the same; a rate needs two dates or more")
-    unordered, order = _in_common(calibrations), sorted(range(len(dates)), key=dates.__getitem__)
-    return History(
-        tuple(calibrations[i] for i in order),
-        unordered.model,
-        unordered.values[order],
-        unordered.covariances[order],
-        tuple(dates[i] for i in order),
-    )
-
-
-def session_like(like: SensorCalibration, directions: Array) -> Campaign:
-    """Session in which gravity has some directions, under the conditions of a calibration."""
-    n, forces = len(directions), -like.gravity * directions
-    columns = {}
-    for k, (column, name) in enumerate(KNOWN.items(), start=1):
-        low, high = like.ranges.get(name, USUAL[column])
-        columns[column] = low + (high - low) * (GOLDEN * k * np.arange(n) % 1.0)
-    return Campaign(
-        "comparison",
-        np.arange(1, n + 1),
-        forces,
-        like.gravity,
-        sigma_force=Noise().sigma_force,
-        angles=angles_of(forces),
-        sigma_angle=Noise().sigma_angle,
-        yaw=np.zeros(n),
-        **columns,
-    )
-
-
-def _effects(calibration: SensorCalibration) -> list[str]:
-    """Effects of the sensor: the rig of a session stays behind."""
-    return [effect.spec for effect in calibration.model.effects if effect.part == "sensor"]
-
-
-def _in_common(calibrations: Sequence[SensorCalibration]) -> History:
-    """Bring calibrations of one sensor to the effects that all of them have."""
-    common = _effects(calibrations[0])
-    for number, one in enumerate(calibrations, start=1):
-        where = f"calibration {number} ({one.content['campaign']})"
-        if not np.isfinite(one.covariance).all():
-            raise InputError(
-                f"{where}: no sigmas; calibrate with more positions, or state the noise of the "
-                "campaign"
-            )
-        if one.content["nominal"] != calibrations[0].content["nominal"]:
-            raise InputError(
-                f"{where}: nominal: other scales or offsets from counts to m/s^2 than in the first "
-                "calibration, so their parameters do not mean the same; import both logs with the "
-                "same ones"
-            )
-        left = [spec for spec in common if spec in _effects(one)]
-        if not left:
-            raise InputError(
-                f"{where}: effects: none in common with those before: {comma_list(_effects(one))} "
-                f"here, {comma_list(common)} there"
-            )
-        common = left
-    model = compose(composition_name(compose("common", tuple(common)).effects), tuple(common))
-    fewest = sorted(calibrations, key=lambda one: len(_effects(one)))[:2]
-    values, covariances = zip(
-        *(_brought_to(one, model, fewest[one is fewest[0]]) for one in calibrations), strict=True
-    )
-    return History(tuple(calibrations), model, np.array(values), np.array(covariances))
-
-
-def _brought_to(
-    calibration: SensorCalibration, model: SensorModel, like: SensorCalibration
-) -> tuple[Array, Array]:
-    """Parameters (p,) and covariance matrix (p, p) of a model with fewer effects."""
-    own = calibration.model
-    part = compose("sensor", tuple(_effects(calibration)))
-    kept = [own.parameter_names.index(name) for name in part.parameter_names]
-    given, covariance = calibration.parameters[kept], calibration.covariance[np.ix_(kept, kept)]
-    if len(part.effects) == len(model.effects):
-        order = [part.parameter_names.index(name) for name in model.parameter_names]
-        return given[order], covariance[np.ix_(order, order)]
-    session = session_like(like, evenly_spread(POSITIONS))
-    approach = get_approach(str(like.content["approach"] or "gravity"))
-
-    def readings(parameters: Array) -> Array:
-        forces = -session.gravity * evenly_spread(POSITIONS)
-        return part.sense(forces, parameters, session.gravity, session.hold)
-
-    fit = fit_campaign(replace(session, forces=readings(given)), model, approach)
-    steps = STEP * np.sqrt(np.diag(covariance))
-    stepped = np.concatenate([given + np.diag(steps), given - np.diag(steps)])
-    angles = fit.observed.angles
-    observed = replace(
-        fit.observed,
-        forces=np.array([readings(parameters) for parameters in stepped]),
-        angles=None if angles is None else np.repeat(angles, len(stepped), axis=0),
-        initial=fit.parameters,
-    )
-    found = calibrate(model, approach, observed).parameters[:, : model.n_parameters]
-    above, below = np.split(found, 2)
-    slopes = ((above - below) / (2 * steps[:, None])).T
-    return fit.parameters, slopes @ covariance @ slopes.T

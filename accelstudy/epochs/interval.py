@@ -12,13 +12,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import optimize
 
-from accelstudy.epochs.history import YEAR, History, session_like
+from accelstudy.basics.units import shown_unit, to_display
+from accelstudy.drawing.style import COLUMN, INK, new_figure
+from accelstudy.epochs.calibrations import session_like
+from accelstudy.epochs.course import YEAR
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
+
+if TYPE_CHECKING:
+    from accelstudy.epochs.history import History
 
 Array = NDArray[np.float64]
 
@@ -28,6 +36,10 @@ MAX_YEARS = 10.0
 """Years beyond which nothing is promised."""
 SHOWN_YEARS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 """Years at which errors are told."""
+WRONG = "#C2247A"
+"""Colour of what must not be exceeded."""
+LINE_POINTS = 50
+"""Points of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +119,7 @@ class Interval:
             sessions = scatter * rng.standard_normal((len(noise) + 1, DRAWS))
             errors = np.array([each[:, k] for each in noise]) + sessions[:-1]
             per_year[:, place] = course.line.combination(scatter)[1] @ errors
-            drift[place] = course.rate[0]
+            drift[place] = course.rate.per_year
             at_once[:, place] += sessions[-2] - sessions[-1]
         parts = weights * np.mean(at_once**2, axis=0)
         dof = history.courses[0].line.dof * np.sum(parts) ** 2 / np.sum(parts**2)
@@ -122,3 +134,28 @@ def _normal(rng: np.random.Generator, covariance: Array) -> Array:
     # The symmetric root, as the signs of eigenvectors depend on the processor.
     root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root * size)
+
+
+def interval_figure(interval: Interval) -> Figure:
+    """Draw the tilt error that is not exceeded, over the time since the last calibration."""
+    figure = new_figure(COLUMN, 55)
+    ax = figure.subplots()
+    last = min(MAX_YEARS, max(1.0, 1.5 * interval.years))
+    years = np.linspace(0.0, last, LINE_POINTS)
+    error = to_display([interval.error(t) for t in years], "rad")
+    ax.plot(years, error, color=INK)
+    ax.axhline(float(error[0]), color=INK, linewidth=0.8, linestyle=":")
+    ax.annotate("a new calibration", (last, float(error[0])), (0, 2), textcoords="offset points",
+                ha="right", fontsize=7)  # fmt: skip
+    accuracy = float(to_display(interval.accuracy, "rad"))
+    ax.axhline(accuracy, color=WRONG, linewidth=0.8)
+    ax.annotate("accuracy", (0, accuracy), (2, 2), textcoords="offset points", fontsize=7,
+                color=WRONG)  # fmt: skip
+    ax.set(
+        xlabel="years since the last calibration",
+        ylabel=f"tilt error / {shown_unit('rad')}",
+        xlim=(0, last),
+        ylim=(0, 1.1 * max(float(error.max()), accuracy)),
+    )
+    ax.set_title(f"Not exceeded with {100 * interval.confidence:g} %")
+    return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -23,18 +24,13 @@ from accelstudy.basics.progress import track
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, fit_base
-from accelstudy.lots.evidence import (
-    AnythingOdds,
-    SensorEvidence,
-    is_noise,
-    mean_sensor,
-    sensor_evidence,
-    together,
-)
+from accelstudy.diagnosis.evidence.noise_tests import NOISES
+from accelstudy.lots.evidence import SensorEvidence, Tested, sensor_evidence
+from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.mixture import Anything
 from accelstudy.lots.noise import SensorNoise, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, Found, Odd, Pass
-from accelstudy.lots.sizes import TypeSizes, told
+from accelstudy.lots.passes import LEVEL, ODD, Found, Pass, SensorState
+from accelstudy.lots.sizes import Names, TypeSizes, sensor_equations, together
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
@@ -47,7 +43,7 @@ MAX_PASSES = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Lot:
+class LotDiagnosis:
     """What the model of a lot lacks.
 
     Attributes
@@ -55,15 +51,15 @@ class Lot:
     passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the lot,
         with the model and all that was found before, until nothing new is found
     model : SensorModel, with `effects`
-    effects : tuple of (Found, spec or None), in the order in which they were found
+    effects : tuple of Found, in the order in which they were found
     close : tuple of names, which come closest to what has no name
     explained : bool; if false, the sensors have something in common that no names explain
     """
 
     passes: tuple[Pass, ...]
     model: SensorModel
-    effects: tuple[tuple[Found, str | None], ...] = ()
-    close: tuple[tuple[str, ...], ...] = ()
+    effects: tuple[Found, ...] = ()
+    close: tuple[Names, ...] = ()
     explained: bool = True
 
     @property
@@ -72,12 +68,9 @@ class Lot:
         return self.passes[0].sensors
 
     @property
-    def noises(self) -> dict[str, SensorNoise | None]:
+    def noises(self) -> Sequence[SensorNoise | None]:
         """Noise of each campaign by that of the lot; None where it speaks for itself."""
-        last = self.passes[-1]
-        noises = last.noises or [None] * len(last.sensors)
-        names = [sensor.campaign for sensor in last.sensors]
-        return dict(zip(names, noises, strict=True))
+        return self.passes[-1].noises or [None] * len(self.sensors)
 
     def model_of(self, i: int) -> SensorModel:
         """Model of the type for a sensor, with its own times of what is sudden."""
@@ -100,12 +93,12 @@ class Lot:
         return "no_effect" if not self.missing else "named" if self.effects else "unknown"
 
     @property
-    def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
+    def alternatives(self) -> list[tuple[Names, float]]:
         """The most probable classes of what has no sure name, with their posterior."""
         return next((one for one in self.passes if one.missing), self.passes[-1]).alternatives
 
     @property
-    def odd(self) -> list[Odd]:
+    def odd(self) -> list[SensorState]:
         """Odd sensors, with all that was found in the model; the surest first."""
         return self.passes[-1].odd
 
@@ -114,18 +107,17 @@ class Lot:
         """Numbers of the sensors that are not odd."""
         return self.passes[-1].usual
 
-    def each(self) -> list[tuple[str, tuple[str, ...], float]]:
-        """Campaign, names of what the model lacks for it, and their posterior, for each sensor."""
-        told = {found.names[0] for found, _ in self.effects}
+    @property
+    def each(self) -> list[SensorState]:
+        """Names of what the model lacks for each sensor, and their posterior."""
+        told = {found.names[0] for found in self.effects}
+        kept = [told] * (len(self.passes) - 1) + [told | {ODD}]
         rows = []
-        for i, sensor in enumerate(self.sensors):
-            names, probability = tuple[str, ...](), 1.0
-            for k, one in enumerate(self.passes, start=1):
-                of_pass, posterior = one.each[i]
-                kept = {*told, ODD} if k == len(self.passes) else told
-                names += tuple(name for name in of_pass if name in kept)
-                probability *= posterior
-            rows.append((sensor.campaign, names, probability))
+        for states in zip(*(one.each for one in self.passes), strict=True):
+            each = zip(states, kept, strict=True)
+            names = tuple(name for state, some in each for name in state.names if name in some)
+            probability = math.prod(state.posterior for state in states)
+            rows.append(SensorState(states[0].campaign, names, probability))
         return rows
 
 
@@ -135,7 +127,7 @@ def weigh_lot(
     approach: Approach | None = None,
     seed: int = 1,
     cores: int = 1,
-) -> Lot:
+) -> LotDiagnosis:
     """Say what the model of sensors of one type lacks, by all of them together.
 
     Parameters
@@ -152,25 +144,25 @@ def weigh_lot(
         If a campaign does not determine the model, or leaves no redundancy.
     """
     with _processes(cores, len(campaigns)) as mapped:
-        sensors = _Sensors(campaigns, approach, seed, mapped)
-        n = len(campaigns)
+        sensors, n = _Sensors(campaigns, approach, seed, mapped), len(campaigns)
         passes, whole = [sensors.weighed([model] * n, model, [None] * n)], model
-        effects: list[tuple[Found, str | None]] = []
-        new = _new(passes[-1], whole, effects)
+        effects: list[Found] = []
         for _ in range(MAX_PASSES):
-            specs = passes[-1].specs(k for k, _ in new)
-            effects += [(one, specs.get(k)) for k, one in new]
-            whole = extended(whole, specs.values())
+            known = {effect.name for effect in whole.effects}
+            known |= {name for found in effects for name in found.names}
+            new = [found for found in passes[-1].found if not known & {*found.names}]
+            if not new and len(passes) > 1:
+                break
+            effects += new
+            whole = extended(whole, (found.spec for found in new if found.spec))
             if (after := sensors.again(whole, passes)) is None:
                 break
             passes.append(after)
-            if not (new := _new(after, whole, effects)):
-                break
-        nameless = any(spec is None and not is_noise(f.names[0]) for f, spec in effects)
+        nameless = any(f.spec is None and f.names[0] not in NOISES for f in effects)
         if not nameless and _explained(sensors, passes, whole, len(effects)):
-            return Lot(tuple(passes), whole, tuple(effects))
-    close = tuple(found.names for found, spec in effects if spec is not None)
-    return Lot(tuple(passes), model, close=close, explained=False)
+            return LotDiagnosis(tuple(passes), whole, tuple(effects))
+    close = tuple(found.names for found in effects if found.spec is not None)
+    return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +176,8 @@ class _Sensors:
 
     def again(self, whole: SensorModel, passes: Sequence[Pass]) -> Pass | None:
         """Weigh all sensors with what was found, and with the noise that they tell together.
+
+        None if no campaign determines the model.
 
         Parameters
         ----------
@@ -219,45 +213,53 @@ class _Sensors:
         whole : SensorModel, of their mean
         noises : of the sensors; None for one that speaks for itself
         """
-        campaigns, n = self.campaigns, len(self.campaigns)
+        n = len(self.campaigns)
         approaches, seeds = [self.approach] * n, range(self.seed, self.seed + n)
-        each = self.mapped(sensor_evidence, campaigns, models, approaches, seeds, noises)
-        sensors, anything = [], Anything()
+        each = self.mapped(sensor_evidence, self.campaigns, models, approaches, seeds, noises)
+        sensors, anything = [], Anything({})
         # What noise alone would say is most of what a sensor gives, and is not kept.
         for sensor, of_test in track(each, "evidence of the sensors", n):
             sensors.append(replace(sensor, pair_specs={}))
-            anything.add(of_test.names, of_test.odds)
+            anything.add(of_test)
 
-        def retested(i: int) -> AnythingOdds:
-            return sensor_evidence(campaigns[i], models[i], self.approach, seeds[i], noises[i])[1]
+        def retested(i: int) -> Tested:
+            return sensor_evidence(
+                self.campaigns[i], models[i], self.approach, seeds[i], noises[i]
+            )[1]
 
-        now = Pass(tuple(sensors), anything, retested, noises=tuple(noises))
+        now = Pass(tuple(sensors), anything, retested, tuple(noises))
         usual = [k for k in now.usual if models[k]]
-        mean = None
-        # What happens to each sensor at a time of its own has no mean.
-        if not any(effect.sudden for effect in whole.effects):
-            of_mean = mean_sensor(
-                [campaigns[k] for k in usual],
-                [sensors[k] for k in usual],
-                [noises[k] for k in usual],
-            )
-            if of_mean is not None:
-                of_its_own = self.seed - 1 if self.seed else n
-                with suppress(InputError):  # the positions do not determine the model
-                    measured, noise = of_mean
-                    mean, _ = sensor_evidence(measured, whole, self.approach, of_its_own, noise)
         # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
         now = replace(
             now,
             sensors=tuple(replace(sensor, shown={}) for sensor in sensors),
-            mean=mean,
+            mean=self._mean([(self.campaigns[k], sensors[k], noises[k]) for k in usual], whole),
             together=together([sensors[k] for k in usual]),
         )
         if len(usual) < 2 or not (shapes := now.strongest()):
             return now
         specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
-        each = self.mapped(told, campaigns, models, approaches, noises, [specs] * n)
-        return replace(now, sizes=TypeSizes.of(list(each), specs, usual), shapes=shapes)
+        told = self.mapped(
+            sensor_equations, self.campaigns, models, approaches, noises, [specs] * n
+        )
+        return replace(now, sizes=TypeSizes.of([*told], specs, shapes, usual))
+
+    def _mean(
+        self,
+        usual: Sequence[tuple[Campaign, SensorEvidence, SensorNoise | None]],
+        whole: SensorModel,
+    ) -> SensorEvidence | None:
+        """Evidence of the mean of usual sensors; None if there is none of their model."""
+        # What happens to each sensor at a time of its own has no mean.
+        if not usual or any(effect.sudden for effect in whole.effects):
+            return None
+        if (measured := mean_sensor(*zip(*usual, strict=True))) is None:
+            return None
+        campaign, noise = measured
+        seed = self.seed - 1 if self.seed else len(self.campaigns)
+        with suppress(InputError):  # the positions do not determine the model
+            return sensor_evidence(campaign, whole, self.approach, seed, noise)[0]
+        return None
 
 
 def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
@@ -269,32 +271,17 @@ def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
     return compose(whole.name, tuple(effects))
 
 
-def _new(
-    now: Pass, whole: SensorModel, effects: Sequence[tuple[Found, str | None]]
-) -> list[tuple[int, Found]]:
-    """What a pass found that neither the model nor an earlier pass has."""
-    known = {name for found, _ in effects for name in found.names}
-    return [
-        (k, one) for k, one in now.found if not _has(whole, one.names) and not known & {*one.names}
-    ]
-
-
-def _has(model: SensorModel, names: Sequence[str]) -> bool:
-    """Whether a model has one of some effects."""
-    return any(effect.name in names for effect in model.effects)
-
-
 def _explained(sensors: _Sensors, passes: Sequence[Pass], whole: SensorModel, known: int) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     now = passes[-1]
     while (rest := now.without_odd()).p_value < LEVEL_OF_REST:
-        best = int(np.argmax(rest.given))
-        spec = rest.specs([best])
-        if is_noise(rest.classes[best][0]) or _has(whole, rest.classes[best]):
+        best = next(iter(rest.given))
+        if best in NOISES or {effect.name for effect in whole.effects} & {*rest.classes[best]}:
             return True
-        if not spec or known >= MAX_PASSES:
+        spec = rest.spec(best)
+        if spec is None or known >= MAX_PASSES:
             return False
-        whole, known = extended(whole, spec.values()), known + 1
+        whole, known = extended(whole, [spec]), known + 1
         if (after := sensors.again(whole, passes)) is None:
             return False
         now = after

@@ -20,19 +20,19 @@ best one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.lots.sizes import OfType
+from accelstudy.lots.evidence import Tested
+from accelstudy.lots.sizes import Names, OfType
 
 Array = NDArray[np.float64]
-Names = tuple[int, ...]
 
 PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""
@@ -54,252 +54,196 @@ BLOCK = 64
 """Sensors that are integrated over the shares at once, so that memory does not follow the lot."""
 
 
-@dataclass(frozen=True)
-class Weighted:
-    """A set of effects of the lot.
-
-    Attributes
-    ----------
-    names : tuple of int, places of the effects
-    log_weight : float, log of its evidence times its prior weight
-    """
-
-    names: Names
-    log_weight: float
-
-
 @dataclass(frozen=True, eq=False)
 class Mixture:
     """The posterior of a lot.
 
     Attributes
     ----------
-    odds : (n, K) array, log odds of each sensor for each effect against nothing
-    pairs : mapping of two places, in order, to (n,) arrays of log odds of both together
-    prior : (K,) array, prior probabilities of the effects, which sum to 1
-    common : mapping of one or two places to the log odds of the mean of the sensors
-    typical : function of one or two places that gives odds with sizes of the type; None where they
-        are not known
-    sets : list of Weighted, most probable first
+    odds : mapping of each effect to (n,) array, log odds of the sensors against nothing
+    pairs : mapping of two effects to (n,) array, log odds of both together; NaN where a sensor has
+        none
+    prior : mapping of each effect to its prior probability; these sum to 1
+    common : mapping of one or two effects to the log odds that they are the same in all sensors
+    typical : mapping of one or two effects to odds with sizes of the type, where these are known
     """
 
-    odds: Array
+    odds: Mapping[str, Array]
     pairs: Mapping[Names, Array]
-    prior: Array
-    common: Mapping[Names, float]
-    typical: Callable[[Names], OfType | None]
-    sets: list[Weighted]
+    prior: Mapping[str, float]
+    common: Mapping[Names, float] = field(default_factory=dict)
+    typical: Mapping[Names, OfType] = field(default_factory=dict)
 
-    @classmethod
-    def of(
-        cls,
-        odds: Array,
-        pairs: Mapping[Names, Array],
-        prior: Array,
-        common: Mapping[Names, float] | None = None,
-        typical: Callable[[Names], OfType | None] = lambda names: None,
-    ) -> Mixture:
-        """Weigh the sets of effects, the strongest first."""
-        empty = cls(odds, pairs, prior, common or {}, typical, [])
-        k = odds.shape[1]
-        found: dict[Names, float] = {(): np.log(1 - PRIOR_MISSING) + empty._evidence(())}
-        for i in range(k):
-            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER)) + np.log(prior[i])
-            found[(i,)] = weight + empty._evidence((i,))
-        singles = sorted(((i,) for i in range(k)), key=lambda s: -found[s])[:MAX_SINGLES]
-        strongest: list[Names] = [*singles]
+    @cached_property
+    def sets(self) -> dict[Names, float]:
+        """Sets of effects of the lot with log of evidence times prior weight, strongest first."""
+        found: dict[Names, float] = {(): np.log(1 - PRIOR_MISSING) + self._evidence(())}
+        for name, prior in self.prior.items():
+            weight = np.log(PRIOR_MISSING * (1 - PRIOR_FURTHER)) + np.log(prior)
+            found[name,] = weight + self._evidence((name,))
+        singles = sorted(self.prior, key=lambda name: -found[name,])[:MAX_SINGLES]
+        strongest: list[Names] = [(name,) for name in singles]
         for size in (2, 3):
-            tried = {tuple(sorted({*s, i})) for s in strongest for (i,) in singles if i not in s}
+            tried = {_with(s, name) for s in strongest for name in singles if name not in s}
             if size == 2:
                 # What is small beside the strongest one may be nothing by itself.
                 first = strongest[:MAX_EXTENDED]
-                tried |= {tuple(sorted({*s, i})) for s in first for i in range(k) if i not in s}
-            if not tried:
-                break
-            log = np.log(PRIOR_MISSING * PRIOR_FURTHER ** (size - 1)) - np.log(
-                special.comb(k, size)
-            )
+                tried |= {_with(s, name) for s in first for name in self.prior if name not in s}
+            weight = PRIOR_MISSING * PRIOR_FURTHER ** (size - 1)
             for names in sorted(tried):
-                found[names] = log + empty._evidence(names)
+                each = np.log(special.comb(len(self.prior), size))
+                found[names] = np.log(weight) - each + self._evidence(names)
             strongest = sorted(tried, key=lambda s: -found[s])[:MAX_EXTENDED]
-        ordered = sorted(found.items(), key=lambda item: -item[1])
-        return replace(empty, sets=[Weighted(n, float(w)) for n, w in ordered])
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     @cached_property
-    def probabilities(self) -> Array:
+    def posterior(self) -> dict[Names, float]:
         """Posterior of each of `sets`."""
-        return special.softmax([one.log_weight for one in self.sets])
+        return dict(zip(self.sets, special.softmax([*self.sets.values()]).tolist(), strict=True))
 
-    @property
-    def missing(self) -> float:
-        """Posterior probability that the model of the lot lacks anything."""
-        return 1 - sum(p for one, p in zip(self.sets, self.probabilities, strict=True)
-                       if not one.names)  # fmt: skip
-
-    @cached_property
-    def of_effects(self) -> Array:
-        """Posterior probability of each effect to be one of the lot, (K,)."""
-        each = np.zeros(self.odds.shape[1])
-        for one, p in zip(self.sets, self.probabilities, strict=True):
-            each[[*one.names]] += p
-        return each
-
-    def of_any(self, places: Collection[int]) -> float:
+    def of_any(self, effects: Collection[str]) -> float:
         """Posterior probability that any of some effects is one of the lot."""
-        each = zip(self.sets, self.probabilities, strict=True)
-        return float(sum(p for one, p in each if {*one.names} & {*places}))
+        return sum(p for names, p in self.posterior.items() if {*names} & {*effects})
 
-    def share(self, k: int) -> tuple[float, float, float]:
+    def share(self, name: str) -> tuple[float, float, float]:
         """Share of the sensors that have an effect: mean, and the interval that holds 95 %."""
         grid, density = np.linspace(0, 1, 401), np.zeros(401)
-        for one, p in zip(self.sets, self.probabilities, strict=True):
-            if k in one.names and p > MIN_POSTERIOR:
-                nodes, weights = self._posterior(one.names)
+        for names, p in self.posterior.items():
+            if name in names and p > MIN_POSTERIOR:
                 # A mixture of narrow steps between the nodes of the integral.
-                place = one.names.index(k)
-                values, mass = nodes[place], weights.sum(
-                    axis=tuple(a for a in range(len(one.names)) if a != place)
-                )  # fmt: skip
-                log = np.log(np.maximum(mass / _nodes(len(one.names))[1], 1e-300))
-                fine = np.exp(np.interp(grid, values[:-1], log[:-1]))
+                nodes, weights = _nodes(len(names))
+                place = names.index(name)
+                others = tuple(axis for axis in range(len(names)) if axis != place)
+                mass = self._of_shares(names).sum(axis=others)
+                log = np.log(np.maximum(mass / weights, 1e-300))
+                fine = np.exp(np.interp(grid, nodes[:-1], log[:-1]))
                 density += p * mass[:-1].sum() * fine / fine.sum()
                 density[-1] += p * mass[-1]
         density /= density.sum()
-        below = np.cumsum(density)
-        low, high = grid[np.minimum(np.searchsorted(below, [0.025, 0.975]), 400)]
+        low, high = grid[np.minimum(np.searchsorted(np.cumsum(density), [0.025, 0.975]), 400)]
         return float(grid @ density), float(low), float(high)
 
     @cached_property
     def sensors(self) -> tuple[dict[Names, Array], Array]:
         """Posterior of each sensor to have a set of effects, {set: (n,)}, and to be odd, (n,)."""
-        n = len(self.odds)
         of_sets: dict[Names, Array] = {}
-        odd = np.zeros(n)
-        for one, p in zip(self.sets, self.probabilities, strict=True):
+        odd = np.zeros(len(self._anything))
+        for names, p in self.posterior.items():
             if p < MIN_POSTERIOR:
                 continue
-            of_set, odd_in_set = self.sensors_under(one.names)
+            of_set, odd_in_set = self.sensors_under(names)
             for subset, mass in of_set.items():
-                of_sets[subset] = of_sets.get(subset, np.zeros(n)) + p * mass
+                of_sets[subset] = of_sets.get(subset, 0.0) + p * mass
             odd += p * odd_in_set
         return of_sets, odd
 
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the model of the lot lacks some effects."""
-        weights = np.ravel(self._posterior(names)[1])
-        of_sets: dict[Names, list[Array]] = {}
-        odd = []
-        for parts, strange in self._parts(names, self._judging(names)):
-            total = np.logaddexp.reduce([*parts.values(), strange])
-            for subset, log in parts.items():
-                mass = np.exp(log - total).reshape(len(log), -1) @ weights
-                of_sets.setdefault(subset, []).append(mass)
-            odd.append(np.exp(strange - total).reshape(len(strange), -1) @ weights)
-        each = {subset: np.concatenate(masses) for subset, masses in of_sets.items()}
-        return each, np.concatenate(odd)
+        weights, each = np.ravel(self._of_shares(names)), []
+        for logs in self._contributions(names, self._judging(names)):
+            shares = np.exp(logs - np.logaddexp.reduce(logs))
+            each.append(shares.reshape(*logs.shape[:2], -1) @ weights)
+        *parts, odd = np.concatenate(each, axis=1)
+        return dict(zip(_subsets(names), parts, strict=True)), odd
 
-    def having(self, k: int) -> Array:
+    def having(self, name: str) -> Array:
         """Posterior of each sensor to have an effect, (n,)."""
-        return np.asarray(sum((p for names, p in self.sensors[0].items() if k in names),
-                              np.zeros(len(self.odds))))  # fmt: skip
+        parts = [p for names, p in self.sensors[0].items() if name in names]
+        return np.sum([np.zeros(len(self._anything)), *parts], axis=0)
 
     @cached_property
     def _anything(self) -> Array:
         """Log odds of each sensor for anything, (n,)."""
-        return np.asarray(special.logsumexp(self.odds + np.log(self.prior), axis=1))
+        weighed = [self.odds[name] + np.log(prior) for name, prior in self.prior.items()]
+        return np.asarray(special.logsumexp(weighed, axis=0))
 
-    def _judging(self, names: Names) -> Callable[[Names], Array]:
-        """Odds of subsets by which sensors and shares are judged: those that explain more."""
-        of_type = self.typical(names)
-        if of_type is None or self._typical_way(names, of_type) < self._own_way(names):
-            return self._together
-        return partial(_looked_up, of_type, names)
-
-    def _together(self, subset: Names) -> Array:
-        """Log odds of the sensors for some effects together, (n,)."""
+    def _of_own_sizes(self, subset: Names) -> Array:
+        """Log odds of the sensors for some effects together, with sizes of each sensor, (n,)."""
         if not subset:
-            return np.zeros(len(self.odds))
-        if len(subset) == 1:
-            return self.odds[:, subset[0]]
-        one, other = subset
+            return np.zeros(len(self._anything))
         # Two that were not weighed together say no more than the weaker one.
-        both = np.minimum(self.odds[:, one], self.odds[:, other])
-        found = self.pairs.get((one, other))
-        return both if found is None else np.where(np.isnan(found), both, found)
+        least = np.min([self.odds[name] for name in subset], axis=0)
+        both = self.pairs.get(subset)
+        return least if both is None else np.where(np.isnan(both), least, both)
 
-    def _parts(
-        self, names: Names, odds_of: Callable[[Names], Array]
-    ) -> Iterator[tuple[dict[Names, Array], Array]]:
-        """Log of what each subset, and oddness, contributes: (b, nodes ...) arrays, b sensors."""
-        size = len(names)
-        nodes = (len(_nodes(size)[0]),) * size
-        rho = np.meshgrid(*[_nodes(size)[0]] * size, indexing="ij") if size else []
-        prior = {}
-        for subset in (s for r in range(min(size, 2) + 1) for s in combinations(names, r)):
-            prior[subset] = np.full(nodes, np.log(1 - PRIOR_ODD))
-            for place, i in enumerate(names):
-                prior[subset] += np.log(rho[place]) if i in subset else _log_of_rest(rho[place])
-        odds = {subset: odds_of(subset) for subset in prior}
-        for first in range(0, len(self.odds), BLOCK):
-            some = slice(first, first + BLOCK)
-            parts = {s: odds[s][some].reshape(-1, *[1] * size) + prior[s] for s in prior}
-            strange = (np.log(PRIOR_ODD) + self._anything[some]).reshape(-1, *[1] * size)
-            yield parts, np.broadcast_to(strange, (len(strange), *nodes))
+    def _contributions(self, names: Names, odds_of: Callable[[Names], Array]) -> Iterator[Array]:
+        """Log of what each of `_subsets`, and oddness, contributes: (s + 1, b, nodes ...) arrays.
+
+        Each is of b sensors.
+        """
+        nodes, size = _nodes(len(names))[0], len(names)
+        shares = dict(zip(names, np.meshgrid(*[nodes] * size, indexing="ij"), strict=True))
+        priors = [
+            sum(
+                (np.log(rho) if name in subset else _log_of_rest(rho)
+                 for name, rho in shares.items()),
+                np.full((len(nodes),) * size, np.log(1 - PRIOR_ODD)),
+            )
+            for subset in _subsets(names)
+        ]  # fmt: skip
+        prior = np.array([*priors, np.full_like(priors[0], np.log(PRIOR_ODD))])[:, None]
+        odds = np.array([*map(odds_of, _subsets(names)), self._anything])
+        for first in range(0, odds.shape[1], BLOCK):
+            some = odds[:, first : first + BLOCK]
+            yield some.reshape(*some.shape, *[1] * size) + prior
 
     def _log_likelihood(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
-        each = (
-            np.logaddexp.reduce([*parts.values(), strange]).sum(axis=0)
-            for parts, strange in self._parts(names, odds_of)
-        )
-        return np.asarray(sum(each))
+        """Log likelihood of shares times their prior weights, (nodes ...)."""
+        each = self._contributions(names, odds_of)
+        logs = sum(np.logaddexp.reduce(logs).sum(axis=0) for logs in each)
+        return np.asarray(logs + _log_weights(len(names)))
 
     def _evidence(self, names: Names) -> float:
         """Log evidence of effects: with sizes of each sensor, or of the type."""
-        own, of_type = self._own_way(names), self.typical(names)
-        if of_type is not None:
-            alike = self._typical_way(names, of_type)
+        own = self._of_own(names)
+        if names in self.typical:
+            alike = self._of_typical(names)
         elif names in self.common:
             alike = self.common[names]
         else:
             return own
         return float(np.logaddexp(own + np.log(1 - PRIOR_EQUAL), alike + np.log(PRIOR_EQUAL)))
 
-    def _own_way(self, names: Names) -> float:
+    def _of_own(self, names: Names) -> float:
         """Log evidence with sizes of each sensor."""
-        logs = self._log_likelihood(names, self._together)
-        return float(special.logsumexp(logs + _log_weights(len(names))))
+        return float(special.logsumexp(self._log_likelihood(names, self._of_own_sizes)))
 
-    def _typical_way(self, names: Names, of_type: OfType) -> float:
+    def _of_typical(self, names: Names) -> float:
         """Log evidence with sizes of the type."""
-        logs = self._log_likelihood(names, partial(_looked_up, of_type, names))
+        of_type = self.typical[names]
+        whole = special.logsumexp(self._log_likelihood(names, of_type.odds.__getitem__))
         if names in self.common:
-            fitted = self.common[names] - of_type.alike
-        else:
-            fitted = 0.0
-            for k in names:
-                one = self.typical((k,))
-                fitted += self.common.get((k,), -np.inf) - (0.0 if one is None else one.alike)
-        return float(special.logsumexp(logs + _log_weights(len(names)))) + fitted
+            return float(whole + self.common[names] - of_type.alike)
+        for name in names:
+            alone = self.typical.get((name,))
+            whole += self.common.get((name,), -np.inf) - (alone.alike if alone else 0.0)
+        return float(whole)
 
-    def _posterior(self, names: Names) -> tuple[list[Array], Array]:
-        """Nodes of each share, and their posterior probabilities (nodes ...)."""
-        logs = self._log_likelihood(names, self._judging(names)) + _log_weights(len(names))
-        return [_nodes(len(names))[0]] * len(names), np.exp(logs - special.logsumexp(logs))
+    def _judging(self, names: Names) -> Callable[[Names], Array]:
+        """Odds of subsets by which sensors and shares are judged: those that explain more."""
+        if names in self.typical and self._of_typical(names) >= self._of_own(names):
+            return self.typical[names].odds.__getitem__
+        return self._of_own_sizes
+
+    def _of_shares(self, names: Names) -> Array:
+        """Posterior probabilities of the nodes of each share, (nodes ...)."""
+        return np.asarray(special.softmax(self._log_likelihood(names, self._judging(names))))
 
 
-def _looked_up(of_type: OfType, names: Names, subset: Names) -> Array:
-    """Log odds of the sensors for a subset of a set, with sizes of the type, (n,)."""
-    if not subset:
-        return np.zeros(len(next(iter(of_type.odds.values()))))
-    return of_type.odds[tuple(names.index(k) for k in subset)]
+def _with(names: Names, name: str) -> Names:
+    """Set with one effect more."""
+    return tuple(sorted([*names, name]))
+
+
+def _subsets(names: Names) -> list[Names]:
+    """What a sensor may have of some effects: at most two."""
+    return [s for r in range(min(len(names), 2) + 1) for s in combinations(names, r)]
 
 
 @cache
 def _nodes(size: int) -> tuple[Array, Array]:
-    """Nodes and weights of the integral over a share."""
-    if not size:
-        return np.zeros(0), np.zeros(0)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES[size])
+    """Nodes and weights of the integral over a share, if there are `size` of them."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES[size]) if size else np.zeros((2, 0))
     return np.append((nodes + 1) / 2, 1.0), np.append((1 - PRIOR_ALL) * weights / 2, PRIOR_ALL)
 
 
@@ -311,13 +255,13 @@ def _log_of_rest(share: Array) -> Array:
 
 @cache
 def _log_weights(size: int) -> Array:
+    """Log of prior weights of the nodes of all shares, (nodes ...)."""
     weights = np.ones(())
     for _ in range(size):
         weights = np.multiply.outer(weights, _nodes(size)[1])
     return np.asarray(np.log(weights))
 
 
-@dataclass(frozen=True)
 class Anything:
     """The test whether anything is missing in a lot, to which sensors are added one by one.
 
@@ -330,26 +274,15 @@ class Anything:
         and in s lots of noise
     """
 
-    logs: dict[str, Array] = field(default_factory=dict)
+    def __init__(self, logs: Mapping[str, Array]) -> None:
+        self.logs = dict(logs)
 
-    def add(self, names: Iterable[str], odds: NDArray[np.floating]) -> None:
-        """Add what a sensor says.
-
-        Parameters
-        ----------
-        names : K, of what is tested
-        odds : (1 + s, K) array, their log odds in the campaign, and in noise alone
-        """
-        for name, log in _of_shares(names, odds):
-            self.logs[name] = self.logs.get(name, 0.0) + log
-
-    def without(self, each: Iterable[tuple[Iterable[str], NDArray[np.floating]]]) -> Anything:
-        """Return the test without some sensors, of which it is given what was added."""
-        logs = dict(self.logs)
-        for names, odds in each:
-            for name, log in _of_shares(names, odds):
-                logs[name] = logs[name] - log
-        return Anything(logs)
+    def add(self, sensor: Tested, sign: float = 1.0) -> None:
+        """Add what a sensor says; or take it away."""
+        nodes, _ = _nodes(2)
+        for name, odds in sensor.items():
+            log = np.logaddexp(_log_of_rest(nodes), odds[:, None] + np.log(nodes))
+            self.logs[name] = self.logs.get(name, 0.0) + sign * log
 
     def p_value(self, weights: Mapping[str, float]) -> float:
         """Probability that sensors without anything missing would show as much evidence.
@@ -367,10 +300,3 @@ class Anything:
         ]
         total = special.logsumexp(np.array(by_effect) + np.log(prior)[:, None], axis=0)
         return float((1 + np.sum(total[1:] >= total[0])) / len(total))
-
-
-def _of_shares(names: Iterable[str], odds: NDArray[np.floating]) -> Iterator[tuple[str, Array]]:
-    """Log likelihood of each share in a sensor, (1 + s, nodes), of what is tested."""
-    nodes, _ = _nodes(2)
-    for name, column in zip(names, odds.T, strict=True):
-        yield name, np.logaddexp(_log_of_rest(nodes), column[:, None] + np.log(nodes))

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +42,8 @@ NOISE_TOLERANCE = 0.02
 """Relative change below which the noise of a lot is found."""
 MAX_REFITS = 8
 """Most calibrations of all sensors for it."""
+STATED, WITHIN, NOTHING = "stated", "within holds", "nothing"
+"""What tells the noise of a campaign by itself."""
 
 
 @dataclass(frozen=True)
@@ -76,25 +77,11 @@ def with_noise(campaign: Campaign, noise: SensorNoise | None) -> Campaign:
     return campaign if noise is None else replace(campaign, sigma_force=noise.sigma, sigma_dof=None)
 
 
-class Source(Enum):
-    """What tells the noise of a campaign by itself."""
-
-    STATED = 1
-    WITHIN = 2
-    NOTHING = 3
-
-    @classmethod
-    def of(cls, fit: BaseFit) -> Source:
-        """Source of the noise of a calibration."""
-        if fit.level.known:
-            return cls.STATED
-        return cls.NOTHING if fit.within is None else cls.WITHIN
-
-    def sigma(self, fit: BaseFit) -> float:
-        """Sigma u that a campaign says, m/s²."""
-        if self is Source.STATED:
-            return fit.sigma
-        return 1.0 if fit.within is None else float(np.sqrt(np.mean(fit.within)))
+def stated_sigma(fit: BaseFit) -> tuple[str, float]:
+    """Return what tells the noise of a campaign by itself, and the sigma that it says, m/s²."""
+    if fit.level.known:
+        return STATED, fit.sigma
+    return (NOTHING, 1.0) if fit.within is None else (WITHIN, float(np.sqrt(np.mean(fit.within))))
 
 
 @dataclass(frozen=True)
@@ -167,23 +154,20 @@ def noises_of_lot(
         None for sensors that speak for themselves, as their noise has nothing in common.
     """
     noises: list[SensorNoise | None] = [None] * len(fits)
-    for source in Source:
-        group = {
-            i: fit for i, fit in enumerate(fits) if fit is not None and Source.of(fit) is source
-        }
+    for source in (STATED, WITHIN, NOTHING):
+        group = {i: fit for i, fit in enumerate(fits) if fit and stated_sigma(fit)[0] == source}
         if len(group) < MIN_SENSORS:
             continue
-        agreement, said = _agreement(group, source, refit)
+        agreement, said = _agreement(group, 0.0 if source == NOTHING else ODD_SHARE, refit)
         if agreement.freedom > RULES.freedom_doubted:
             for i, u in zip(group, said.tolist(), strict=True):
-                noises[i] = SensorNoise(
-                    agreement.factor * u, agreement.freedom, said=source is not Source.NOTHING
-                )
+                sigma = agreement.factor * u
+                noises[i] = SensorNoise(sigma, agreement.freedom, said=source != NOTHING)
     return noises
 
 
 def _agreement(
-    group: dict[int, BaseFit], source: Source, refit: Callable[[int, float], BaseFit | None]
+    group: dict[int, BaseFit], odd_share: float, refit: Callable[[int, float], BaseFit | None]
 ) -> tuple[Agreement, Array]:
     """Find how some sensors agree in noise, and of which sigmas their noise is a multiple.
 
@@ -195,21 +179,20 @@ def _agreement(
     def agreement(fits: Sequence[BaseFit], said: Array) -> Agreement:
         sigmas = np.maximum([fit.sigma_posteriori for fit in fits], LEAST_SIGMA)
         redundancies = np.array([fit.solution.redundancy for fit in fits])
-        share = 0.0 if source is Source.NOTHING else ODD_SHARE
-        return Agreement.of(sigmas, redundancies, said, share)
+        return Agreement.of(sigmas, redundancies, said, odd_share)
 
     fits = list(group.values())
-    said = np.array([source.sigma(fit) for fit in fits])
-    now, same = agreement(fits, said), agreement(fits, np.ones(len(fits)))
+    said, equal = np.array([stated_sigma(fit)[1] for fit in fits]), np.ones(len(fits))
+    now, same = agreement(fits, said), agreement(fits, equal)
     if same.log_likelihood > now.log_likelihood + MIN_LOG_RATIO:
-        now, said = same, np.ones(len(fits))
+        now, said = same, equal
     before = None
     beside = any(fit.solution.approach.uses_angles for fit in fits)
     for _ in range(MAX_REFITS if beside else 0):
         factor = now.factor
-        again = [refit(i, factor * u) for i, u in zip(group, said.tolist(), strict=True)]
-        there = np.array([one is not None for one in again])
-        now = agreement([one for one in again if one is not None], said[there])
+        again = {k: refit(i, float(factor * said[k])) for k, i in enumerate(group)}
+        there = {k: fit for k, fit in again.items() if fit is not None}
+        now = agreement([*there.values()], said[[*there]])
         off = float(np.log(now.factor / factor))
         if abs(off) < NOISE_TOLERANCE:
             break

@@ -1,27 +1,43 @@
-"""What a lot writes: JSON, the model of the type, a figure and a page."""
+"""A lot: what the model of its type lacks, a calibration of each sensor, and what it writes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from operator import itemgetter
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+import accelstudy
+from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggested
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import path_name
+from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
-from accelstudy.basics.wording import probability
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import json_number, write_json
-from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.basics.wording import comma_list, probability
+from accelstudy.campaign.batch.config import BatchConfig
+from accelstudy.campaign.batch.run import campaign_of
+from accelstudy.campaign.calibration.assessment import assess, tilt_left
+from accelstudy.campaign.calibration.document import json_content, write_json
+from accelstudy.campaign.calibration.fit import (
+    CampaignFit,
+    JudgedNoise,
+    fit_campaign,
+    usual_approach,
+)
 from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
 from accelstudy.campaign.sensor_type import TYPE_FILE
+from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import (
     FULL,
@@ -33,38 +49,358 @@ from accelstudy.drawing.style import (
     say_empty,
     symbol,
 )
-from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.lots.calibrated import CalibratedLot, TypeParameter
+from accelstudy.files.outputs import LOT, result_folder
+from accelstudy.leveling.error import (
+    ATTITUDES,
+    MAX_TILT_GON,
+    cap_forces,
+    holds_in_use,
+    tilt_error,
+)
 from accelstudy.lots.evidence import shown
-from accelstudy.lots.passes import LEVEL
+from accelstudy.lots.lot import LotDiagnosis, weigh_lot
+from accelstudy.lots.parameters import TypeParameter
+from accelstudy.lots.passes import LEVEL, Found
 from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
+from accelstudy.pages.result import Result
+from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 EACH = "each"
 """Folder of the calibrations of the sensors."""
+MIN_SENSORS = 2
+"""Sensors of the smallest lot."""
+EFFECT_KEYS = ("names", "posterior", "share", "share_ci95")
+PARAMETER_KEYS = ("name", "mean", "scatter", "scatter_ci95", "sigma", "unit")
+"""What lot.json has of an effect, and of its parameters."""
 
 
-def said(calibrated: CalibratedLot) -> list[str]:
-    """Say what the model lacks, what it is worth, which sensors are odd; the verdict is first."""
-    lot = calibrated.lot
-    found = [one for one, _ in lot.effects]
-    first = found[0].names if found else ()
-    likeliest = [max(each.odds.items(), key=itemgetter(1))[0] for each in lot.sensors]
-    return lines(
-        "lots/wording.txt.j2",
-        "verdict",
-        lot,
-        shown,
-        found,
-        [f"{_either(names[:3])} ({probability(p)})" for names, p in lot.alternatives],
-        alone=sum(each.p_value < LEVEL for each in lot.sensors),
-        single=sum(name in first for name in likeliest),
-        close=[_either(names[:3]) for names in lot.close],
-        tilt=calibrated.tilt,
-        max_tilt=MAX_TILT_GON * GON,
-    )
+class Lot(Result):
+    """What the model of sensors of one type lacks, and a calibration of each of them.
+
+    Attributes
+    ----------
+    diagnosis : accelstudy.lots.lot.LotDiagnosis, all that is missing
+    model : SensorModel, that was diagnosed, without what was found
+    fits : calibrations of the sensors with the model of the type, or why there is none
+    approach : Approach, of the first campaign
+    left_out : mapping of campaigns that are not in the lot to why
+    """
+
+    kind = LOT
+
+    def __init__(
+        self,
+        diagnosis: LotDiagnosis,
+        model: SensorModel,
+        fits: Sequence[CampaignFit | InputError],
+        approach: Approach,
+        left_out: Mapping[str, str],
+    ) -> None:
+        self.diagnosis, self.model, self.fits = diagnosis, model, fits
+        self.approach, self.left_out = approach, left_out
+        self.name = f"{len(diagnosis.sensors)} sensors"
+
+    @classmethod
+    def of(
+        cls,
+        campaigns: Sequence[Campaign],
+        model: SensorModel,
+        approach: Approach | None = None,
+        seed: int = 1,
+        cores: int = 1,
+        left_out: Mapping[str, str] | None = None,
+    ) -> Lot:
+        """Say what the model of sensors of one type lacks, and calibrate each of them.
+
+        Parameters
+        ----------
+        campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
+            numbers behind it, and those of one log count once
+        left_out : mapping of campaigns that could not be read to what is wrong with them; what
+            cannot be judged by itself, as it leaves no redundancy, is left out as well
+
+        Raises
+        ------
+        InputError
+            If fewer than two campaigns can be judged.
+        """
+        usable, without, first = list[Campaign](), dict(left_out or {}), dict[bytes, str]()
+        names = own_names([campaign.name for campaign in campaigns], without)
+        for given, name in zip(campaigns, names, strict=True):
+            campaign = replace(given, name=name)
+            # Noise never repeats: the same numbers are the same log, whatever its folder.
+            if (same := first.setdefault(campaign.forces.tobytes(), name)) != name:
+                without[name] = f"{name}: has the readings of {same}; each sensor counts once"
+                continue
+            try:
+                fit_base(campaign, model, approach or usual_approach(campaign))
+                usable.append(campaign)
+            except InputError as error:
+                without[name] = str(error)
+        if len(usable) < MIN_SENSORS:
+            why = next(iter(without.values()), "")
+            raise InputError(why or "CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
+        for name, why in without.items():
+            say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
+        diagnosis = weigh_lot(usable, model, approach, seed, cores)
+        fits = list[CampaignFit | InputError]()
+        for i, campaign in enumerate(usable):
+            try:
+                chosen = approach or usual_approach(campaign)
+                fits.append(fit_campaign(campaign, diagnosis.model_of(i), chosen))
+            except InputError as error:
+                fits.append(error)
+        return cls(diagnosis, model, fits, approach or usual_approach(usable[0]), without)
+
+    @cached_property
+    def fitted(self) -> dict[int, CampaignFit]:
+        """Calibrations of the sensors by their numbers, without those of which there is none."""
+        each = enumerate(self.fits)
+        return {i: fit for i, fit in each if isinstance(fit, CampaignFit)}
+
+    @property
+    def usual(self) -> dict[int, CampaignFit]:
+        """Those of the sensors that are not odd."""
+        return {i: self.fitted[i] for i in self.diagnosis.usual if i in self.fitted}
+
+    @property
+    def calibrations(self) -> dict[str, accelstudy.Calibration]:
+        """Calibration of each sensor with all that the model lacks, by its campaign."""
+        fits = self.fitted.values()
+        return {fit.campaign.name: accelstudy.Calibration(None, fit) for fit in fits}
+
+    @cached_property
+    def parameters(self) -> dict[str, TypeParameter]:
+        """Parameters of the model of the type; of an effect, over the sensors that have it."""
+        diagnosis, n = self.diagnosis, len(self.fits)
+        values, sigmas = np.full((2, n, diagnosis.model.n_parameters), np.nan)
+        for i, fit in self.fitted.items():
+            values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
+        usual, has = np.isin(np.arange(n), diagnosis.usual), dict[str, NDArray[np.bool_]]()
+        for found in diagnosis.effects:
+            having = np.array([found.names[0] in one.names for one in diagnosis.each])
+            has |= dict.fromkeys(_parameters_of(found.spec), having)
+        return {
+            p.name: TypeParameter(
+                *(p.name, p.unit, values[:, j], sigmas[:, j], usual),
+                has.get(p.name, np.ones(n, dtype=bool)),
+            )
+            for j, p in enumerate(diagnosis.model.parameters)
+        }
+
+    def _sizes(self, found: Found) -> list[TypeParameter]:
+        """Parameters of an effect that was found."""
+        return [self.parameters[name] for name in _parameters_of(found.spec)]
+
+    def _variances(self, i: int, fit: CampaignFit) -> Array:
+        """Variances of the parameters of a sensor, (u,), by what all sensors tell of its noise.
+
+        Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
+        would look like scatter of the parameters.
+        """
+        own, noise = fit.sigma**2, self.diagnosis.noises[i]
+        if fit.trusts_sigma or noise is None:
+            return own
+        r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
+        return own * float((r + noise.freedom * ratio) / (r + noise.freedom))
+
+    @cached_property
+    def tilt(self) -> Array | None:
+        """Rms tilt error of the sensors by what their model lacked, (2,), rad: roll and pitch.
+
+        It is over tilts up to `MAX_TILT_GON`, in the conditions of the campaigns, of sensors that
+        are not odd, and without what the uncertainty of the parameters adds. None if nothing of the
+        catalogue was found, or no sensor tells it.
+        """
+        squares = []
+        if any(found.spec is not None for found in self.diagnosis.effects):
+            for fit in self.usual.values():
+                with suppress(InputError):
+                    squares.append(_squared_error(fit, self.model))
+        return np.sqrt(np.maximum(np.mean(squares, axis=0), 0.0)) if squares else None
+
+    @property
+    def state(self) -> str:
+        """One of no_effect, named, unknown."""
+        return self.diagnosis.state
+
+    @cached_property
+    def said(self) -> list[str]:
+        """What the model lacks, what it is worth, which sensors are odd; the verdict is first."""
+        d = self.diagnosis
+        first = d.effects[0].names if d.effects else ()
+        return lines(
+            "lots/wording.txt.j2",
+            "verdict",
+            self,
+            d,
+            lambda names: comma_list([*map(shown, names)], "or"),
+            closest=[_either(names[:3]) for names in d.close],
+            alternatives=[
+                f"{_either(names[:3])} ({probability(p)})" for names, p in d.alternatives
+            ],
+            alone=sum(one.p_value < LEVEL for one in d.sensors),
+            single=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.sensors),
+            max_tilt=MAX_TILT_GON * GON,
+        )
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of lot.json, in SI."""
+        d, tilt = self.diagnosis, self.tilt
+        content: dict[str, Any] = json_content({
+            "schema_version": 1,
+            "sensors": len(d.sensors),
+            "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
+            "effects": [
+                {
+                    **{key: getattr(found, key) for key in EFFECT_KEYS},
+                    "parameters": [
+                        {key: getattr(one, key) for key in PARAMETER_KEYS}
+                        for one in self._sizes(found)
+                    ],
+                }
+                for found in d.effects
+            ],
+            "explained": d.explained,
+            "close": d.close,
+            "alternatives": [{"names": n, "posterior": p} for n, p in d.alternatives],
+            "odd": [
+                {
+                    **one._asdict(),
+                    "reason": f"it shows {_either(one.names)}, and the others do not",
+                }
+                for one in d.odd
+            ],
+            "each": [
+                {**one._asdict(), "failed": str(fit) if isinstance(fit, InputError) else None}
+                for one, fit in zip(d.each, self.fits, strict=True)
+            ],
+            "left_out": [{"campaign": name, "reason": why} for name, why in self.left_out.items()],
+            "tilt": None
+            if tilt is None
+            else {
+                "roll_mgon": float(tilt[0] / MGON),
+                "pitch_mgon": float(tilt[1] / MGON),
+                "max_tilt_gon": MAX_TILT_GON,
+            },
+            "verdict": " ".join(self.said),
+        })  # fmt: skip
+        return content
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """Parameters that the model lacks: mean and scatter over the sensors that have them."""
+        rows = [
+            {"effect": " or ".join(one["names"]), "share": one["share"], **size}
+            for one in self.content["effects"]
+            for size in one["parameters"]
+        ]
+        columns = ["effect", "share", "name", "mean", "scatter", "sigma", "unit"]
+        return pd.DataFrame(rows, columns=columns)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return for each sensor which effects its model lacks, and their posterior probability."""
+        odd = [one["campaign"] for one in self.content["odd"]]
+        rows = pd.DataFrame(self.content["each"]).set_index("campaign")
+        rows = rows.assign(effects=rows["names"].str.join(", "), odd=rows.index.isin(odd))
+        return rows[["effects", "posterior", "odd", "failed"]]
+
+    def tell(self, place: Path) -> None:
+        """Print the verdict."""
+        show(self.verdict)
+        say(f"report: {place / 'report.html'}")
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy lot` does."""
+        for i, fit in self.fitted.items():
+            its_own = folder / EACH / f"{i + 1:04d}-{path_name(fit.campaign.name, 'sensor')}"
+            its_own.mkdir(parents=True)
+            write_json(its_own / "calibration.json", calibration_content(assess(fit)))
+        steps = []
+        if write_type(self, folder):
+            of_type = place / TYPE_FILE
+            command = suggested.calibrate("CAMPAIGN", of_type, self.approach.name, of_type)
+            steps.append(("Calibrate the next sensor of the type, with what these tell", command))
+        write_page(
+            folder / "report.html",
+            "lots/report.html.j2",
+            self.verdict,
+            doc=self.content,
+            state=self.state,
+            lines=self.said,
+            either=_either,
+            figures=save_all({"sensors": self.figure}, folder / "figures"),
+            next_steps=steps,
+        )
+        files = (path for path in folder.rglob("*") if path.is_file())
+        names = sorted(path.relative_to(folder).as_posix() for path in files)
+        write_json(folder / "lot.json", {**self.content, "files": names})
+
+    @property
+    def _drawn(self) -> Sequence[TypeParameter | None]:
+        """Parameters that are drawn; None stands for those of a lot in which there are none."""
+        return [one for found in self.diagnosis.effects for one in self._sizes(found)] or [None]
+
+    def draw(self, ax: Axes) -> None:
+        """Draw what each sensor has of the first parameter that the model lacks."""
+        _draw_parameter(ax, self._drawn[0])
+        ax.set_xlabel("sensor")
+
+    def figure(self) -> Figure:
+        """Draw what each sensor has of all that the model lacks, a parameter a row."""
+        figure = new_figure(FULL, 24 + 30 * len(self._drawn))
+        panels = figure.subplots(len(self._drawn), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, parameter in zip(panels, self._drawn, strict=True):
+            _draw_parameter(ax, parameter)
+        panels[-1].set_xlabel("sensor")
+        figure.suptitle(
+            "Each sensor with its 95 % interval; band: the type, ± 2 scatter; circle: odd"
+        )
+        return figure
+
+
+def run_lot(
+    batch: BatchConfig, folders: Sequence[str | Path], out: str | Path, cores: int = 1
+) -> Lot:
+    """Evaluate all campaigns of a batch together; those that cannot be read are named.
+
+    Parameters
+    ----------
+    batch : BatchConfig, with `lot`
+    folders : paths, written by `run_task`, in the order of its tasks
+    out : path of the folder to write
+    cores : int, processes that work at once
+    """
+    settings = batch.lot
+    assert settings is not None
+    campaigns, unread = [], {}
+    for task, folder in zip(batch.tasks(), folders, strict=True):
+        try:
+            campaigns.append(campaign_of(task, folder))
+        except InputError as error:
+            unread[task.name] = str(error)
+    model = get_model(settings.model or batch.model)
+    approach = None if settings.approach is None else get_approach(settings.approach)
+    with result_folder(out, LOT) as new:
+        lot = Lot.of(campaigns, model, approach, settings.seed, cores, unread)
+        lot.write(new, Path(out))
+    return lot
+
+
+def own_names(given: Sequence[str], others: Collection[str]) -> list[str]:
+    """Return names of campaigns, no two alike: of equal ones each gets a number behind it."""
+    names: list[str] = []
+    for number, name in enumerate(given, start=1):
+        if given.count(name) > 1 or name in others:
+            numbered = (f"{name} ({k})" for k in count(number))
+            name = next(one for one in numbered if one not in {*given, *others, *names})
+        names.append(name)
+    return names
 
 
 def _either(names: Sequence[str]) -> str:
@@ -72,128 +408,22 @@ def _either(names: Sequence[str]) -> str:
     return " or ".join(map(shown, names))
 
 
-def lot_document(calibrated: CalibratedLot) -> dict[str, Any]:
-    """Describe a lot, in SI."""
-    lot, tilt = calibrated.lot, calibrated.tilt
-    return {
-        "schema_version": 1,
-        "sensors": len(lot.sensors),
-        "anything": {"p_value": lot.p_value, "missing": lot.missing, "level": LEVEL},
-        "effects": [
-            {
-                "names": list(found.names),
-                "posterior": found.posterior,
-                "share": found.share,
-                "share_ci95": list(found.share_ci95),
-                "parameters": [
-                    {
-                        "name": one.name,
-                        "mean": json_number(one.mean),
-                        "scatter": json_number(one.scatter),
-                        "scatter_ci95": [json_number(bound) for bound in one.scatter_interval()],
-                        "sigma": json_number(one.sigma),
-                        "unit": one.unit,
-                    }
-                    for one in calibrated.parameters_of(spec)
-                ],
-            }
-            for found, spec in lot.effects
-        ],
-        "explained": lot.explained,
-        "close": [list(names) for names in lot.close],
-        "alternatives": [{"names": list(n), "posterior": p} for n, p in lot.alternatives],
-        "odd": [
-            {
-                "campaign": one.campaign,
-                "posterior": one.posterior,
-                "names": list(one.names),
-                "reason": f"it shows {_either(one.names)}, and the others do not",
-            }
-            for one in lot.odd
-        ],
-        "each": [
-            {
-                "campaign": campaign,
-                "names": list(names),
-                "posterior": p,
-                "failed": str(fit) if isinstance(fit, InputError) else None,
-            }
-            for (campaign, names, p), fit in zip(lot.each(), calibrated.fits, strict=True)
-        ],
-        "left_out": [
-            {"campaign": name, "reason": why} for name, why in calibrated.left_out.items()
-        ],
-        "tilt": None
-        if tilt is None
-        else {
-            "roll_mgon": float(tilt[0] / MGON),
-            "pitch_mgon": float(tilt[1] / MGON),
-            "max_tilt_gon": MAX_TILT_GON,
-        },
-        "verdict": " ".join(said(calibrated)),
-    }
+def _parameters_of(spec: str | None) -> Sequence[str]:
+    """Names of the parameters of an effect; none of what is no effect."""
+    return () if spec is None else compose(spec, (spec,)).parameter_names
 
 
-def write_lot(
-    calibrated: CalibratedLot, content: Mapping[str, Any], folder: Path, place: str | Path
-) -> None:
-    """Write lot.json, type.yaml, report.html, the figure, and a calibration of each sensor.
-
-    Parameters
-    ----------
-    calibrated : CalibratedLot
-    content : of `lot_document`
-    folder : Path, to write to
-    place : path of the results, for the commands that the page gives
-    """
-    for i, fit in enumerate(calibrated.fits, start=1):
-        if isinstance(fit, CampaignFit):
-            its_own = folder / EACH / f"{i:04d}-{path_name(fit.campaign.name, 'sensor')}"
-            its_own.mkdir(parents=True)
-            write_json(its_own / "calibration.json", calibration_content(assess(fit)))
-    steps = []
-    if write_type(calibrated, folder):
-        of_type = Path(place) / TYPE_FILE
-        command = suggested.calibrate("CAMPAIGN", of_type, calibrated.approach.name, of_type)
-        steps.append(("Calibrate the next sensor of the type, with what these tell", command))
-    write_page(
-        folder / "report.html",
-        "lots/report.html.j2",
-        content["verdict"],
-        doc=content,
-        state=calibrated.lot.state,
-        lines=said(calibrated),
-        shown=shown,
-        figures=save_all({"sensors": lambda: sensors_figure(calibrated)}, folder / "figures"),
-        next_steps=steps,
-    )
-    files = (path for path in folder.rglob("*") if path.is_file())
-    names = sorted(path.relative_to(folder).as_posix() for path in files)
-    write_json(folder / "lot.json", {**content, "files": names})
-
-
-def sensors_figure(calibrated: CalibratedLot) -> Figure:
-    """Draw what each sensor has of what the model lacks, with 95 % intervals, a parameter a row."""
-    parameters = _drawn(calibrated)
-    figure = new_figure(FULL, 24 + 30 * len(parameters))
-    panels = figure.subplots(len(parameters), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, parameter in zip(panels, parameters, strict=True):
-        _draw_parameter(ax, parameter)
-    panels[-1].set_xlabel("sensor")
-    figure.suptitle("Each sensor with its 95 % interval; band: the type, ± 2 scatter; circle: odd")
-    return figure
-
-
-def draw_sensors(ax: Axes, calibrated: CalibratedLot) -> None:
-    """Draw the first parameter that `sensors_figure` shows."""
-    _draw_parameter(ax, _drawn(calibrated)[0])
-    ax.set_xlabel("sensor")
-
-
-def _drawn(calibrated: CalibratedLot) -> Sequence[TypeParameter | None]:
-    """Parameters that are drawn; None stands for those of a lot in which there are none."""
-    of_each = (calibrated.parameters_of(spec) for _, spec in calibrated.lot.effects)
-    return [parameter for parameters in of_each for parameter in parameters] or [None]
+def _squared_error(fit: CampaignFit, model: SensorModel) -> Array:
+    """Square of the error less that by noise: of nested models the difference of covariances."""
+    noise = JudgedNoise(fit.trusts_sigma, fit.variance_factor)
+    base = replace(fit_campaign(fit.campaign, model, fit.approach), judged=noise)
+    f_b = cap_forces(MAX_TILT_GON * GON, ATTITUDES, fit.gravity)
+    hold = holds_in_use(fit.campaign.hold, fit.campaign.n_positions, f_b)
+    error = tilt_error(
+        fit.model, fit.parameters, model, base.parameters, f_b, fit.gravity, hold
+    ).constant
+    by_noise = tilt_left(fit).parameters ** 2 - tilt_left(base).parameters ** 2
+    return np.asarray(error - by_noise)
 
 
 def _draw_parameter(ax: Axes, parameter: TypeParameter | None) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +15,10 @@ from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.lots.evidence import (
-    COMMON,
-    AnythingOdds,
-    Joint,
-    SensorEvidence,
-    is_noise,
-    lot_classes,
-)
-from accelstudy.lots.mixture import Anything, Mixture, Names
+from accelstudy.lots.evidence import COMMON, SensorEvidence, Tested, lot_classes
+from accelstudy.lots.mixture import Anything, Mixture
 from accelstudy.lots.noise import SensorNoise
-from accelstudy.lots.sizes import OfType, TypeSizes
+from accelstudy.lots.sizes import Joint, Names, OfType, Shapes, TypeSizes
 
 Array = NDArray[np.float64]
 
@@ -62,31 +56,31 @@ MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """Something that the model of the lot lacks.
 
     Attributes
     ----------
-    names : tuple of str, the names that mean the same in this lot
+    names : tuple of str, the names that mean the same in this lot, the most probable first
     posterior : float, given that the model lacks anything
     share : float, of the sensors
     share_ci95 : tuple of two floats
+    spec : str, the effect in the setting that explains most; None of what is no effect
     """
 
     names: tuple[str, ...]
     posterior: float
     share: float
     share_ci95: tuple[float, float]
+    spec: str | None = None
 
 
-@dataclass(frozen=True)
-class Odd:
-    """A sensor with an effect that neither the model nor the other sensors have."""
+class SensorState(NamedTuple):
+    """What the model lacks for a sensor, or what makes it odd, and how probable that is."""
 
     campaign: str
-    posterior: float
     names: tuple[str, ...]
+    posterior: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,115 +92,97 @@ class Pass:
     sensors : tuple of SensorEvidence
     anything : Anything, the test of them
     retested : function of a sensor's place that gives what it added to the test
-    mean : SensorEvidence, of their mean; None if they were in different positions
     noises : tuple of SensorNoise, by all sensors; None where a campaign says its own
+    mean : SensorEvidence, of their mean; None if they were in different positions
     together : mapping of effects to what all campaigns say of them together
-    sizes : TypeSizes, of the effects of `shapes`; None where there are none
-    shapes : mapping of the names of one or two effects to the shape of each
+    sizes : TypeSizes, of the most probable effects; None where there are none
     """
 
     sensors: tuple[SensorEvidence, ...]
     anything: Anything
-    retested: Callable[[int], AnythingOdds]
-    mean: SensorEvidence | None = None
+    retested: Callable[[int], Tested]
     noises: tuple[SensorNoise | None, ...] = ()
+    mean: SensorEvidence | None = None
     together: Mapping[str, Joint] = field(default_factory=dict)
     sizes: TypeSizes | None = None
-    shapes: Mapping[frozenset[str], Mapping[str, str]] = field(default_factory=dict)
 
     @cached_property
-    def classes(self) -> list[tuple[str, ...]]:
-        """Names that mean the same in this lot; the first one stands for them."""
-        return lot_classes(self.sensors) + ([] if self.mean is None else [(COMMON,)])
+    def classes(self) -> dict[str, tuple[str, ...]]:
+        """Names that mean the same in this lot, by the one that stands for them."""
+        of_mean = {} if self.mean is None else {COMMON: (COMMON,)}
+        return lot_classes(self.sensors) | of_mean
 
     @cached_property
     def mixture(self) -> Mixture:
         """Posterior of all sets of effects."""
-        # One sensor alone never shows what has neither a name nor a shape.
-        unseen = [IMPOSSIBLE if members[0] == COMMON else 0.0 for members in self.classes]
-        odds = [
-            [
-                each.odds.get(members[0], no)
-                for members, no in zip(self.classes, unseen, strict=True)
-            ]
-            for each in self.sensors
-        ]
+        odds = {
+            # One sensor alone never shows what has neither a name nor a shape.
+            name: np.array([
+                one.odds.get(name, IMPOSSIBLE if name == COMMON else 0.0) for one in self.sensors
+            ])
+            for name in self.classes
+        }  # fmt: skip
         pairs: dict[Names, Array] = {}
-        for i, each in enumerate(self.sensors):
-            for both, log in self._pairs(each).items():
-                pairs.setdefault(both, np.full(len(self.sensors), np.nan))[i] = log
-        kinds = [_kind(members[0]) for members in self.classes]
-        prior = np.array([WEIGHTS[kind] / kinds.count(kind) for kind in kinds])
-        of_all = {name: joint.odds for name, joint in self.together.items()}
+        for i, one in enumerate(self.sensors):
+            for names, log in self._pairs(one).items():
+                pairs.setdefault(names, np.full(len(self.sensors), np.nan))[i] = log
+        kinds = {name: _kind(name) for name in self.classes}
+        counts = [*kinds.values()]
+        prior = {name: WEIGHTS[kind] / counts.count(kind) for name, kind in kinds.items()}
+        total = sum(prior.values())
+        common: dict[Names, float] = {(name,): one.odds for name, one in self.together.items()}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise; what is sudden has no mean.
-            of_all |= {
-                name: log
-                for name, log in mean.odds.items()
-                if not is_noise(name) and not _is_sudden(name)
-            }
-            of_all[COMMON] = mean.odds[LEVEL_OF_NOISE]
-        firsts = [members[0] for members in self.classes]
-        common: dict[Names, float] = {
-            (k,): of_all[name] for k, name in enumerate(firsts) if name in of_all
-        }
-        if mean is not None:
+            of_mean = {(name,): log for name, log in mean.odds.items() if name not in NOISES}
             common |= {
-                both: log
-                for both, log in self._pairs(mean).items()
-                if not any(_is_sudden(firsts[k]) for k in both)
+                names: log
+                for names, log in (of_mean | self._pairs(mean)).items()
+                if not any(map(_is_sudden, names))
             }
-        return Mixture.of(np.array(odds), pairs, prior / prior.sum(), common, cache(self._of_type))
+            common[COMMON,] = mean.odds[LEVEL_OF_NOISE]
+        prior = {name: weight / total for name, weight in prior.items()}
+        return Mixture(odds, pairs, prior, common, self._typical)
 
-    def _of_type(self, names: Names) -> OfType | None:
-        """Odds of effects with sizes of the type; None where sensors do not tell of a type."""
-        specs = self._shapes(names)
-        if self.sizes is None or not specs:
-            return None
-        if not all(len(self.sizes.columns[spec]) for spec in specs):
-            return None
-        of_type = self.sizes.of_set(specs)
-        return None if min(of_type.shares) * len(self.sensors) <= self._few else of_type
+    @property
+    def _typical(self) -> dict[Names, OfType]:
+        """Odds with sizes of the type, of what more than few sensors have."""
+        sets = {} if self.sizes is None else self.sizes.sets
+        n = len(self.sensors)
+        return {
+            names: one for names, one in sets.items() if min(one.shares.values()) * n > self._few
+        }
 
-    def _shapes(self, names: Names) -> tuple[str, ...]:
-        """Shapes of some effects that were looked at, in order; none if they were not."""
-        effects = [self.classes[k][0] for k in names]
-        shapes = self.shapes.get(frozenset(effects), {})
-        return tuple(shapes[name] for name in effects) if shapes else ()
-
-    def _looked_at(self, k: int) -> Names | None:
+    def _looked_at(self, name: str) -> Names | None:
         """Most probable set with an effect, of those whose sizes were looked at."""
-        sets = (one.names for one in self.mixture.sets if k in one.names)
-        return next((names for names in sets if self._shapes(names)), None)
+        shapes = {} if self.sizes is None else self.sizes.shapes
+        return next((s for s in self.mixture.sets if name in s and s in shapes), None)
 
-    def strongest(self) -> dict[frozenset[str], dict[str, str]]:
+    def strongest(self) -> dict[Names, Shapes]:
         """Return the most probable sets of effects and each of their effects, with best shapes."""
-        best = [one.names for one in self.mixture.sets[:MAX_SETS]]
-        sets = dict.fromkeys([*((k,) for names in best for k in names), *best])
-        shapes = {}
-        for names in sets:
-            effects = sorted(self.classes[k][0] for k in names)
-            if 0 < len(effects) < 3 and all(name in self.together for name in effects):
-                shapes[frozenset(effects)] = self._best_shapes(effects)
-        return shapes
+        best = [*self.mixture.sets][:MAX_SETS]
+        sets = dict.fromkeys([*((name,) for names in best for name in names), *best])
+        return {
+            names: self._best_shapes(names)
+            for names in sets
+            if 0 < len(names) < 3 and all(name in self.together for name in names)
+        }
 
-    def _best_shapes(self, effects: Sequence[str]) -> dict[str, str]:
-        of_all = {name: self.together[name].spec for name in effects}
+    def _best_shapes(self, names: Names) -> Shapes:
+        of_all = {name: self.together[name].spec for name in names}
         if self.mean is None:
             return of_all
-        specs = self.mean.pair_specs.get((effects[0], effects[-1]))
-        if specs is not None:
-            return dict(zip(effects, specs, strict=True))
+        if (specs := self.mean.pair_specs.get((names[0], names[-1]))) is not None:
+            return dict(zip(names, specs, strict=True))
         return {name: self.mean.specs.get(name, spec) for name, spec in of_all.items()}
 
-    def _pairs(self, each: SensorEvidence) -> dict[Names, float]:
+    def _pairs(self, one: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
-        place = {name: k for k, members in enumerate(self.classes) for name in members}
+        stands = {name: first for first, members in self.classes.items() for name in members}
         pairs: dict[Names, float] = {}
-        for (one, other), log in each.pairs.items():
-            if one in place and other in place and place[one] != place[other]:
-                first, second = sorted((place[one], place[other]))
-                pairs[first, second] = max(log, pairs.get((first, second), -np.inf))
+        for both, log in one.pairs.items():
+            names = tuple(sorted({stands[name] for name in both if name in stands}))
+            if len(names) == 2:
+                pairs[names] = max(log, pairs.get(names, -np.inf))
         return pairs
 
     @cached_property
@@ -226,58 +202,61 @@ class Pass:
     @cached_property
     def wrong(self) -> float:
         """Posterior probability that the model lacks anything, or that a sensor is odd."""
-        mixture = self.mixture
-        nothing = 1 - mixture.missing
-        none_odd = np.prod(1 - mixture.sensors_under(())[1]) if nothing > 0 else 1.0
+        nothing = self.mixture.posterior[()]
+        none_odd = np.prod(1 - self.mixture.sensors_under(())[1]) if nothing > 0 else 1.0
         return float(max(1 - nothing * none_odd, 1e-300))
 
     @cached_property
-    def found(self) -> list[tuple[int, Found]]:
-        """What is missing and has a name that is sure enough, with its place in `classes`.
+    def given(self) -> dict[str, float]:
+        """Posterior of each class to be one of the lot, if anything is wrong, highest first."""
+        given = {name: self.mixture.of_any([name]) / self.wrong for name in self.classes}
+        return dict(sorted(given.items(), key=lambda item: -item[1]))
+
+    @cached_property
+    def found(self) -> list[Found]:
+        """What is missing and has a name that is sure enough.
 
         What few sensors have makes these odd.
         """
         if not self.missing:
             return []
-        found, taken = [], set[int]()
-        for k in np.argsort(-self.given, kind="stable").tolist():
-            if k in taken or self._rare[k] or self.given[k] < MIN_RIVAL:
+        found, taken = [], set[str]()
+        for name, given in self.given.items():
+            if name in taken or name in self._rare or given < MIN_RIVAL:
                 continue
-            alike = [k] if self.given[k] >= MIN_CERTAIN else [k, *self._rivals(k)]
+            alike = [name] if given >= MIN_CERTAIN else [name, *self._rivals(name)]
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
             if posterior >= RULES.sure:
                 taken.update(alike)
-                names = tuple(name for one in alike for name in self.classes[one])
-                share, low, high = self.mixture.share(k)
-                found.append((k, Found(names, posterior, share, (low, high))))
+                members = tuple(member for one in alike for member in self.classes[one])
+                share, low, high = self.mixture.share(name)
+                found.append(Found(members, posterior, share, (low, high), self.spec(name)))
         return found
 
-    def _rivals(self, k: int) -> list[int]:
+    def _rivals(self, name: str) -> list[str]:
         """Effects that all campaigns together hardly tell from one that is not certain."""
-        names = self._looked_at(k)
-        of_type = None if names is None else self.mixture.typical(names)
-        if names is None or of_type is None or self.sizes is None:
+        names = self._looked_at(name)
+        if self.sizes is None or names is None or names not in self.mixture.typical:
             return []
         rivals = []
-        for j in np.flatnonzero(self.given >= MIN_RIVAL).tolist():
-            if j in names or not (spec := self._shapes((j,))):
+        for rival in self.classes:
+            if self.given[rival] < MIN_RIVAL or rival in names or (rival,) not in self.sizes.shapes:
                 continue
-            left, whole = self.sizes.apart(self._shapes(names), of_type, names.index(k), *spec)
+            left, whole = self.sizes.apart(names, name, rival)
             if left < min(UNTOLD, RESEMBLES * whole):
-                rivals.append(j)
+                rivals.append(rival)
         return rivals
 
     @cached_property
-    def given(self) -> Array:
-        """Posterior of each class to be one of the lot, given that anything is wrong, (K,)."""
-        return np.asarray(self.mixture.of_effects / self.wrong)
-
-    @cached_property
-    def _rare(self) -> NDArray[np.bool_]:
-        """Whether few sensors have it, if it is one of the lot, (K,)."""
-        of = np.maximum(self.mixture.of_effects, 1e-300)
-        surely = [np.sum(self.mixture.having(k) > MIN_HAVING * of[k]) for k in range(len(of))]
-        return np.array(surely) <= self._few
+    def _rare(self) -> set[str]:
+        """What few sensors have, if it is one of the lot."""
+        surely = {
+            name: np.sum(
+                self.mixture.having(name) > MIN_HAVING * max(self.mixture.of_any([name]), 1e-300)
+            )
+            for name in self.classes
+        }
+        return {name for name, count in surely.items() if count <= self._few}
 
     @property
     def _few(self) -> float:
@@ -287,35 +266,37 @@ class Pass:
     @property
     def alternatives(self) -> list[tuple[tuple[str, ...], float]]:
         """The most probable classes with their posterior, given that anything is wrong."""
-        order = np.argsort(-self.given, kind="stable")[:3]
-        return [(self.classes[k], float(self.given[k])) for k in order]
+        return [(self.classes[name], given) for name, given in [*self.given.items()][:3]]
 
     @cached_property
-    def odd(self) -> list[Odd]:
+    def odd(self) -> list[SensorState]:
         """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly.
 
         A sensor is odd by whatever nothing accounts for that is found in the lot. If that makes
         more than few sensors odd, the lot has something that has no sure name, and what is rare
         makes them so.
         """
-        found = {k for k, _ in self.found}
-        nameless = np.array([k not in found for k in range(len(self.classes))], dtype=bool)
+        nameless = {*self.classes} - {one.names[0] for one in self.found}
         odd = self._odd_by(nameless)
         return odd if len(odd) <= self._few else self._odd_by(self._rare)
 
-    def _odd_by(self, strange: NDArray[np.bool_]) -> list[Odd]:
-        """Sensors that are odd if they have one of some classes, (K,)."""
+    def _odd_by(self, strange: set[str]) -> list[SensorState]:
+        """Sensors that are odd if they have one of some classes."""
         of_sets, odd = self.mixture.sensors
-        alone = sum((p for names, p in of_sets.items() if any(strange[k] for k in names)), odd)
+        alone = sum((p for names, p in of_sets.items() if strange & {*names}), odd)
         # Sensors of which nobody doubts it stay in their order.
         order = np.argsort(-np.round(alone, 3), kind="stable")
         wrong = np.cumsum(1 - alone[order]) / np.arange(1, len(alone) + 1)
-        known = {k for k, _ in self.found}
+        known = {one.names[0] for one in self.found}
+        own = {
+            name: self.mixture.odds[name] + np.log(prior)
+            for name, prior in self.mixture.prior.items()
+            if name not in known
+        }
         told = []
         for i in order[: int(np.sum(wrong <= FALSE_ODD))]:
-            own = self.mixture.odds[i] + np.log(self.mixture.prior)
-            k = max((k for k in range(len(own)) if k not in known), key=lambda k: own[k])
-            told.append(Odd(self.sensors[i].campaign, float(alone[i]), self.classes[k]))
+            name = max(own, key=lambda name: own[name][i])
+            told.append(SensorState(self.sensors[i].campaign, self.classes[name], float(alone[i])))
         return told
 
     @property
@@ -328,42 +309,40 @@ class Pass:
         """The same without the sensors that are odd."""
         if not self.odd:
             return self
-        usual = self.usual
-        others = [self.retested(i) for i in range(len(self.sensors)) if i not in {*usual}]
+        usual, anything = self.usual, Anything(self.anything.logs)
+        for i in {*range(len(self.sensors))} - {*usual}:
+            anything.add(self.retested(i), -1.0)
         return replace(
             self,
             sensors=tuple(self.sensors[i] for i in usual),
-            anything=self.anything.without((one.names, one.odds) for one in others),
+            anything=anything,
             retested=lambda i: self.retested(usual[i]),
             sizes=None if self.sizes is None else self.sizes.only(usual),
         )
 
     @cached_property
-    def each(self) -> list[tuple[tuple[str, ...], float]]:
-        """Names of what the model lacks for a sensor, and their posterior, for each sensor."""
+    def each(self) -> list[SensorState]:
+        """Names of what the model lacks for each sensor, and their posterior."""
         of_sets, odd = self.mixture.sensors
-        sets = [*of_sets]
-        table = np.array([*of_sets.values(), odd])
-        rows = []
-        for i, k in enumerate(table.argmax(axis=0)):
-            names = (ODD,) if k == len(sets) else tuple(self.classes[c][0] for c in sets[k])
-            rows.append((names, float(table[k, i])))
-        return rows
+        of_names = {
+            tuple(name for name in self.classes if name in names): p for names, p in of_sets.items()
+        }
+        sets, table = [*of_names, (ODD,)], np.array([*of_names.values(), odd])
+        best = table.argmax(axis=0)
+        return [
+            SensorState(sensor.campaign, sets[k], float(table[k, i]))
+            for i, (sensor, k) in enumerate(zip(self.sensors, best, strict=True))
+        ]
 
-    def specs(self, places: Iterable[int]) -> dict[int, str]:
-        """Effects of some classes, each in the setting that explains most."""
-        specs = {}
-        for k in places:
-            if (names := self._looked_at(k)) is not None:
-                specs[k] = self._shapes(names)[names.index(k)]
-                continue
-            counted: dict[str, float] = {}
-            for each, weight in zip(self.sensors, self.mixture.having(k), strict=True):
-                if (spec := each.specs.get(self.classes[k][0])) is not None:
-                    counted[spec] = counted.get(spec, 0.0) + float(weight)
-            if counted:
-                specs[k] = max(counted, key=lambda spec: counted[spec])
-        return specs
+    def spec(self, name: str) -> str | None:
+        """Return an effect in the setting that explains most; None of what is no effect."""
+        if self.sizes is not None and (names := self._looked_at(name)) is not None:
+            return self.sizes.shapes[names][name]
+        counted: dict[str, float] = {}
+        for one, weight in zip(self.sensors, self.mixture.having(name).tolist(), strict=True):
+            if (spec := one.specs.get(name)) is not None:
+                counted[spec] = counted.get(spec, 0.0) + weight
+        return max(counted, key=lambda spec: counted[spec], default=None)
 
 
 def _is_sudden(name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Sizes of effects as those of a type: who has them, as large as they are in the others.
+"""Sizes of effects: one that all sensors have, and those of a type, with a scatter.
 
 Sensor i tells of the parameters β of some effects by ℓ_i(β) = βᵀ b_i − βᵀ N_i β / 2, in units of
 its noise. In a type each effect has sizes β ~ N(μ, S), S = τ² ‖μ‖²/k · I, in a part ρ of the
@@ -11,10 +11,11 @@ with the μ, ρ and τ that make the likelihood of all sensors largest.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +25,24 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
+from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
-from accelstudy.effects import get_effect
+from accelstudy.effects import Effect, get_effect
 from accelstudy.lots.noise import SensorNoise, with_noise
 from accelstudy.sensors.sensor import SensorModel
 
-Array = NDArray[np.float64]
-Names = tuple[int, ...]
+if TYPE_CHECKING:
+    from accelstudy.lots.evidence import SensorEvidence
 
+Array = NDArray[np.float64]
+Names = tuple[str, ...]
+"""Names of some effects, in order."""
+Shapes = Mapping[str, str]
+"""Names of some effects, in order, with the settings of each."""
+
+MAX_LOG_DIFFERENCE = 0.3
+"""Largest difference of the logarithms of settings that are nearly the same."""
 SCATTERS = (0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size."""
 SHARES = (0.9, 0.35)
@@ -45,33 +55,113 @@ LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which they are found."""
 
 
-@dataclass(frozen=True)
-class Told:
-    """What a sensor tells of the parameters of some effects, side by side.
+# --- what one campaign says of parameters -------------------------------------------------------
+
+
+class Equations(NamedTuple):
+    """Normal equations of the parameters of effects, by the residuals z of a campaign.
 
     Attributes
     ----------
-    normal : (k, k) array, DᵀD of the derivatives D of the residuals z by the parameters
-    right : (k,) array, Dᵀz
-    squares : (k,) array, of what D would be if no parameter of the model were estimated
-    square : float, ‖z‖²
-    redundancy : int
+    normal : (..., k, k) array, DᵀD of the derivatives D of z by the parameters
+    right : (..., k) array, Dᵀz
+    squares : (..., k) array, of what D would be if no parameter of the model were estimated
     """
 
     normal: Array
     right: Array
     squares: Array
-    square: float
-    redundancy: int
+
+    @classmethod
+    def of(cls, frame: Frame, columns: Array) -> Equations:
+        """Of derivatives (m, s, k), whitened, before the model is estimated."""
+        residuals = frame.residuals
+        d = residuals.project(columns.reshape(len(columns), -1)).reshape(columns.shape)
+        return cls(
+            np.einsum("msk,msl->skl", d, d),
+            np.einsum("msk,m->sk", d, residuals.z),
+            np.sum(columns**2, axis=0),
+        )
+
+    @classmethod
+    def pooled(cls, each: Iterable[Equations]) -> Equations:
+        """Those of all campaigns as one."""
+        normal, right, squares = (np.sum(parts, axis=0) for parts in zip(*each, strict=True))
+        return cls(normal, right, squares)
+
+    def visible(self) -> tuple[Array, Array]:
+        """Combinations of the parameters that show, and how much each of them does.
+
+        Returns
+        -------
+        directions : (k, l) array
+        values : (l,) array, of the normal matrix in these directions
+        """
+        scale = np.sqrt(np.where(self.squares > 0, self.squares, 1.0))
+        values, vectors = np.linalg.eigh(self.normal / np.outer(scale, scale))
+        seen = values > RULES.visible**2
+        return vectors[:, seen] / scale[:, None], values[seen]
 
 
-def told(
+class ShapeEquations(NamedTuple):
+    """The shapes of an effect in the residuals of a campaign.
+
+    Attributes
+    ----------
+    specs : tuple of str, the effect in each of its shapes
+    settings : (s, q) array, those of the shapes
+    each : Equations, (s, ...) arrays, in units of the noise
+    """
+
+    specs: tuple[str, ...]
+    settings: Array
+    each: Equations
+
+    @classmethod
+    def of(cls, frame: Frame, effects: Sequence[Effect], variance: float) -> ShapeEquations:
+        """Of shapes of an effect, by a campaign whose residuals have a variance of unit weight."""
+        columns = frame.residuals.whitened(frame.signatures(effects))
+        each = Equations.of(frame, columns.reshape(len(columns), len(effects), -1))
+        return cls(
+            tuple(effect.spec for effect in effects),
+            np.array([[*effect.settings.values()] for effect in effects], dtype=float),
+            Equations(*(part / variance for part in each)),
+        )
+
+    def nearest(self, settings: Array) -> Equations | None:
+        """Return those of the shape with these settings, or nearly so."""
+        best = 0
+        if settings.size:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                apart = np.max(abs(np.nan_to_num(np.log(self.settings / settings))), axis=1)
+            best = int(np.argmin(apart))
+            if apart[best] >= MAX_LOG_DIFFERENCE:
+                return None
+        return Equations(*(part[best] for part in self.each))
+
+
+class SensorEquations(NamedTuple):
+    """What a sensor tells of the parameters of some effects, side by side.
+
+    Attributes
+    ----------
+    of : Equations
+    square : float, ‖z‖²
+    redundancy : int
+    """
+
+    of: Equations
+    square: float = 0.0
+    redundancy: int = 0
+
+
+def sensor_equations(
     campaign: Campaign,
     model: SensorModel | None,
     approach: Approach | None,
     noise: SensorNoise | None,
     specs: Sequence[str],
-) -> Told:
+) -> SensorEquations:
     """Say what a campaign tells of effects; nothing of those that it cannot show.
 
     Parameters
@@ -79,40 +169,71 @@ def told(
     campaign, model, approach, noise : as in `evidence.sensor_evidence`
     specs : effects with their settings
     """
+    effects = [get_effect(spec) for spec in specs]
     if model is None:
-        k = sum(len(get_effect(spec).parameters) for spec in specs)
-        return Told(np.zeros((k, k)), np.zeros(k), np.zeros(k), 0.0, 0)
+        k = sum(len(effect.parameters) for effect in effects)
+        return SensorEquations(Equations(np.zeros((k, k)), np.zeros(k), np.zeros(k)))
     campaign = with_noise(campaign, noise)
     frame = Frame.of(fit_base(campaign, model, approach or usual_approach(campaign)).solution)
     residuals, columns = frame.residuals, []
-    for spec in specs:
-        effect = get_effect(spec)
+    for effect in effects:
         try:
             columns.append(residuals.whitened(frame.signature(effect)))
         except InputError:  # a column is absent
             columns.append(np.zeros((len(residuals.z), len(effect.parameters))))
-    whole = np.concatenate(columns, axis=1)
-    d, z = residuals.project(whole), residuals.z
-    return Told(d.T @ d, d.T @ z, np.sum(whole**2, axis=0), float(z @ z), residuals.redundancy)
+    side_by_side = Equations.of(frame, np.concatenate(columns, axis=1)[:, None])
+    of = Equations(*(part[0] for part in side_by_side))
+    return SensorEquations(of, float(residuals.z @ residuals.z), residuals.redundancy)
 
 
-def visible(normal: Array, squares: Array) -> tuple[Array, Array]:
-    """Combinations of the parameters of an effect that show, and how much each of them does.
+# --- one size of all sensors --------------------------------------------------------------------
+
+
+class Joint(NamedTuple):
+    """An effect in all campaigns together.
+
+    Attributes
+    ----------
+    odds : float, log odds that it is equally large in all sensors, against nothing
+    spec : str, its most probable shape
+    """
+
+    odds: float
+    spec: str
+
+
+def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
+    """Weigh each effect by all campaigns as one: the normal equations of residuals are added.
+
+    Settings of an effect are those of the first campaign that shows it, or nearly so.
 
     Parameters
     ----------
-    normal : (k, k) array, DᵀD of the derivatives D of residuals by the parameters
-    squares : (k,) array, of what D would be if no parameter of the model were estimated
-
-    Returns
-    -------
-    directions : (k, l) array
-    values : (l,) array, of the normal matrix in these directions
+    used : of the sensors that count
     """
-    scale = np.sqrt(np.where(squares > 0, squares, 1.0))
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    seen = values > RULES.visible**2
-    return vectors[:, seen] / scale[:, None], values[seen]
+    redundancy = sum(each.redundancy for each in used)
+    evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), redundancy)
+    square = sum(each.square for each in used)
+    nothing = float(evidence.of_noise(square)[0])
+    joint = {}
+    for name in sorted({name for each in used for name in each.shown}):
+        shown, logs = [each.shown[name] for each in used if name in each.shown], {}
+        for spec, settings in zip(shown[0].specs, shown[0].settings, strict=True):
+            near = [one for shapes in shown if (one := shapes.nearest(settings)) is not None]
+            if 2 * len(near) <= len(used):
+                continue
+            pooled = Equations.pooled(near)
+            directions, values = pooled.visible()
+            if dim := len(values):
+                part = float(np.sum((pooled.right @ directions) ** 2 / values))
+                logs[spec] = float(evidence.of_spaces(np.array([part]), [dim], square)[0])
+        if logs:
+            odds = float(log_mean(np.array([*logs.values()]))) - nothing
+            joint[name] = Joint(odds, max(logs, key=lambda spec: logs[spec]))
+    return joint
+
+
+# --- sizes of a type ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -121,63 +242,73 @@ class OfType:
 
     Attributes
     ----------
-    odds : mapping of each subset but the empty one, as places in the set, to (n,) array, log odds
-        of the sensors
+    odds : mapping of each of its subsets to (n,) array, log odds of the sensors
+    log_likelihood : float, of the sizes and shares
+    sizes : mapping of each effect to (k,) array, μ of its parameters
+    shares : mapping of each effect to ρ
     alike : float, log likelihood ratio of one size in all sensors, the most probable one
-    mean, shares : (k,) and (e,) arrays, μ of all parameters and ρ of each effect
     """
 
     odds: Mapping[Names, Array]
+    log_likelihood: float
+    sizes: Mapping[str, Array]
+    shares: Mapping[str, float]
     alike: float
-    mean: Array
-    shares: Array
 
 
 @dataclass(frozen=True, eq=False)
 class TypeSizes:
-    """What all sensors of a lot tell of effects.
+    """What all sensors of a lot tell of the sizes of effects.
 
     Attributes
     ----------
+    shapes : mapping of sets of one or two effects to the shape of each
     normal, right : (n, K, K) and (n, K) arrays, of all parameters that show, in units in which they
         show equally well
-    columns : mapping of each effect to its parameters among the K
+    columns : mapping of each effect in a shape to its parameters among the K
     usual : int array, places of the sensors that tell what is typical
     """
 
+    shapes: Mapping[Names, Shapes]
     normal: Array
     right: Array
     columns: Mapping[str, NDArray[np.int_]]
     usual: NDArray[np.int_]
 
     @classmethod
-    def of(cls, each: Sequence[Told], specs: Sequence[str], usual: Sequence[int]) -> TypeSizes:
+    def of(
+        cls,
+        each: Sequence[SensorEquations],
+        specs: Sequence[str],
+        shapes: Mapping[Names, Shapes],
+        usual: Sequence[int],
+    ) -> TypeSizes:
         """Gather what sensors tell of effects.
 
         The noise is that which the one or two effects leave that explain most.
 
         Parameters
         ----------
-        each : what the sensors tell of the effects
-        specs : effects with their settings
-        usual : places of the sensors that tell what is typical
+        each : what the sensors tell of `specs`, the effects with their settings
+        shapes, usual : as above
         """
-        normal = np.array([one.normal for one in each])
-        right = np.array([one.right for one in each])
-        whole = np.sum([one.squares for one in each], axis=0)
+        normal, right, _ = map(np.array, zip(*(one.of for one in each), strict=True))
+        pooled = Equations.pooled(one.of for one in each)
         ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)])
         turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
         for spec, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
-            shown = normal[:, first:end, first:end].sum(axis=0)
-            directions, values = visible(shown, whole[first:end])
+            block = slice(first, end)
+            shown = Equations(
+                pooled.normal[block, block], pooled.right[block], pooled.squares[block]
+            )
+            directions, values = shown.visible()
             # In these directions and units the sensors together tell as much of each.
-            block = np.zeros((ends[-1], len(values)))
-            block[first:end] = directions / np.sqrt(values / len(each))
-            turned.append(block)
-            columns[spec] = place + np.arange(block.shape[1])
-            place += block.shape[1]
+            turned.append(np.zeros((ends[-1], len(values))))
+            turned[-1][block] = directions / np.sqrt(values / len(each))
+            columns[spec] = place + np.arange(len(values))
+            place += len(values)
         turn = np.concatenate(turned, axis=1)
-        raw = cls(turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
+        raw = cls(shapes, turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
         counted = [each[i] for i in usual]
         variance = raw.only(usual)._variance(
             sum(one.square for one in counted), sum(one.redundancy for one in counted)
@@ -202,108 +333,56 @@ class TypeSizes:
                 left.append((squares - part) / (redundancy - rank))
         return max(min(left), 1e-12)
 
-    def of_set(self, specs: Sequence[str]) -> OfType:
-        """Odds of each sensor for the subsets of some effects, with sizes of the type."""
-        parts = [self.columns[spec] for spec in specs]
-        at = np.concatenate(parts)
-        counts = [len(part) for part in parts]
-        search = _Search(self.normal[:, at[:, None], at], self.right[:, at], counts, self.usual)
-        mean, alike = search.pooled
-        best = -np.inf, list[Array](), mean, np.ones(len(specs))
+    @cached_property
+    def sets(self) -> dict[Names, OfType]:
+        """Those of the sets of effects that show: odds of each sensor, with sizes of the type."""
+        return {
+            names: self._of_set(names)
+            for names, shapes in self.shapes.items()
+            if all(len(self.columns[spec]) for spec in shapes.values())
+        }
+
+    def _of_set(self, names: Names) -> OfType:
+        """Odds of a set with the sizes and shares that are most probable."""
+        parts = [self.columns[self.shapes[names][name]] for name in names]
+        at, of = np.concatenate(parts), np.repeat(names, [len(part) for part in parts])
         # From many that have each effect, and from few that have one of them.
         most, few = SHARES
-        starts = [np.full(len(specs), most)]
-        starts += [np.where(np.arange(len(specs)) == k, few, most) for k in range(len(specs))]
-        for scatter in SCATTERS:
-            for shares in starts:
-                whole = mean / np.repeat(shares, search.counts)
-                found = search.found(whole, shares, scatter)
-                best = max(best, found, key=lambda one: one[0])
-        _, odds, mean, shares = best
-        return OfType(dict(zip(search.subsets, odds, strict=True)), alike, mean, shares)
+        starts = [dict.fromkeys(names, most)]
+        starts += [{**starts[0], name: few} for name in names]
+        found = [self._search(at, of, shares, scatter) for scatter in SCATTERS for shares in starts]
+        return max(found, key=lambda one: one.log_likelihood)
 
-    def apart(
-        self, specs: Sequence[str], of_type: OfType, place: int, rival: str
-    ) -> tuple[float, float]:
-        """Noncentrality that an effect leaves beside a rival of it, and without the rival.
+    def _search(
+        self, at: NDArray[np.int_], of: NDArray[np.str_], start: Mapping[str, float], scatter: float
+    ) -> OfType:
+        """Search for sizes and shares with a scatter, by expectation and maximization.
 
         Parameters
         ----------
-        specs : set of effects
-        of_type : OfType of the set
-        place : int, of the effect in the set
-        rival : str, another effect that may be there in its place
+        at, of : (k,) arrays, parameters of some effects, and the effect of each
+        start : shares to begin with
+        scatter : float, τ
         """
-        normal = self.normal[self.usual].sum(axis=0)
-        ends = np.cumsum([0, *(len(self.columns[spec]) for spec in specs)])
-        mean = of_type.mean[ends[place] : ends[place + 1]]
-        own = self.columns[specs[place]]
-        others = [spec for k, spec in enumerate(specs) if k != place]
-
-        def left(beside: Sequence[str]) -> float:
-            rest = np.concatenate([np.zeros(0, dtype=int), *(self.columns[s] for s in beside)])
-            cross = normal[np.ix_(own, rest)]
-            inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
-            shown = normal[np.ix_(own, own)] - cross @ inverse @ cross.T
-            return float(of_type.shares[place] * mean @ shown @ mean)
-
-        return left([*others, rival]), left(others)
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """The search for sizes and shares of effects, side by side, with `counts` of parameters."""
-
-    normal: Array
-    right: Array
-    counts: list[int]
-    usual: NDArray[np.int_]
-
-    @cached_property
-    def subsets(self) -> list[Names]:
-        """All sets of the effects but the empty one."""
-        effects = range(len(self.counts))
-        return [s for r in effects for s in combinations(effects, r + 1)]
-
-    @cached_property
-    def of(self) -> NDArray[np.int_]:
-        """Effect of each parameter."""
-        return np.repeat(np.arange(len(self.counts)), self.counts)
-
-    @cached_property
-    def places(self) -> list[NDArray[np.int_]]:
-        """Parameters of each of the `subsets`."""
-        return [np.flatnonzero(np.isin(self.of, subset)) for subset in self.subsets]
-
-    @cached_property
-    def has(self) -> NDArray[np.bool_]:
-        """Which effects the empty set and the `subsets` have."""
-        return np.array([[k in s for k in range(len(self.counts))] for s in ((), *self.subsets)])
-
-    @cached_property
-    def pooled(self) -> tuple[Array, float]:
-        """Sizes that are the same in all sensors, and their log likelihood ratio."""
-        normal, right = (a[self.usual].sum(axis=0) for a in (self.normal, self.right))
-        mean = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right
-        return mean, float(right @ mean) / 2
-
-    def found(
-        self, mean: Array, shares: Array, scatter: float
-    ) -> tuple[float, list[Array], Array, Array]:
-        """Log likelihood, odds of each subset (n,), sizes and shares, from given ones on."""
-        before, odds = -np.inf, list[Array]()
+        names, normal, right = tuple(start), self.normal[:, at[:, None], at], self.right[:, at]
+        subsets = [s for r in range(len(names)) for s in combinations(names, r + 1)]
+        places = [np.flatnonzero(np.isin(of, subset)) for subset in subsets]
+        has = np.array([[name in subset for name in names] for subset in ((), *subsets)])
+        whole, pulled = (a[self.usual].sum(axis=0) for a in (normal, right))
+        same = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
+        shares, alike = np.array([*start.values()]), float(pulled @ same) / 2
+        mean, before = same / np.array([start[name] for name in of]), -np.inf
+        odds = np.zeros((1 + len(subsets), len(right)))
         for _ in range(MAX_STEPS):
-            variances = np.array([
-                max(scatter**2 * float(np.mean(mean[self.of == k] ** 2)), 1e-12)
-                for k in range(len(self.counts))
-            ])[self.of]  # fmt: skip
-            odds, taken, seen = [], [], []
-            for at in self.places:
-                n, b = self.normal[:, at[:, None], at], self.right[:, at]
+            squares = {name: float(np.mean(mean[of == name] ** 2)) for name in names}
+            variances = np.array([max(scatter**2 * squares[name], 1e-12) for name in of])
+            taken, seen = [], []
+            for row, at in enumerate(places, start=1):
+                n, b = normal[:, at[:, None], at], right[:, at]
                 m, s = mean[at], variances[at]
                 inverse = np.linalg.inv(n + np.diag(1 / s))
                 pull = b + m / s
-                odds.append(
+                odds[row] = (
                     np.einsum("nk,nkl,nl->n", pull, inverse, pull) / 2
                     - m @ (m / s) / 2
                     - np.linalg.slogdet(np.eye(len(at)) + s[:, None] * n)[1] / 2
@@ -312,18 +391,48 @@ class _Search:
                 lost = n @ inverse
                 taken.append(n - lost @ n)
                 seen.append(b - np.einsum("nkl,nl->nk", lost, b))
-            prior = np.where(self.has, np.log(shares), np.log1p(-shares)).sum(axis=1)
-            logs = np.array([0 * odds[0], *odds]) + prior[:, None]
+            prior = np.where(has, np.log(shares), np.log1p(-shares)).sum(axis=1)
+            logs = odds + prior[:, None]
             total = np.logaddexp.reduce(logs)
             if (now := float(total[self.usual].sum())) < before + LIKELIHOOD_TOLERANCE:
                 break
             before = now
-            weights = np.zeros((len(self.subsets), len(total)))
+            weights = np.zeros((len(subsets), len(total)))
             weights[:, self.usual] = np.exp(logs[1:] - total)[:, self.usual]
             whole, pulled = np.zeros((len(mean),) * 2), np.zeros(len(mean))
-            for at, w, a, b in zip(self.places, weights, taken, seen, strict=True):
+            for at, w, a, b in zip(places, weights, taken, seen, strict=True):
                 whole[np.ix_(at, at)] += np.einsum("n,nkl->kl", w, a)
                 pulled[at] += w @ b
-            shares = np.clip(weights.sum(axis=1) @ self.has[1:] / len(self.usual), 0.01, 0.999)
+            shares = np.clip(weights.sum(axis=1) @ has[1:] / len(self.usual), 0.01, 0.999)
             mean = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
-        return before, odds, mean, shares
+        return OfType(
+            odds=dict(zip(((), *subsets), odds, strict=True)),
+            log_likelihood=before,
+            sizes={name: mean[of == name] for name in names},
+            shares=dict(zip(names, shares.tolist(), strict=True)),
+            alike=alike,
+        )
+
+    def apart(self, names: Names, name: str, rival: str) -> tuple[float, float]:
+        """Noncentrality that an effect leaves beside a rival of it, and without the rival.
+
+        Parameters
+        ----------
+        names : set of effects
+        name : str, one of them
+        rival : str, another effect that may be there in its place
+        """
+        of_type, shapes = self.sets[names], {**self.shapes[rival,], **self.shapes[names]}
+        normal, mean = self.normal[self.usual].sum(axis=0), of_type.sizes[name]
+        own = self.columns[shapes[name]]
+        others = [other for other in names if other != name]
+
+        def left(beside: Sequence[str]) -> float:
+            parts = [self.columns[shapes[other]] for other in beside]
+            rest = np.concatenate([np.zeros(0, dtype=int), *parts])
+            cross = normal[np.ix_(own, rest)]
+            inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
+            shown = normal[np.ix_(own, own)] - cross @ inverse @ cross.T
+            return float(of_type.shares[name] * mean @ shown @ mean)
+
+        return left([*others, rival]), left(others)

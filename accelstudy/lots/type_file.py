@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
@@ -13,7 +13,10 @@ from accelstudy.basics.plugins import as_a_key
 from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import DataSheet
 from accelstudy.files.outputs import whole_file
-from accelstudy.lots.calibrated import CalibratedLot, TypeParameter
+from accelstudy.lots.parameters import TypeParameter
+
+if TYPE_CHECKING:
+    from accelstudy.lots.output import Lot
 
 SHEET = {
     "bias": "bias",
@@ -27,14 +30,14 @@ BOUND_PROBABILITY = 0.9
 """Probability with which the scatter is below its bound."""
 
 
-def write_type(lot: CalibratedLot, folder: Path) -> bool:
+def write_type(lot: Lot, folder: Path) -> bool:
     """Write type.yaml: for `--model`, `--prior`, and as a data sheet for `plan --sensor`.
 
     Odd sensors do not count, and what is sudden is no matter of the type.
 
     Parameters
     ----------
-    lot : CalibratedLot
+    lot : Lot
     folder : Path
 
     Returns
@@ -44,7 +47,7 @@ def write_type(lot: CalibratedLot, folder: Path) -> bool:
     """
     if (sensors := len(lot.usual)) < 2:
         return False
-    model = lot.lot.model
+    model = lot.diagnosis.model
     lasting = [effect for effect in model.effects if not effect.sudden]
     wanted = {parameter.name for effect in lasting for parameter in effect.parameters}
     parameters = {
@@ -91,16 +94,16 @@ def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalPara
     )
 
 
-def _sheet(lot: CalibratedLot, parameters: dict[str, TypicalParameter]) -> DataSheet:
+def _sheet(lot: Lot, parameters: dict[str, TypicalParameter]) -> DataSheet:
     """Noise of a position mean, which is that of the median sensor, and errors when it is new."""
     title = f"{len(lot.usual)} sensors of a type"
-    noises = lot.lot.noises
+    noises = lot.diagnosis.noises
     sigmas = [
-        fit.sigma_position if (noise := noises[fit.campaign.name]) is None else noise.sigma
-        for fit in lot.usual
+        fit.sigma_position if (noise := noises[i]) is None else noise.sigma
+        for i, fit in lot.usual.items()
     ]
     values: dict[str, Any] = {"position_sigma": float(np.median(sigmas))}
-    for effect in lot.lot.model.effects:
+    for effect in lot.diagnosis.model.effects:
         if (quantity := SHEET.get(effect.name)) is not None:
             of_effect = [parameters[parameter.name] for parameter in effect.parameters]
             squares = [one.mean**2 + one.scatter**2 for one in of_effect]

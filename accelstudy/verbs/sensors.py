@@ -54,11 +54,10 @@ def compare(
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
     from accelstudy.api.calibrations import as_calibration
-    from accelstudy.epochs import history
-    from accelstudy.epochs.output import Comparison
+    from accelstudy.epochs.comparison import Comparison
 
     pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
-    return Comparison(history.compare(*pair), float(tilt_range))  # in SI by `verb`
+    return Comparison(*pair, float(tilt_range))  # in SI by `verb`
 
 
 @verb
@@ -107,9 +106,7 @@ def history(
             years
     """
     from accelstudy.api.calibrations import as_calibration
-    from accelstudy.epochs.history import follow
-    from accelstudy.epochs.interval import Interval
-    from accelstudy.epochs.output import History
+    from accelstudy.epochs.history import History, dated
 
     check_once(calibrations, "calibration")
     sensors = [as_calibration(one).sensor for one in calibrations]
@@ -117,11 +114,10 @@ def history(
         str(one) if isinstance(one, str | PathLike) else f"calibration {i}"
         for i, one in enumerate(calibrations, start=1)
     ]
-    course = follow(sensors, dates, names)
-    if tilt_accuracy is None:
-        return History(course, None)
-    wanted = map(float, (tilt_accuracy, tilt_range, confidence))  # in SI by `verb`
-    return History(course, Interval(course, *wanted))
+    wanted = None
+    if tilt_accuracy is not None:
+        wanted = float(tilt_accuracy), float(tilt_range), float(confidence)  # in SI by `verb`
+    return History(sensors, dated(sensors, dates, names), wanted)
 
 
 @verb
@@ -161,15 +157,12 @@ def lot(
         accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
     from accelstudy.api.calibrations import as_campaign, chosen
-    from accelstudy.api.lots import Lot
-    from accelstudy.lots.run import MIN_SENSORS, evaluate_lot
+    from accelstudy.lots.output import Lot
 
     given = [one for each in campaigns for one in folders_of(each)]
     check_once(given, "sensor")
-    if len(given) < MIN_SENSORS:
-        raise InputError("CAMPAIGN: a lot has two sensors or more; `diagnose` takes one")
     measured = [as_campaign(one) for one in given]
-    return Lot(evaluate_lot(measured, *chosen(model, approach), seed, cores))
+    return Lot.of(measured, *chosen(model, approach), seed, cores)
 
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:

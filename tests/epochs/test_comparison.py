@@ -12,7 +12,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.document import json_text
-from accelstudy.epochs.history import compare
+from accelstudy.epochs.comparison import Comparison
 from accelstudy.leveling.angles import angles_of, wrapped
 from accelstudy.leveling.error import cap_forces
 
@@ -24,6 +24,10 @@ def calibrated(seed, **options):
     return calibration_of(json.loads(json_text(document(seed, **options))))
 
 
+def compare(first, second):
+    return Comparison(first, second, 50 * GON)
+
+
 def test_a_robot_and_gravity_have_the_same_sensor_in_common():
     """Without noise a calibration by gravity is that by the robot, with the rotation taken out."""
     options = {"effects": (*SENSOR, CROSS), "sigma": 1e-9, "robot_sigma": 2e-11}
@@ -31,11 +35,11 @@ def test_a_robot_and_gravity_have_the_same_sensor_in_common():
     by_robot = calibrated(2, model=f"{NINE}-crossaxis", approach="robot", **options)
     for c in (compare(by_gravity, by_robot), compare(by_robot, by_gravity)):
         assert c.model.name == NINE
-        np.testing.assert_allclose(*c.values, atol=1e-8)
+        np.testing.assert_allclose(*c.estimates, atol=1e-8)
         assert c.left_out(by_robot) == ["cross_axis_misalignment"]
         assert c.left_out(by_gravity) == []
         # Their tilts are relative to the sensor's own axes: a rotation is no change.
-        assert c.tilt(50 * GON)[0].max() < 1e-8
+        assert c.tilt[0].max() < 1e-8
 
 
 def test_what_is_brought_to_a_smaller_model_scatters_as_is_said():
@@ -46,7 +50,7 @@ def test_what_is_brought_to_a_smaller_model_scatters_as_is_said():
     first = calibrated(1, model=f"{NINE}+thermal_bias", effects=effects, temperature=(15, 35),
                        temperature_order="random")  # fmt: skip
     each = [compare(first, calibrated(seed, effects=effects, **robot)) for seed in range(2, 14)]
-    values = np.array([c.values[1] for c in each])
+    values = np.array([c.estimates[1] for c in each])
     roots = [np.linalg.cholesky(c.covariances[1]) for c in each]
     apart = [
         np.linalg.solve(r, d) for r, d in zip(roots, values - values.mean(axis=0), strict=True)
@@ -62,7 +66,7 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
     forces = cap_forces(50 * GON, 5000, second.gravity)
     readings = first.model.sense(forces, first.parameters)
     apart = wrapped(angles_of(second.correct(readings)) - angles_of(forces))
-    np.testing.assert_allclose(c.tilt(50 * GON)[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
+    np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
     assert [c.parameters[i].name for i in c.change.changed] == ["b_y"]
 
 

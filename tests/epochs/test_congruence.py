@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from accelstudy.epochs.congruence import LEVEL, POWER, Epochs, dof_of_squares
+from accelstudy.epochs.congruence import LEVEL, POWER, Differences, dof_of_squares
 
 N = 1000
 STANDARD_ERRORS = 3.3
@@ -37,7 +37,9 @@ def test_the_level_is_kept_with_noise_of_any_kind(dof, noise):
     true = [s**2 * cofactors(rng, n) for s, n in zip(noise, (40, 25), strict=True)]
     n = 200
     each = zip(differences(rng, sum(true), n), *(estimated(rng, r, n) for r in dof), strict=True)
-    rejected = [not Epochs(d, (v * true[0], w * true[1]), dof).test().congruent for d, v, w in each]
+    rejected = [
+        not Differences(d, (v * true[0], w * true[1]), dof).test.congruent for d, v, w in each
+    ]
     assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, n)
     # Where none of two similar variances is sure the level is not reached; not by far with these.
     assert np.mean(rejected) >= LEVEL / 2 - tolerance(LEVEL / 2, n)
@@ -75,7 +77,7 @@ def test_few_positions_by_gravity_beside_many_with_a_robot_keep_the_level(n, rat
         sessions.append((noise @ solve.T, solve @ solve.T, variance))
     (one, q, s), (other, r, t) = sessions
     rejected = [
-        not Epochs(b - a, (v * q, w * r), (n - P, 63)).test().congruent
+        not Differences(b - a, (v * q, w * r), (n - P, 63)).test.congruent
         for a, b, v, w in zip(one, other, s, t, strict=True)
     ]
     assert np.mean(rejected) <= LEVEL + tolerance(LEVEL, draws)
@@ -96,11 +98,11 @@ def test_a_detectable_change_is_found_about_as_often_as_is_said(dof, least):
     rng = np.random.default_rng(2)
     q = cofactors(rng, 40)
     change = np.zeros(P)
-    change[3] = Epochs(change, (q, q), (dof, dof)).detectable()[3]
+    change[3] = Differences(change, (q, q), (dof, dof)).detectable[3]
     n = 200
     drawn = differences(rng, 2 * q, n) + change
     variances = zip(estimated(rng, dof, n), estimated(rng, dof, n), strict=True)
-    found = [not Epochs(d, (v * q, w * q), (dof, dof)).test().congruent
+    found = [not Differences(d, (v * q, w * q), (dof, dof)).test.congruent
              for d, (v, w) in zip(drawn, variances, strict=True)]  # fmt: skip
     assert least - tolerance(POWER, n) <= np.mean(found) <= POWER + tolerance(POWER, n)
 
@@ -109,12 +111,12 @@ def test_the_parameter_that_changed_is_named_and_no_other():
     rng = np.random.default_rng(3)
     q = cofactors(rng, 40), cofactors(rng, 25)
     none, one, two = np.zeros((3, P))
-    one[4] = 3 * Epochs(none, q, (np.inf, np.inf)).detectable()[4]
-    two[[0, 4]] = 3 * Epochs(none, q, (np.inf, np.inf)).detectable()[[0, 4]]
+    one[4] = 3 * Differences(none, q, (np.inf, np.inf)).detectable[4]
+    two[[0, 4]] = 3 * Differences(none, q, (np.inf, np.inf)).detectable[[0, 4]]
     n = 200
     for true, said in ((none, ()), (one, (4,)), (two, (0, 4))):
         right = [
-            Epochs(d, q, (np.inf, np.inf)).changed == said
+            Differences(d, q, (np.inf, np.inf)).changed == said
             for d in true + differences(rng, sum(q), n)
         ]
         assert np.mean(right) >= 1 - LEVEL - tolerance(LEVEL, n)
@@ -124,6 +126,6 @@ def test_parameters_that_cannot_be_told_apart_are_named_together():
     correlation = np.eye(3)
     correlation[0, 1] = correlation[1, 0] = -0.999
     covariance = correlation / 2
-    epochs = Epochs(np.array([0.2, 0.0, 0.3]), (covariance, covariance), (np.inf, np.inf))
-    (found,) = epochs.changed
-    assert epochs.instead_of(found) == (1 - found,)
+    change = Differences(np.array([0.2, 0.0, 0.3]), (covariance, covariance), (np.inf, np.inf))
+    (found,) = change.changed
+    assert change.instead_of(found) == (1 - found,)

@@ -67,7 +67,7 @@ def test_what_is_not_there_is_found_no_more_often_than_is_said(sigmas, dof):
 def test_intervals_hold_rate_and_scatter(sigmas, scatter):
     """Without scatter the interval of the rate is wider than it need be: nobody knows."""
     rates, scatters = zip(
-        *((c.rate_interval, c.line.scatter_interval())
+        *((c.rate.interval, c.line.scatter_interval())
           for c in drawn(2, sigmas, rate=0.4, scatter=scatter)), strict=True,
     )  # fmt: skip
     low, high = np.transpose(scatters)
@@ -91,17 +91,17 @@ def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
         walk = 100 * np.sqrt(np.diff(years)) * rng.standard_normal(n_sessions - 1)
         values = rate * years + np.append(0, np.cumsum(walk)) + rng.standard_normal(n_sessions)
         course = Course(years, values, ones, np.inf * ones)
-        usual += course.rate_interval[0] < rate < course.rate_interval[1]
-        wandering += course.wandering_interval[0] < rate < course.wandering_interval[1]
+        usual += course.rate.interval[0] < rate < course.rate.interval[1]
+        wandering += course.wandering_rate.interval[0] < rate < course.wandering_rate.interval[1]
         if "drifts" in course.found(level):
-            named.append(course.may_wander(level))
+            named.append(course.wandering_rate.p_value >= level)
     # Beside a walk that is this large noise is nothing, and the interval exact.
     assert wandering / n == pytest.approx(0.95, abs=tolerance(0.05, n))
     assert usual / n <= 0.8
     # That a drift may be none is said of nearly all that are named, and of no strong one.
     assert np.mean(named) >= 0.8
     strong = Course(years, 1000 * years + rng.standard_normal(n_sessions), ones, np.inf * ones)
-    assert not strong.may_wander(level)
+    assert strong.wandering_rate.p_value < level
 
 
 @pytest.mark.parametrize("true", [None, "drifts", "scatters"])

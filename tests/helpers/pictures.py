@@ -48,7 +48,7 @@ OF_STUDIES = {
 """Pictures of the pages of a study."""
 DRAWN = {
     "plan": ("the command in docs/guides/plan.md", "accelstudy/planning/figure.py"),
-    "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/output.py"),
+    "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/history.py"),
     "designs-efficiency": ("make positions", "studies/positions/efficiency.py"),
     "sequential": ("make positions", "studies/positions/stopping.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),

@@ -9,8 +9,11 @@ import pytest
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import SensorEvidence, mean_sensor
+from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.lot import weigh_lot
+from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
+from accelstudy.sensors.models import get_model
 
 N, REDUNDANCY = 16, 40
 QUIET, ROUGH = 3e-4, 2e-3
@@ -91,6 +94,32 @@ def test_of_several_maxima_the_highest_is_found():
         )
 
 
+@pytest.mark.parametrize("freedom", [8.0, 1e6])
+def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
+    """Variances of 400 sensors about 0.002² with a known scatter, and some with ten times that."""
+    rng = np.random.default_rng(7)
+    squares = 0.002**2 * (freedom / rng.chisquare(freedom, 400)) * rng.chisquare(12, 400) / 12
+    squares[:8] *= 100
+    said = rng.choice([3e-4, 2e-3], 400)
+    noise = Agreement.of(np.sqrt(squares) * said / 0.002, np.full(400, 12), 2 * said)
+    assert noise.factor == pytest.approx(0.5, rel=0.05)
+    assert noise.freedom == pytest.approx(min(freedom, 200.0), rel=0.5)
+
+
+def test_the_mean_of_sensors_has_their_noise_over_the_root_of_their_number():
+    """Also with the seed zero. Of 3 times 63 degrees of freedom an sd has a sigma of 5 %."""
+    made = [simulate_campaign(CampaignSettings(name=f"s{i}", seed=i))[0] for i in range(3)]
+    lot = weigh_lot(made, get_model("bias-scale-nonorthogonality"), seed=0)
+    assert lot.passes[0].mean is not None
+    mean, noise = mean_sensor(made, lot.sensors, [None] * 3)
+    sigma = np.sqrt(np.mean([np.sum(e.residuals**2) / e.redundancy for e in lot.sensors]) / 3)
+    assert noise.sigma == pytest.approx(sigma, rel=0.2)
+    np.testing.assert_allclose(mean.forces, np.mean([one.forces for one in made], axis=0))
+    turned, untimed = replace(made[0], forces=made[0].forces[::-1]), replace(made[0], time=None)
+    for other in (turned, untimed):
+        assert mean_sensor([other, *made[1:]], lot.sensors, [None] * 3) is None
+
+
 def test_the_mean_has_weights_by_known_noise_and_its_variance():
     """Readings that differ by ±1 in units of their own noise, and those of two that have none."""
     base, _ = simulate_campaign(CampaignSettings(name="s", seed=1))
@@ -100,7 +129,7 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
         replace(base, forces=base.forces + s * e) for s, e in zip(sigmas, signs, strict=True)
     ]
     sensors = [
-        SensorEvidence("c", 1.0, {}, {}, (), {}, 30, np.full(30, s * e), 30, variance=s**2)
+        SensorEvidence("c", residuals=np.full(30, s * e), redundancy=30, variance=s**2)
         for s, e in zip(sigmas, signs, strict=True)
     ]
 

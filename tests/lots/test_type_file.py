@@ -17,8 +17,8 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.calibrated import CalibratedLot
 from accelstudy.lots.noise import SensorNoise
+from accelstudy.lots.output import Lot
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -50,10 +50,9 @@ def type_of(sensors, folder):
     named = [SimpleNamespace(campaign=one.name) for one in sensors]
     lot = SimpleNamespace(
         usual=range(len(sensors)), sensors=named, effects=(), model=MODEL,
-        noises={one.name: SensorNoise(0.002, 200.0) for one in sensors},
-        each=lambda: [(one.name, (), 1.0) for one in sensors],
+        noises=[SensorNoise(0.002, 200.0)] * len(sensors),
     )  # fmt: skip
-    assert write_type(CalibratedLot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
+    assert write_type(Lot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
     return folder / "type.yaml"
 
 

@@ -31,13 +31,12 @@ from accelstudy.campaign.calibration.document import (
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.epochs.history import compare, history_of
-from accelstudy.epochs.output import Comparison, History
-from accelstudy.lots.calibrated import CalibratedLot
-from accelstudy.lots.evidence import AnythingOdds, SensorEvidence
-from accelstudy.lots.lot import Lot
+from accelstudy.epochs.comparison import Comparison
+from accelstudy.epochs.history import History
+from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import Anything
-from accelstudy.lots.output import lot_document
+from accelstudy.lots.output import Lot
 from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
@@ -95,10 +94,10 @@ def test_each_key_and_column_of_a_calibration_is_described():
     document |= {"quality": quality_document(assessment)}
     one = calibration_of(json.loads(json_text(document)))
     dates = [datetime(2025, month, 1) for month in (1, 2, 3)]
-    history = History(history_of([one] * 3, dates), None)
+    history = History([one] * 3, dates)
     written = {
         "calibration": document,
-        "comparison": Comparison(compare(one, one), 1.0).content,
+        "comparison": Comparison(one, one, 1.0).content,
         "history": history.content,
         "lot": {**_lot(), "files": []},
     }
@@ -144,15 +143,13 @@ def test_each_name_of_an_exported_calibration_is_described():
 
 def _lot():
     """Content of lot.json, of sensors that lack the same."""
-    name, anything = "thermal_bias", Anything()
-    each = [SensorEvidence(c, 0.5, {name: 20.0}, {}, ((name,),), {}, 9, np.zeros(1)) for c in "abc"]
-    odds = np.array([[20.0], *[[0.0]] * 1000])
+    name, anything = "thermal_bias", Anything({})
+    each = [SensorEvidence(c, 0.5, {name: 20.0}, classes=((name,),)) for c in "abc"]
     for _ in each:
-        anything.add((name,), odds)
-    one = Pass(tuple(each), anything, lambda i: AnythingOdds((name,), odds))
-    model, effects = get_model("bias-scale"), tuple((found, None) for _, found in one.found)
-    lot = Lot((one, one), model, effects)
-    return lot_document(CalibratedLot(lot, model, [None] * 3, get_approach("robot"), {}))
+        anything.add({name: np.array([20.0, *[0.0] * 1000])})
+    one, model = Pass(tuple(each), anything, {}.get), get_model("bias-scale")
+    lot = LotDiagnosis((one, one), model, tuple(one.found))
+    return Lot(lot, model, [None] * 3, get_approach("robot"), {}).content
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean(monkeypatch):

@@ -1,0 +1,323 @@
+"""The mixture of a lot and sizes of a type, beside plain integrals and simulated sensors."""
+
+from dataclasses import replace
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.lots.evidence import DRAWS, SensorEvidence, lot_classes
+from accelstudy.lots.lot import LotDiagnosis
+from accelstudy.lots.mixture import (
+    PRIOR_ALL,
+    PRIOR_EQUAL,
+    PRIOR_FURTHER,
+    PRIOR_MISSING,
+    PRIOR_ODD,
+    Anything,
+    Mixture,
+)
+from accelstudy.lots.passes import LEVEL, Pass
+from accelstudy.lots.sizes import (
+    SCATTERS,
+    Equations,
+    Joint,
+    SensorEquations,
+    ShapeEquations,
+    TypeSizes,
+    together,
+)
+from accelstudy.sensors.models import get_model
+
+STANDARD_ERRORS = 3.3
+NAMES = ("axis_nonperpendicularity", "gravity_error", "settling")
+"""Effects with a parameter each, whose names alone matter here."""
+SPREAD = 3.0
+"""Sd of what is missing, in units of the noise; a sensor shows it in one number."""
+N, ROWS = 24, 30
+"""Sensors of a type, and the numbers in which each shows its effects."""
+
+
+def odds_of(shown):
+    """Log odds of N(0, 1 + SPREAD²) against N(0, 1)."""
+    total = 1 + SPREAD**2
+    return shown**2 / 2 * (1 - 1 / total) - np.log(total) / 2
+
+
+def shown_by(rng, lacks):
+    """Numbers, of sensors (n, K) that lack things or do not."""
+    lacks = np.asarray(lacks, dtype=float)
+    return rng.standard_normal(lacks.shape) * np.sqrt(1 + (SPREAD * lacks) ** 2)
+
+
+def mixture_of(odds, **known):
+    """Mixture of log odds (n, K) of effects that are equally probable."""
+    names = NAMES[: odds.shape[1]]
+    prior = dict.fromkeys(names, 1 / len(names))
+    return Mixture(dict(zip(names, odds.T, strict=True)), {}, prior, **known)
+
+
+def weighed(odds, rng):
+    """A pass over sensors with these odds (n, 3), whose chances are those of their numbers."""
+    sensors, tested, anything = [], [], Anything({})
+    for i, each in enumerate(odds):
+        known = dict(zip(NAMES, each.tolist(), strict=True))
+        pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
+        sensors.append(SensorEvidence(f"sensor {i}", 0.5, known, pairs, [(n,) for n in NAMES]))
+        chance = odds_of(rng.standard_normal((DRAWS, len(NAMES))))
+        tested.append(dict(zip(NAMES, np.vstack([each, chance]).T, strict=True)))
+        anything.add(tested[-1])
+    return Pass(tuple(sensors), anything, tested.__getitem__)
+
+
+def lot_of(lacks, rng):
+    return weighed(odds_of(shown_by(rng, lacks)), rng)
+
+
+def type_of(rng, sizes, like=0.0, first=0.0):
+    """What sensors with effects of some sizes (n, 3) tell; each is like the one before it."""
+    d = rng.standard_normal((len(sizes), ROWS, 3))
+    d[..., 1] = first * d[..., 0] + np.sqrt(1 - first**2) * d[..., 1]
+    d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
+    z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
+    each = [Equations(a.T @ a, a.T @ b, np.sum(a**2, axis=0)) for a, b in zip(d, z, strict=True)]
+    told = [SensorEquations(e, float(b @ b), ROWS) for e, b in zip(each, z, strict=True)]
+    sets = [s for r in (1, 2) for s in combinations(NAMES, r)]
+    shapes = {names: {name: name for name in names} for names in sets}
+    return d, z, TypeSizes.of(told, NAMES, shapes, range(len(sizes)))
+
+
+def two_effects(rng, like=0.0, first=0.0):
+    """All sensors have the first effect, a third of them the second one, none the third."""
+    lacks = np.zeros((N, 3))
+    lacks[:, 0], lacks[: N // 3, 1] = 1, 1
+    return lacks, *type_of(rng, 0.6 * lacks, like, first)
+
+
+def assert_so_often(said, true, parts, slack):
+    """Of what is said with a probability of p, a part p is so, in each part of the scale."""
+    said, true = np.array(said), np.array(true)
+    for low, high in parts:
+        chosen = (said >= low) & (said <= high)
+        p = np.mean(said[chosen])
+        apart = STANDARD_ERRORS * np.sqrt(p * (1 - p) / chosen.sum()) + slack
+        assert np.mean(true[chosen]) == pytest.approx(p, abs=apart)
+
+
+def test_the_evidence_of_a_set_is_its_integral():
+    rng = np.random.default_rng(1)
+    odds = rng.normal(0, 2, (4, 2))
+    pair = odds.sum(axis=1) - 0.5
+    one, other = NAMES[:2]
+    mixture = replace(mixture_of(odds), prior={one: 0.7, other: 0.3}, pairs={(one, other): pair})
+    strange = PRIOR_ODD * (np.exp(odds) @ [0.7, 0.3])
+
+    def likelihood(a, b=0.0):
+        sets = (1 - a) * (1 - b) + a * (1 - b) * np.exp(odds[:, 0])
+        sets = sets + (1 - a) * b * np.exp(odds[:, 1]) + a * b * np.exp(pair)
+        return np.prod((1 - PRIOR_ODD) * sets + strange)
+
+    def over_shares(function):
+        return (1 - PRIOR_ALL) * integrate.quad(function, 0, 1)[0] + PRIOR_ALL * function(1.0)
+
+    alone = PRIOR_MISSING * (1 - PRIOR_FURTHER) * 0.7
+    both = PRIOR_MISSING * PRIOR_FURTHER
+    expected = {
+        (): (1 - PRIOR_MISSING) * likelihood(0.0),
+        (one,): alone * over_shares(likelihood),
+        (one, other): both * over_shares(lambda a: over_shares(partial(likelihood, a))),
+    }
+    for names, value in expected.items():
+        assert np.exp(mixture.sets[names]) == pytest.approx(value, rel=1e-6)
+    # An effect may as well be equally large in all sensors; then their mean tells.
+    alike = replace(mixture, common={(one,): 3.0}).sets[one,]
+    value = (1 - PRIOR_EQUAL) * expected[one,] + PRIOR_EQUAL * alone * np.exp(3.0)
+    assert np.exp(alike) == pytest.approx(value, rel=1e-6)
+    # Each sensor lacks some set, or is odd.
+    lacks, odd = mixture.sensors
+    np.testing.assert_allclose(sum(lacks.values()) + odd, 1, rtol=1e-6)
+
+
+def test_shares_and_sensors_are_so_as_often_as_is_said():
+    """Of lots that are drawn from the prior; of intervals of the share 95 % hold it."""
+    rng, said, true, inside = np.random.default_rng(2), [], [], []
+    one = PRIOR_MISSING * (1 - PRIOR_FURTHER)
+    for _ in range(150):
+        missing = rng.random() < one / (one + 1 - PRIOR_MISSING)
+        share = 1.0 if rng.random() < PRIOR_ALL else rng.random()
+        lacks = rng.random((20, 1)) < share * missing
+        mixture = mixture_of(odds_of(shown_by(rng, lacks)))
+        said += mixture.having(NAMES[0]).tolist()
+        true += lacks[:, 0].tolist()
+        if missing:
+            _, low, high = mixture.share(NAMES[0])
+            inside.append(low <= share <= high)
+    sigma = np.sqrt(0.95 * 0.05 / len(inside))
+    assert np.mean(inside) == pytest.approx(0.95, abs=STANDARD_ERRORS * sigma)
+    assert_so_often(said, true, ((0.0, 0.2), (0.2, 0.6), (0.6, 0.9), (0.9, 1.0)), 0.03)
+
+
+def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
+    """The evidence is that of one campaign with all residuals, by least squares."""
+    derivatives, z, _ = type_of(np.random.default_rng(8), np.full((4, 3), 0.3))
+    sensors = []
+    for d, one in zip(derivatives, z, strict=True):
+        each = Equations((d.T @ d)[None], (d.T @ one)[None], np.sum(d**2, axis=0)[None])
+        shown = {"effect": ShapeEquations(("effect",), np.zeros((1, 0)), each)}
+        sensors.append(SensorEvidence("c", shown=shown, redundancy=ROWS, square=float(one @ one)))
+    joint = together(sensors)["effect"]
+    d, one = derivatives.reshape(-1, 3), z.ravel()
+    fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
+    evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 4 * ROWS)
+    part = evidence.of_spaces(np.array([fitted @ fitted]), [3], one @ one)[0]
+    assert joint.odds == pytest.approx(part - evidence.of_noise(one @ one)[0], rel=1e-6)
+    assert joint.spec == "effect"
+
+
+def test_sizes_of_the_type_say_which_sensors_have_it():
+    """Of what is said with a probability of p, a part p is so, and intervals hold the share."""
+    rng, said, true, inside, n = np.random.default_rng(9), [], [], [], 60
+    first = NAMES[0]
+    for _ in range(n):
+        share = 1.0 if rng.random() < PRIOR_ALL else rng.random()
+        lacks = rng.random(20) < share
+        sizes = np.zeros((20, 3))
+        sizes[:, 0] = 0.43 * (1 + 0.25 * rng.standard_normal(20)) * lacks
+        *_, of_lot = type_of(rng, sizes)
+        alone = replace(of_lot, shapes={(first,): {first: first}}).sets
+        mixture = mixture_of(np.zeros((20, 1)), common={(first,): 50.0}, typical=alone)
+        said += mixture.having(first).tolist()
+        true += lacks.tolist()
+        _, low, high = mixture.share(first)
+        inside.append(low <= share <= high)
+    assert_so_often(said, true, ((0.0, 0.2), (0.8, 1.0)), 0.05)
+    assert np.mean(inside) > 0.95 - STANDARD_ERRORS * np.sqrt(0.0475 / n)
+    right = (np.array(said) > 0.5) == np.array(true)
+    # With sizes that are known, and as many sensors with it as without: Φ(√λ/2).
+    assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.43 / 2) - 0.03
+
+
+def test_odds_are_the_integral_over_the_sizes_of_the_type():
+    _, _, _, sizes = two_effects(np.random.default_rng(1))
+    both = NAMES[:2]
+    of_type = sizes.sets[both]
+    assert of_type.shares[NAMES[0]] > 0.9
+    assert of_type.shares[NAMES[1]] == pytest.approx(1 / 3, abs=0.15)
+
+    def integral(i, names, scatter):
+        """Log of the mean of exp(ℓ) over normal sizes, by quadrature."""
+        at = [NAMES.index(name) for name in names]
+        normal, right = sizes.normal[i][np.ix_(at, at)], sizes.right[i][at]
+        mean = np.concatenate([of_type.sizes[name] for name in names])
+        # The trapezoidal rule is exact to rounding for what has ended at the limits.
+        steps = np.linspace(-9, 9, 301)
+        grid = np.stack(np.meshgrid(*[steps] * len(at), indexing="ij"), axis=-1)
+        grid = grid.reshape(-1, len(at))
+        b = mean + scatter * abs(mean) * grid
+        density = np.prod(stats.norm.pdf(grid), axis=1) * (steps[1] - steps[0]) ** len(at)
+        quadratic = np.einsum("nk,kl,nl->n", b, normal, b)
+        return np.log(np.sum(density * np.exp(b @ right - quadratic / 2)))
+
+    for i, names in ((0, both[:1]), (20, both[1:]), (3, both)):
+        odds = of_type.odds[names][i]
+        near = [integral(i, names, scatter) - odds for scatter in SCATTERS]
+        assert min(map(abs, near)) < 1e-3 * max(1, abs(odds))
+
+
+def test_what_a_third_has_is_found_beside_what_all_have():
+    """Of ten lots; by itself a sensor shows it with a noncentrality of 11."""
+    rng, named, right = np.random.default_rng(2), 0, []
+    for _ in range(10):
+        lacks, _, _, sizes = two_effects(rng, like=0.7)
+        common = {(name,): sizes.sets[name,].alike - 3 for name in NAMES}
+        mixture = mixture_of(np.zeros((N, 3)), common=common, typical=sizes.sets)
+        named += next(iter(mixture.sets)) == NAMES[:2]
+        right.append(np.mean((mixture.having(NAMES[1]) > 0.5) == lacks[:, 1]))
+    assert named >= 9
+    # With a known size the error is Φ(−√λ/2) where half of the sensors have it, and less here.
+    assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.6 / 2) - 0.03
+
+
+@pytest.mark.parametrize("like", [0.3, 0.99])
+def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
+    _, d, _, sizes = two_effects(np.random.default_rng(3), like=like, first=0.8)
+    columns = d.reshape(-1, 3)
+    own, expected = 0.6 * columns[:, 1], []
+    for beside in ([0, 2], [0]):
+        others = columns[:, beside]
+        left = own - others @ np.linalg.lstsq(others, own, rcond=None)[0]
+        expected.append(left @ left / 3)
+    found = sizes.apart(NAMES[:2], *NAMES[1:])
+    assert found == pytest.approx(expected, rel=0.4)
+    assert found[0] / found[1] == pytest.approx(expected[0] / expected[1], rel=0.02)
+
+
+def test_the_noise_is_that_which_the_best_effects_leave():
+    """In units of it, what a sensor tells of an effect that it lacks scatters as noise does."""
+    true = np.zeros((400, 3))
+    true[:, 0], true[:200, 1] = 3.0, -2.0
+    *_, sizes = type_of(np.random.default_rng(4), true)
+    told = []
+    for normal, right in zip(sizes.normal, sizes.right, strict=True):
+        by = np.linalg.solve(normal[:2, :2], normal[:2, 2])
+        told.append((right[2] - by @ right[:2]) / np.sqrt(normal[2, 2] - by @ normal[:2, 2]))
+    assert np.std(told) == pytest.approx(1, abs=STANDARD_ERRORS / np.sqrt(800))
+
+
+def test_nothing_missing_is_called_so_at_one_level():
+    rng, n = np.random.default_rng(4), 100
+    p = [lot_of(np.zeros((10, 3)), rng).p_value for _ in range(n)]
+    for level in (LEVEL / 2, 0.2):
+        sigma = np.sqrt(level * (1 - level) / n)
+        assert np.mean(np.array(p) < level) == pytest.approx(level, abs=STANDARD_ERRORS * sigma)
+
+
+def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
+    rng = np.random.default_rng(5)
+    lacks = np.zeros((20, 3))
+    lacks[:12, 2] = 1
+    assert [found.names for found in lot_of(2 * lacks, rng).found] == [NAMES[2:]]
+    odds = odds_of(shown_by(rng, np.zeros((20, 3))))
+    odds[:, 1] = -1.0
+    odds[7, 1] = 25.0
+    one = weighed(odds, rng)
+    lot = LotDiagnosis((one, one), get_model("bias-scale"))
+    assert lot.missing
+    assert one.found == []
+    assert [(o.campaign, o.names) for o in lot.odd] == [("sensor 7", (NAMES[1],))]
+    assert [one.names for one in lot.each if one.names] == [("odd",)]
+    # Without it the others are weighed as before, with the sizes of the type, too.
+    true = np.zeros((20, 3))
+    true[:, 0] = 0.6
+    *_, sizes = type_of(rng, true)
+    alone = replace(sizes, shapes={NAMES[:1]: {NAMES[0]: NAMES[0]}})
+    joint = {NAMES[0]: Joint(alone.sets[NAMES[:1]].alike, NAMES[0])}
+    rest = replace(one, together=joint, sizes=alone).without_odd()
+    assert len(rest.sensors) == 19
+    assert [*rest.classes] != [*one.classes]  # their order follows the evidence
+    assert rest.p_value > one.p_value
+    assert rest.alternatives[0][0] == NAMES[:1]
+    assert rest.mixture.share(NAMES[0])[0] > 0.9
+
+
+def test_a_sensor_is_odd_though_a_second_one_shows_the_same_by_chance():
+    """Two of sixteen are too many for odd ones, and too few for a type."""
+    odds = np.full((16, 3), -1.0)
+    odds[9, 1], odds[4, 1] = 35.0, 2.8
+    one = weighed(odds, np.random.default_rng(6))
+    assert one.found == []
+    assert [(o.campaign, o.names) for o in one.odd] == [("sensor 9", (NAMES[1],))]
+
+
+def test_names_that_no_campaign_tells_apart_are_one_class():
+    def shows(*classes):
+        odds = {name: 1.0 - i / 10 for i, name in enumerate(sorted(n for c in classes for n in c))}
+        return SensorEvidence("c", odds=odds, classes=classes)
+
+    alike = [shows(("a", "b"), ("c",))] * 2
+    assert lot_classes(alike) == {"a": ("a", "b"), "c": ("c",)}
+    assert [*lot_classes([*alike, *[shows(("a",), ("b",), ("c",))] * 3])] == ["a", "b", "c"]
