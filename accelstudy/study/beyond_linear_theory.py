@@ -20,12 +20,6 @@ def knows_all(study: Study) -> bool:
     return study.simulated_effects is None and not study.noise.effects
 
 
-def is_compared(cells: Any) -> Any:
-    """Whether cells, one or more rows of the table `cells`, are compared with linear theory."""
-    simulated = (cells["control"] == "linear") & (cells["n_converged"] > 1)
-    return simulated & (cells["gravity_error_mps2"] == 0)
-
-
 def beyond_linear_theory(cells: pd.DataFrame, summary: pd.DataFrame) -> pd.DataFrame:
     """Bias and excess of the variance of each parameter of each cell, with their uncertainties.
 
@@ -42,7 +36,9 @@ def beyond_linear_theory(cells: pd.DataFrame, summary: pd.DataFrame) -> pd.DataF
     """
     from scipy import special
 
-    rows = summary[summary["cell"].isin(cells["cell"][is_compared(cells)])]
+    compared = (cells["control"] == "linear") & (cells["n_converged"] > 1)
+    compared &= cells["gravity_error_mps2"] == 0
+    rows = summary[summary["cell"].isin(cells["cell"][compared])]
     relative = (rows["sd_empirical"] / rows["sd_linear"]) ** 2
     errors = {
         "bias": rows["bias_se"] / rows["sd_empirical"],

@@ -35,7 +35,7 @@ from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files import validation as kinds
-from accelstudy.files.reading import config_hash, overlay, read_layer
+from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import Block, Configuration, OneOrMore, checked
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
@@ -446,8 +446,8 @@ class Study(Configuration):
     )
     schemes: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
-        description="positions of the schemes that are read from files, as `scheme`, `title`, "
-        "`source` and `directions`; filled in when the configuration is read",
+        description="positions of schemes that have no file, as `scheme`, `title`, `source` and "
+        "`directions`, by the names that `grids` has for them; `accelstudy plan` writes them",
     )
     grids: list[Grid] = Field(default_factory=list, description="sets of cells")
     presets: Presets | None = Field(None, description="Table 1 of the paper")
@@ -494,13 +494,6 @@ class Study(Configuration):
             return parse(content)
         finally:
             OWN_MODELS.reset(before)
-
-    @model_validator(mode="after")
-    def _keep_schemes_of_files(self) -> Study:
-        for scheme in (scheme for grid in self.grids for scheme in grid.schemes):
-            if (content := held(scheme.name)) is not None:
-                self.schemes[scheme.name] = content
-        return self
 
     def check(self) -> None:
         """Check that all fits together; jobs read a configuration that was checked before.
@@ -612,11 +605,6 @@ class Study(Configuration):
             configured = given[key].in_si(get_effect(key)) if key in given else {}
             values |= {p.name: configured.get(p.name, 0.0) for p in effect.parameters}
         return values
-
-    @property
-    def fingerprint(self) -> str:
-        """Hash of everything that the numbers depend on, defaults included."""
-        return config_hash(self.model_dump(mode="json"))
 
 
 def _shown(value: float) -> str:

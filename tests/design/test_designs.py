@@ -115,14 +115,11 @@ def test_a_study_depends_on_what_the_file_holds(tmp_path):
         path.write_text(yaml.safe_dump({"scheme": "mine", "directions": directions}))
         return study(path)
 
-    first = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, -1, 0])
-    (cell,) = first.cells
+    (cell,) = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, -1, 0]).cells
     assert cell.scheme.startswith("mine@")
     np.testing.assert_array_equal(cell.positions.directions[0], [0, 0, 1])
-    second = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, 1, 1])
-    (other,) = second.cells
+    (other,) = write([0, 0, 2], [0, 1, 0], [1, 0, 0], [0, 1, 1]).cells
     assert other.scheme != cell.scheme
-    assert second.fingerprint != first.fingerprint
     assert other.seed(1, 0).entropy != cell.seed(1, 0).entropy
     moved = path.rename(tmp_path / "elsewhere.yaml")
     assert study(moved).cells == [other]
@@ -132,7 +129,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     path = tmp_path / "some.yaml"
     path.write_text("directions: [[0, 0, 1], [0, 1, 0], [1, 0, 0]]\n")
     (cell,) = study(path).cells
-    plain = study(path).model_dump(mode="json")
+    plain = study(path, schemes={cell.scheme: files.held(cell.scheme)}).model_dump(mode="json")
     path.unlink()
     monkeypatch.setattr(files, "_read", {})
     same = pickle.loads(pickle.dumps(cell))
@@ -140,9 +137,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     np.testing.assert_array_equal(same.positions.directions, np.eye(3)[::-1])
     with pytest.raises(InputError, match="unknown scheme 'some@"):
         get_scheme(cell.scheme)
-    again = parse_study(plain)
-    assert again.cells == [cell]
-    assert again.fingerprint == parse_study(plain).fingerprint
+    assert parse_study(plain).cells == [cell]  # as a plan writes it
     np.testing.assert_array_equal(get_scheme(cell.scheme).directions, same.positions.directions)
     plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
     with pytest.raises(InputError, match=r"schemes.*is the name of other positions"):

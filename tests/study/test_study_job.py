@@ -14,6 +14,7 @@ from study_helpers import make_study
 
 from accelstudy import jobs
 from accelstudy.basics.errors import InputError
+from accelstudy.files.reading import config_hash
 from accelstudy.jobs import code_version, job, killed_notice
 
 
@@ -44,7 +45,10 @@ def log(tmp_path):
 def test_a_job(log, capsys):
     with a_job(log) as provenance:
         logging.getLogger("accelstudy").info("at work")
-    assert provenance == {"config_hash": make_study().fingerprint, "seed": 1}
+    assert provenance == {
+        "config_hash": config_hash(make_study().model_dump(mode="json")),
+        "seed": 1,
+    }
     assert log.read_text().rstrip().endswith("INFO at work")
     assert capsys.readouterr().err == ""
 
