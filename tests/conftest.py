@@ -19,6 +19,7 @@ LONGEST = (
     "test_diagnosis_output.py", "test_golden.py", "test_figures.py", "test_lots.py",
     "test_strangers.py", "test_explorer.py", "test_optimal.py", "test_diagnosis.py",
     "test_api.py", "test_designs.py", "test_campaign_batch.py", "test_stopping.py",
+    "test_hidden_physics.py",
 )  # fmt: skip
 """The longest first."""
 
