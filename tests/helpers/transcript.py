@@ -126,6 +126,8 @@ def _in_a_line(loop):
 
 UNREAD = re.compile(r"/(\.\w+|__pycache__|benchmarks|tables|estimates|logs|parts)/")
 """Folders of times, and of what lies between the steps of a workflow."""
+SILENT = "snakemake "
+"""Commands that print jobs with their times, in any order, of which nothing is told."""
 MANY = 3
 """Folders alike that are read, each; of more, the first."""
 FORK = multiprocessing.get_context("fork")
@@ -161,8 +163,8 @@ class Shell:
             return f"=== {command}\nnot run: {why}\n\n"
         before = self._files()
         status, printed, warned = self.run(command)
-        if command.startswith("snakemake ") and not status:
-            printed = warned = ""  # jobs with their times, in any order
+        if command.startswith(SILENT) and not status:
+            printed = warned = ""
         lines = [f"=== {command}", *([f"exit status {status}"] if status else [])]
         lines += [f"> {line}".rstrip() for line in printed.splitlines()]
         lines += [f"! {line}".rstrip() for line in warned.splitlines()]
@@ -192,14 +194,15 @@ class Shell:
     def run(self, command):
         """Exit status and both streams of a command."""
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            return self._run(command, out, err), _content(out), _content(err)
+            status = self._run(command, out, err)
+            return status, _content(out), _content(err)
 
     def output(self, command):
         """What a command, which must end well, shows on a terminal."""
         with tempfile.TemporaryFile() as shown:
             if self._run(command, shown, shown):
                 raise RuntimeError(f"{command}: {_content(shown)}")
-            return _content(shown)
+            return "" if command.startswith(SILENT) else _content(shown)
 
     def _run(self, command, out, err):
         if command.startswith("cd "):
