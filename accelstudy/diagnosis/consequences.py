@@ -67,7 +67,7 @@ def parameter_changes(
     variance : float, of unit weight
     """
     u, residuals = base.model.n_parameters, Residuals.of(base)
-    rows = np.concatenate([residuals.whitened(frame.signature(e)) for e in effects], axis=1)
+    rows = np.concatenate([residuals.whitened(frame.signatures((e,))) for e in effects], axis=1)
     shift = np.linalg.lstsq(base.design, rows, rcond=None)[0][:u]
     added = slice(u, u + rows.shape[1])
     # By the same theory the noise of the effect's size is all that makes the change uncertain.

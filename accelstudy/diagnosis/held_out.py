@@ -337,7 +337,7 @@ def chosen_place(
     part: Problem, split: LinearSplit, noise: Array, place: Place
 ) -> tuple[Ints, Array]:
     """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
-    unknown, z, frame = part.unknown, split.residuals(part.residuals, noise), split.frame
+    unknown, z = part.unknown, split.residuals(part.residuals, noise)
     assert unknown is not None
     each = unknown.of_place(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
     most = np.max([*each.values()], axis=0)
@@ -348,7 +348,7 @@ def chosen_place(
         best = np.argmax([log_sum(one.logs) for one in shapes], axis=0)
         for i, one in enumerate(shapes):
             sizes = np.argmax(one.logs, axis=1)
-            shown = frame.residuals.whitened(frame.signature(one.effect)) * one.effect.deviations
+            shown = split.frame.rows(one.effect) * one.effect.deviations
             for size in np.unique(sizes[best == i]):
                 yield (best == i) & (sizes == size), shown, one.trace / SIZES[size]
 

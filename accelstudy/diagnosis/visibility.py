@@ -54,7 +54,6 @@ class Visibility:
     mdb : float, minimal detectable size of a parameter, the worst one, SI; infinite if a
         combination of parameters does not show
     mib : float, size at which the effect can also be told from the nearest other one, likewise
-    unit : str, SI unit of the parameters
     confused : tuple of (name, cosine), the nearest other effects
     easiest : Effect, in the shape that all this is said of; None if it is not visible
     hardest : Effect, in the shape that is hardest to see of those that a diagnosis tries
@@ -66,17 +65,21 @@ class Visibility:
     reason: str = ""
     mdb: float = np.inf
     mib: float = np.inf
-    unit: str = ""
     confused: tuple[tuple[str, float], ...] = ()
     easiest: Effect | None = None
     hardest: Effect | None = None
     hardest_mdb: float = np.inf
 
+    @property
+    def unit(self) -> str:
+        """SI unit of the parameters."""
+        return get_effect(self.name).parameters[0].unit
+
 
 def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
     """Signature of each parameter of an effect in the residual space, (m, k)."""
     assert hypothesis.effect is not None
-    return frame.residuals.project(frame.residuals.whitened(frame.signature(hypothesis.effect)))
+    return frame.residuals.project(frame.rows(hypothesis.effect))
 
 
 def whole_shapes(shapes: Iterable[Hypothesis]) -> list[Hypothesis]:
@@ -151,28 +154,20 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
         for rival in rivals:
             rest = columns[easiest] - rival.basis @ (rival.basis.T @ columns[easiest])
             left = np.minimum(left, np.linalg.norm(rest, axis=0))
-        assert best.effect is not None
         rows.append(
             Visibility(
                 name=name,
                 status="visible",
                 mdb=mdbs[easiest],
                 mib=_size(root, left),
-                unit=best.effect.parameters[0].unit,
                 confused=near[:3],
                 easiest=best.effect,
                 hardest=judged[hardest].effect,
                 hardest_mdb=mdbs[hardest],
             )
         )
-    rows += [
-        Visibility(name, "invisible", unit=get_effect(name).parameters[0].unit)
-        for name in examined.invisible
-    ]
-    rows += [
-        Visibility(name, "untestable", reason, unit=get_effect(name).parameters[0].unit)
-        for name, reason in examined.untestable.items()
-    ]
+    rows += [Visibility(name, "invisible") for name in examined.invisible]
+    rows += [Visibility(name, "untestable", why) for name, why in examined.untestable.items()]
     return sorted(rows, key=lambda row: row.name)
 
 

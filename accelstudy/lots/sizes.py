@@ -178,7 +178,7 @@ def sensor_equations(
     residuals, columns = frame.residuals, []
     for effect in effects:
         try:
-            columns.append(residuals.whitened(frame.signature(effect)))
+            columns.append(frame.rows(effect))
         except InputError:  # a column is absent
             columns.append(np.zeros((len(residuals.z), len(effect.parameters))))
     side_by_side = Equations.of(frame, np.concatenate(columns, axis=1)[:, None])

@@ -16,6 +16,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
+from accelstudy.diagnosis.visibility import examine_campaign
 from accelstudy.effects import effect_names
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.conversion import Conversion
@@ -98,13 +99,13 @@ def test_no_effect_is_silently_absent(gravity):
     """Every effect is in the model, tested, invisible, or untestable with the reason."""
     few, _ = simulate_campaign(CampaignSettings(scheme="icosahedron-12", approach="gravity"))
     for measured in (gravity, few, replace(gravity, temperature=None, time=None)):
-        found = diagnosis_document(diagnose(measured, NINE))
-        tested = {c["name"] for c in found["screening"]["candidates"]}
-        listed = [*found["invisible_effects"], *found["untestable_effects"]]
+        examined = examine_campaign(measured, NINE)
+        tested = {*examined.candidates}
+        listed = [*examined.invisible, *examined.untestable]
         known = {effect.name for effect in NINE.effects}
         assert (tested | set(listed) | known) >= set(effect_names())
         assert not tested & set(listed)
-        assert all(found["untestable_reasons"][name] for name in found["untestable_effects"])
+        assert all(examined.untestable.values())
 
 
 def test_counts_are_diagnosed_like_what_they_count(robot):

@@ -139,7 +139,7 @@ def test_the_limit_of_a_parameter_holds_where_no_noise_is_stated():
     assert residuals.redundancy == 5
     names = [n for n, shapes in examined.candidates.items() if {h.dim for h in shapes} == {1}]
     shape = examined.candidates[next(n for n in names if n != OUTLIER)][0]
-    columns = residuals.whitened(examined.frame.signature(shape.effect))
+    columns = examined.frame.rows(shape.effect)
     size = 1000 / float(np.linalg.norm(residuals.project(columns)))
     short = 0
     for _ in range(n := 1500):

@@ -10,12 +10,13 @@ from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
-from accelstudy.diagnosis.decision import posterior
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem
 from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.held_out import Gap
+from accelstudy.diagnosis.pipeline import decide, diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
+from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.pages import lines
 
@@ -67,7 +68,7 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
 
 
 @pytest.mark.parametrize(("known", "level"), [(True, GIVEN), (False, NOT_GIVEN)])
-def test_a_diagnosis_decides_at_the_levels(monkeypatch, known, level):
+def test_a_diagnosis_decides_at_the_levels(known, level):
     """Noise alone, of which the test says that it is on either side of a level.
 
     What has no name counts at the level of a calibration that accepts the fit, and both say the
@@ -75,16 +76,15 @@ def test_a_diagnosis_decides_at_the_levels(monkeypatch, known, level):
     """
     measured = campaign(1, scheme="mclaren-24", sigma_known=known)[0]
     says = calibrated_lines(assess(fit_campaign(measured, NINE, ROBOT)))
+    case = diagnose(measured, NINE).case
     for p, verdict, weak in (
         (level + 1e-6, "no_effect", False),
         (level - 1e-6, "no_effect" if known else "unknown", known),
         (REFUTATION_LEVEL + 1e-6, "no_effect" if known else "unknown", known),
         (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
-        monkeypatch.setattr(
-            posterior, "detect", lambda *given, p=p: replace(detect(*given), p_value=p)
-        )
-        found = diagnose(measured, NINE)
+        vars(case)["detection"] = replace(case.detection, p_value=p)
+        found = Diagnosis(case, decide(case), Gap(1.0))
         assert (found.verdict, found.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:

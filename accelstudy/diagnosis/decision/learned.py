@@ -218,7 +218,7 @@ class PlaceShape:
         cls, effect: Learned, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
     ) -> PlaceShape | None:
         """Weigh a shape by errors (b, m) in a space of residuals; None if too little shows."""
-        rows = residuals.whitened(frame.signature(effect)) * effect.deviations
+        rows = frame.rows(effect) * effect.deviations
         left = residuals.project(rows)
         trace = float(np.sum(left**2))
         if not trace > RULES.visible_shape * float(np.sum(rows**2)):

@@ -83,9 +83,9 @@ class Frame:
             hold=implied_hold(solution, angles),
         )
 
-    def signature(self, effect: Effect) -> Signature:
-        """Signature of an effect of the sensor."""
-        return self.signatures((effect,))
+    def rows(self, effect: Effect) -> Array:
+        """What an effect does to the conditions of unit weight, by its parameters, (m, k)."""
+        return self.residuals.whitened(self.signatures((effect,)))
 
     def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
         """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
