@@ -19,7 +19,7 @@ from accelstudy.diagnosis.decision.learned import (
     most_probable_place,
     weigh_place,
 )
-from accelstudy.diagnosis.decision.noise import exceeds_stated, unit_variance
+from accelstudy.diagnosis.decision.noise import exceeds_stated, judged_noise
 from accelstudy.diagnosis.decision.posterior import Alternatives, Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
@@ -114,7 +114,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
     if isinstance(refit, str):
         return replace(gap, reason=refit)
     known = problem.evidence.level.known
-    variance = unit_variance(problem, finding.frame) if known else None
+    variance = judged_noise(problem, finding.frame).variance if known else None
     test = held_out_gap(base, refit, first.observed.take(held), held, variance, rngs[1])
     if others:
         another = "effect" if place is None else "coordinate or target"

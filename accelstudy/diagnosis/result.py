@@ -16,15 +16,15 @@ from accelstudy.adjustment.quality import GlobalTest, Solution, global_test, sus
 from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.assessment import OUTLIER_LEVEL
+from accelstudy.campaign.calibration.fit import JudgedNoise
 from accelstudy.campaign.gross_errors.recognition import Recognised
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
 from accelstudy.diagnosis.decision.learned import shares_of_places
 from accelstudy.diagnosis.decision.noise import (
     exceeds_stated,
-    sigma_holds,
+    judged_noise,
     tests_of_noise,
-    unit_variance,
     worst_of,
 )
 from accelstudy.diagnosis.decision.posterior import Case, Explanation
@@ -263,7 +263,7 @@ class Diagnosis:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.problem.examined, solution, [one.shape for one in chosen])
-        sigma = np.sqrt(np.diag(cofactors) * self.unit_variance).tolist()
+        sigma = np.sqrt(np.diag(cofactors) * self.noise.variance).tolist()
         each = zip(solution.parameters.tolist(), sigma, strict=False)
         values = dict(zip(solution.model.parameter_names, each, strict=False))
         searched = iter(sigma[len(solution.parameters) :])
@@ -327,19 +327,14 @@ class Diagnosis:
         return self.problem.evidence.level.known
 
     @cached_property
-    def sigma_holds(self) -> bool:
-        """Whether sigma is given, and the final fit does not refute it."""
-        return sigma_holds(self.problem, self.final)
+    def noise(self) -> JudgedNoise:
+        """Whether the residuals of the final fit bear sigma, and the variance that is quoted."""
+        return judged_noise(self.problem, self.final)
 
     @property
     def exceeds_stated(self) -> bool:
         """Whether sigma is given, and the residuals of the final fit are larger than it allows."""
         return exceeds_stated(self.problem, self.final)
-
-    @cached_property
-    def unit_variance(self) -> float:
-        """Variance of unit weight that is taken for the noise."""
-        return unit_variance(self.problem, self.final)
 
     @cached_property
     def noise_tests(self) -> tuple[NoiseTest, ...]:
@@ -349,7 +344,7 @@ class Diagnosis:
     @property
     def sigma_position(self) -> float:
         """Noise of a position mean, m/s², that the diagnosis assumes."""
-        return float(np.sqrt(self.unit_variance) * np.mean(self.final.residuals.sigmas[:, :3]))
+        return float(np.sqrt(self.noise.variance) * np.mean(self.final.residuals.sigmas[:, :3]))
 
     @property
     def weights(self) -> list[float]:
@@ -376,7 +371,7 @@ class Diagnosis:
     def shape(self) -> LearnedShape | None:
         """The function that was learned."""
         learned = self.verdict == LEARNED
-        return shape_of(self.problem, self.finding, self.unit_variance) if learned else None
+        return shape_of(self.problem, self.finding, self.noise.variance) if learned else None
 
     @cached_property
     def like(self) -> tuple[LikeShape, ...]:
@@ -398,7 +393,7 @@ class Diagnosis:
         """Tilt error without and with what was found, rad; None if there is nothing to compare."""
         if not self.finding.chosen:
             return None
-        return leveling_rms(self.base, self.final.solution, self.frame.hold, self.unit_variance)
+        return leveling_rms(self.base, self.final.solution, self.frame.hold, self.noise.variance)
 
     @property
     def better_for_leveling(self) -> str | None:
@@ -414,7 +409,7 @@ class Diagnosis:
         effects = [one.shape.shown for one in self.finding.chosen if one.shape.shown is not None]
         if not effects or len(effects) < len(self.finding.chosen):
             return ()
-        final, variance = self.final.solution, self.unit_variance
+        final, variance = self.final.solution, self.noise.variance
         return parameter_changes(self.base, self.frame, effects, final, variance)
 
     @cached_property
@@ -427,7 +422,7 @@ class Diagnosis:
             names += [name for alike in classes for name in alike]
         same = self.final is self.frame
         examined = self.problem.examined if same else ExaminedFit.of(self.final)
-        return tuple(upper_limits(examined, self.sigma_holds, names))
+        return tuple(upper_limits(examined, self.noise.trusted, names))
 
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:
@@ -452,7 +447,7 @@ class Diagnosis:
         base = self.base
         if is_exact(base):
             return {}
-        trusted = sigma_holds(self.problem, self.frame)
+        trusted = judged_noise(self.problem, self.frame).trusted
         marked = suspects(base.model, base.approach, base.observed, OUTLIER_LEVEL, trusted)
         return {int(self.campaign.positions[s.position]): s.p_value for s in marked}
 
@@ -460,5 +455,5 @@ class Diagnosis:
     def implausible(self) -> list[str]:
         """Parameters of the final fit that no sensor has."""
         final, u = self.final.solution, self.extended.n_parameters
-        sigma = np.sqrt(np.diag(final.cofactors)[:u] * self.unit_variance)
+        sigma = np.sqrt(np.diag(final.cofactors)[:u] * self.noise.variance)
         return implausible_parameters(self.extended.effects, final.parameters[:u], sigma)

@@ -27,7 +27,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.fit import JudgedNoise, fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -432,7 +432,7 @@ def test_numbers_of_many_positions_do_not_meet():
     solution = SimpleNamespace(whitening=np.eye(3)[None])
     gap = SimpleNamespace(held_out=SimpleNamespace(before=2.0, after=1.0, floor=1.0))
     final = SimpleNamespace(solution=solution)
-    diagnosis = SimpleNamespace(gap=gap, final=final, unit_variance=1e-6)
+    diagnosis = SimpleNamespace(gap=gap, final=final, noise=JudgedNoise(True, 1e-6))
     with mpl.rc_context(STYLE):
         figure = gap_figure(diagnosis, positions)
         figure.draw_without_rendering()

@@ -10,9 +10,8 @@ from scipy import stats
 
 from accelstudy.diagnosis.decision import verdict
 from accelstudy.diagnosis.decision.noise import (
+    judged_noise,
     lack_of_fit,
-    sigma_holds,
-    unit_variance,
     worst_of,
 )
 from accelstudy.diagnosis.decision.posterior import Posterior
@@ -155,6 +154,7 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
     problem = repeated(level, scatter)
     e = problem.base.solution.misclosures[:, 0] / 0.002
-    assert sigma_holds(problem, problem.frame) == holds
+    judged = judged_noise(problem, problem.frame)
+    assert judged.trusted == holds
     variance = 1.0 if holds else np.sum(e**2) / 27
-    assert unit_variance(problem, problem.frame) == pytest.approx(variance, rel=1e-3)
+    assert judged.variance == pytest.approx(variance, rel=1e-3)

@@ -10,6 +10,7 @@ from scipy import special
 
 from accelstudy.adjustment.quality import Solution, pooled_variance
 from accelstudy.basics.levels import REFUTATION_LEVEL
+from accelstudy.campaign.calibration.fit import JudgedNoise
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import Problem, is_exact
 from accelstudy.diagnosis.evidence.noise_tests import (
@@ -121,28 +122,20 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
     return level_test(frame.residuals, frame.solution.sigma_dof)
 
 
-def sigma_holds(problem: Problem, frame: Frame) -> bool:
-    """Whether sigma is given, and the residuals of a fit do not refute it."""
-    stated = problem.evidence.level.known
-    return stated and level_test_of(problem, frame).p_value >= REFUTATION_LEVEL
+def judged_noise(problem: Problem, frame: Frame) -> JudgedNoise:
+    """Judge sigma by the residuals of a fit; where it is refuted, or none is given, they are it."""
+    residuals = frame.residuals
+    stated, r = problem.evidence.level.known, residuals.redundancy
+    if not stated or level_test_of(problem, frame).p_value < REFUTATION_LEVEL:
+        return JudgedNoise(trusted=False, variance=residuals.variance)
+    omega = r * residuals.variance
+    return JudgedNoise(True, pooled_variance(omega, r, frame.solution.sigma_dof))
 
 
 def exceeds_stated(problem: Problem, frame: Frame) -> bool:
     """Whether sigma is given, and the residuals of a fit are larger than it allows."""
-    return (
-        problem.evidence.level.known
-        and not sigma_holds(problem, frame)
-        and frame.residuals.variance > 1
-    )
-
-
-def unit_variance(problem: Problem, frame: Frame) -> float:
-    """Variance of unit weight: of the given sigma where that holds, else a posteriori."""
-    residuals = frame.residuals
-    if not sigma_holds(problem, frame):
-        return residuals.variance
-    r = residuals.redundancy
-    return pooled_variance(r * residuals.variance, r, frame.solution.sigma_dof)
+    refuted = problem.evidence.level.known and not judged_noise(problem, frame).trusted
+    return refuted and frame.residuals.variance > 1
 
 
 def worst_of(tests: Sequence[NoiseTest]) -> NoiseTest | None:

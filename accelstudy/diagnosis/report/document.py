@@ -21,7 +21,7 @@ from accelstudy.campaign.calibration.document import (
     json_content,
     quality_document,
 )
-from accelstudy.campaign.calibration.fit import CampaignFit, JudgedNoise, campaign_estimability
+from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
@@ -57,7 +57,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "noise": {
             "sigma_mps2": d.sigma_position,
-            "sigma_source": "a-priori" if d.sigma_holds else "residuals",
+            "sigma_source": "a-priori" if d.noise.trusted else "residuals",
             "tests": [_some(t, "name", "statistic", "p_value", "remark") for t in d.noise_tests],
         },
         "screening": {
@@ -192,7 +192,7 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
             calibrate(d.extended, d.approach, observed), cofactors=solution.cofactors[None]
         ),
         estimability=campaign_estimability(campaign, d.extended, d.approach),
-        judged=JudgedNoise(d.sigma_holds, d.unit_variance),
+        judged=d.noise,
     )
 
 
@@ -267,8 +267,8 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
             table[f"residual_{name}_{when}_mps2"] = pd.Series(values, rows)
     for when, fitted, rows in fits:
         tests = position_tests(fitted)
-        table[f"test_{when}"] = pd.Series(tests.w / np.sqrt(d.unit_variance), rows)
-        p = tests.p_known if d.sigma_holds else tests.p_unknown
+        table[f"test_{when}"] = pd.Series(tests.w / np.sqrt(d.noise.variance), rows)
+        p = tests.p_known if d.noise.trusted else tests.p_unknown
         table[f"p_{when}"] = pd.Series(p, rows)
     for k, when in enumerate(("before", "after")):
         missed = {} if held is None else dict(zip(held.held, held.misses[k], strict=True))

@@ -392,7 +392,7 @@ def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     ax, bars = figure.subplots(1, 2, width_ratios=[2.6, 1])
     held = positions[positions["split"] == "held-out"]
     before, after = (1e3 * held[f"predicted_{when}_mps2"] for when in ("before", "after"))
-    sigma = 1e3 * condition_sigma(diagnosis.final.solution, diagnosis.unit_variance)
+    sigma = 1e3 * condition_sigma(diagnosis.final.solution, diagnosis.noise.variance)
     place = np.arange(len(held))
     ax.axhspan(0, sigma, color=NOISE, label="noise alone (1 σ)")
     ax.vlines(place, after, before, color=OTHER_COLOUR, linewidth=0.8)
