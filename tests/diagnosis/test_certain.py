@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import explanation
+from diagnosis_helpers import GRAVITY, NINE, G, explanation
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -22,11 +21,6 @@ from accelstudy.diagnosis.report.words import headline
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import specific_force
-from accelstudy.sensors.models import get_model
-
-NINE = get_model("bias-scale-nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
-G = 9.80665
 
 
 def session(n, rng, approach="gravity"):

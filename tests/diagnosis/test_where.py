@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from diagnosis_helpers import GRAVITY, NINE
 from scipy import stats
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
@@ -16,9 +16,7 @@ from accelstudy.diagnosis.space.hypotheses import LackOfFit, clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 
-NINE, GRAVITY = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
 PLACES = {
     "thermal_bias: 0.002, -0.002, 0.001": ("temperature", "bias"),
     "thermal_scale: 3e-4, -3e-4, 2e-4": ("temperature", "scale"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,23 +76,16 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
     return None
 
 
-@dataclass(frozen=True)
-class FoundPlace:
-    """Where something without a name lives.
-
-    Attributes
-    ----------
-    place : Place
-    probability : float, of all of the posterior
-    names : tuple of str, of the effects beside it in the most probable explanation
-    """
+class PlaceFound(NamedTuple):
+    """Where something without a name lives."""
 
     place: Place
     probability: float
     names: tuple[str, ...]
+    """Effects beside it in the most probable explanation."""
 
 
-def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | None:
+def most_probable_place(problem: Problem, posterior: Posterior) -> PlaceFound | None:
     """Coordinate and target that hold most of a posterior; None if nothing unknown does."""
     totals: dict[Place, float] = defaultdict(float)
     beside: dict[Place, tuple[float, tuple[str, ...]]] = {}
@@ -104,7 +98,7 @@ def most_probable_place(problem: Problem, posterior: Posterior) -> FoundPlace | 
     if not totals:
         return None
     place = max(totals, key=totals.__getitem__)
-    return FoundPlace(place, totals[place], beside[place][1])
+    return PlaceFound(place, totals[place], beside[place][1])
 
 
 def _cause(case: Case, posterior: Posterior, name: str) -> Cause:

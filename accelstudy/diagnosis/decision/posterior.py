@@ -272,7 +272,7 @@ class Alternatives:
                 weighed.append(Explanation((*one.causes, NOT_LISTED), one.log_weight + log + prior))
         return weighed
 
-    def refit(self, chosen: Iterable[Cause]) -> tuple[list[Hypothesis], Solution] | None:
+    def refit(self, chosen: Sequence[Cause]) -> tuple[tuple[Cause, ...], Solution] | None:
         """Fit with those that mean the same as causes and fit best; None without a solution."""
         return best_refit(self.problem.examined, self.singles, chosen)
 
@@ -373,14 +373,15 @@ def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | Non
     fit = case.refit(one.causes)
     if fit is None:
         return one, None
-    best, solution = fit
+    refitted, solution = fit
     z, basis = case.problem.residuals.z, np.concatenate([h.basis for h in one.best], axis=1)
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
     gain = max(float(left @ left) - solution.omega, 0.0)
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
     first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
-    causes = tuple(replace(c, best=h) for c, h in zip(one.causes, best, strict=True))
+    both = zip(one.causes, refitted, strict=True)
+    causes = tuple(replace(cause, best=other.best) for cause, other in both)
     return Explanation(causes, weight), solution
 
 

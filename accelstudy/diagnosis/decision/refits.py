@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -53,9 +53,9 @@ def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
 
 
 def best_refit(
-    examined: ExaminedFit, singles: Singles, chosen: Iterable[Cause]
-) -> tuple[list[Hypothesis], Solution] | None:
-    """Fit with the members of classes that fit best; None if none has a solution.
+    examined: ExaminedFit, singles: Singles, chosen: Sequence[Cause]
+) -> tuple[tuple[Cause, ...], Solution] | None:
+    """Fit with the members of classes that fit best, by their own names; None without a solution.
 
     To first order the members of a class are the same. Large effects are not of first order.
 
@@ -82,7 +82,9 @@ def best_refit(
     # Fits that differ by less count as equal: rounding errors must not choose the name.
     best, fit = next(item for item in solved if item[1].omega <= least + RULES.same_fit)
     u = len(fit.parameters)
-    return best, replace(fit, cofactors=with_settings(examined, fit, best)[:u, :u])
+    named = zip(chosen, best, strict=True)
+    causes = tuple(Cause(h.name, one.members, h, one.posterior) for one, h in named)
+    return causes, replace(fit, cofactors=with_settings(examined, fit, best)[:u, :u])
 
 
 STEP = 1e-4

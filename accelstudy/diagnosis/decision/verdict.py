@@ -26,7 +26,6 @@ from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STE
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
-from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.plausibility import impossible_parameters
@@ -86,7 +85,7 @@ class Finding:
         """Explanations any of which would be what was chosen."""
         if self.verdict != "unknown":
             return self.credible_set
-        added = {choice.members for choice in self.chosen}
+        added = {cause.members for cause in self.chosen}
         parts = [part for part in self.statement.certain if part.names[0].members in added]
         alternatives = product(*(part.names for part in parts))
         return tuple(Explanation(one, posterior=parts[0].posterior) for one in alternatives)
@@ -122,10 +121,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         reason = _against(case.problem, top, fit)
         if fit is None or reason is not None:
             return Finding("unknown", frame, reason, posterior=posterior)
-        found = [
-            Cause(best.name, members, best, top.posterior)
-            for best, members in zip(fit[0], top.classes, strict=True)
-        ]
+        found = [replace(cause, posterior=top.posterior) for cause in fit[0]]
         found.sort(key=lambda one: one.shape.effect is not None)
         credible, verdict = posterior.credible_set, ""
         of_effects = sum(one.posterior for one in credible if one.of_effects)
@@ -148,7 +144,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
 
 
 def _against(
-    problem: Problem, top: Explanation, fit: tuple[list[Hypothesis], Solution] | None
+    problem: Problem, top: Explanation, fit: tuple[tuple[Cause, ...], Solution] | None
 ) -> Reason | None:
     """Why an explanation cannot be the answer, however probable; None if it can."""
     if fit is None:
@@ -206,14 +202,10 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
     chosen = [cause for _, cause in _certain_effects(case, posterior, says)]
     if not chosen:
         return finding
-    fit = _fit_of(case, chosen)
+    fit = case.refit(chosen)
     if fit is None:
         return replace(finding, statement=Statement((), ()))
-    added = tuple(
-        Cause(best.name, one.members, best, one.posterior)
-        for one, best in zip(chosen, fit[0], strict=True)
-    )
-    return replace(finding, frame=Frame.of(fit[1]), chosen=added)
+    return replace(finding, frame=Frame.of(fit[1]), chosen=fit[0])
 
 
 def _certain_effects(case: Case, posterior: Posterior, says: Statement) -> list[tuple[Part, Cause]]:
@@ -243,16 +235,9 @@ def _perhaps_imitations(case: Case, posterior: Posterior) -> set[str]:
     return names
 
 
-def _fit_of(case: Case, chosen: Sequence[Cause]) -> tuple[list[Hypothesis], Solution] | None:
-    """Fit with what was chosen, the base fit if that is nothing; None if it has no solution."""
-    if not chosen:
-        return [], case.problem.frame.solution
-    return case.refit(chosen)
-
-
 def _disagreement(case: Case, chosen: Sequence[Cause]) -> float:
     """Ω that a fit leaves beyond the given noise, all if none is given; ∞ without a solution."""
-    fit = _fit_of(case, chosen)
+    fit = case.refit(chosen) if chosen else ((), case.problem.frame.solution)
     if fit is None:
         return np.inf
     noise = fit[1].redundancy * float(case.problem.evidence.level.known)
