@@ -19,7 +19,6 @@ Stat. Soc. B 82, 1273), costs far less and finds less where signatures are corre
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -176,20 +175,12 @@ class _Search:
         best = {places: tuple(self.shapes[i] for i in self.found[places][1]) for places in several}
         logs = {places: self.found[places][0] for places in several}
         least = max(self.weights.values(), default=0.0) - RULES.bounds_within
-        bounded = defaultdict[str, list[tuple[Places, int]]](list)
         for places in several:
-            for i, one in enumerate(best[places]):
-                if self.weights[places] > least and one.estimates is not None:
-                    bounded[one.name].append((places, i))
-        for each in bounded.values():
-            shapes = [best[places][i] for places, i in each]
-            rest = [
-                column_basis(np.concatenate([h.basis for h in best[places] if h is not shape], 1))
-                for (places, _), shape in zip(each, shapes, strict=True)
-            ]
-            change = self._bounds(shapes, rest) - self._bounds(shapes)
-            for (places, _), factor in zip(each, change.tolist(), strict=True):
-                logs[places] += factor
+            for one in best[places] if self.weights[places] > least else ():
+                if one.estimates is not None:
+                    others = [other.basis for other in best[places] if other is not one]
+                    beside = [column_basis(np.concatenate(others, axis=1))]
+                    logs[places] += float((self._bounds([one], beside) - self._bounds([one]))[0])
         return [EffectSet(best[places], logs[places]) for places in several]
 
     def _beside(self, chosen: tuple[int, ...]) -> tuple[float, Array]:

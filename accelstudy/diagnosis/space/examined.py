@@ -90,17 +90,14 @@ class ExaminedFit:
 
     def alike(self, others: Sequence[Hypothesis]) -> set[str]:
         """Effects indistinguishable from any of the given hypotheses, in one of their shapes."""
-        dims = np.array([other.dim for other in others])
         ideals, ends = self._ideals
-        products = np.concatenate([other.ideal for other in others], axis=1).T @ ideals
-        products = np.add.reduceat(products**2, ends[:-1], axis=1)
-        # The squared cosines sum to the squares of all products, so most need no decomposition.
-        squares = np.add.reduceat(products, np.cumsum(dims) - dims, axis=0)
         same: set[str] = set()
-        for i, k in np.argwhere(squares > dims[:, None] * RULES.alike**2).tolist():
-            shape = self._shapes[k]
-            if shape.name not in same and same_space(others[i], shape):
-                same.add(shape.name)
+        for other in others:
+            # The squared cosines sum to the squares of all products: most need no decomposition.
+            squares = np.sum((other.ideal.T @ ideals) ** 2, axis=0)
+            near = np.add.reduceat(squares, ends[:-1]) > other.dim * RULES.alike**2
+            shapes = (self._shapes[k] for k in np.flatnonzero(near))
+            same |= {one.name for one in shapes if one.name not in same and same_space(other, one)}
         return same
 
     def nearest(self, hypothesis: Hypothesis) -> tuple[tuple[str, float], ...]:

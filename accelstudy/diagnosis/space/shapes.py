@@ -124,16 +124,9 @@ class LearnedShapes(Shapes):
         cls, places: Sequence[Place], weights: Array, roots: Sequence[Array], m: int
     ) -> LearnedShapes:
         """Decompose covariances C Cᵀ, given by C (m, l), scaled to the trace 1."""
-        decomposed: dict[int, tuple[Array, Array]] = {}
-        widths = np.array([root.shape[1] for root in roots])
-        for width in np.unique(widths):
-            alike = np.flatnonzero(widths == width)
-            # Together they take a third less time than one by one.
-            grams = np.stack([roots[i].T @ roots[i] for i in alike.tolist()])
-            decomposed |= zip(alike.tolist(), zip(*np.linalg.eigh(grams), strict=True), strict=True)
         vectors, shares = [np.zeros((m, 0))], []
-        for i, root in enumerate(roots):
-            values, turned = decomposed[i]
+        for root in roots:
+            values, turned = np.linalg.eigh(root.T @ root)
             kept = np.flatnonzero(values > MIN_TRACE_SHARE * values.sum())[-MAX_DIRECTIONS:]
             vectors.append(root @ (turned[:, kept] / np.sqrt(values[kept])))
             shares.append(values[kept] / values[kept].sum())
