@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import display_unit, to_display
-from accelstudy.basics.wording import counted, short_list
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.gross_errors.recognition import check_plausible
 from accelstudy.campaign.header import LogLayout, Place
@@ -26,6 +25,7 @@ from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
+from accelstudy.pages import lines
 from accelstudy.sensors.conversion import Conversion, conversion_of
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 Imported = tuple[Campaign, Holds | None]
 """A campaign, and the holds that it was made of; None of a table of means."""
 
+TEMPLATE = "campaign/importing/logs.txt.j2"
 MAX_ACROSS_RATIO = 1.5
 """Noise across gravity, as a multiple of that along it, from which on a warning says that the
 sensor turns within its holds."""
@@ -189,39 +190,32 @@ def _campaign_of_holds(holds: Holds, reference: ReferenceLog | None) -> Imported
         beside = reference.angles_for(holds, offset, gravity)
         holds = beside.holds
     table, forces, left_out = holds.table, holds.means - offset, dict(holds.left_out)
-    several = len(log.parts) > 1
-    warnings = [*holds.warnings, *_doubts(holds, gravity)]
-    for i, part in enumerate(log.parts, 1):
-        if several and i not in holds.table.index:
-            warnings.append(f"{part.path}: no static hold; position {i} is missing")
-    warnings += log.warnings()
+    noise, timed = holds.noise, holds.size is None or "time" in log.first.places
+    rounded = noise.rounding > MIN_ROUNDING_RATIO * noise.accuracy.allan
     columns: dict[str, Any] = {}
-    if (holds.size is None or "time" in log.first.places) and (not several or log.timed):
+    if timed and (len(log.parts) == 1 or log.timed):
         columns["time"] = ((table["t0"] + table["t1"]) / 2).to_numpy()
     for name in log.conditions:
         if table[name].notna().all():
             columns[name] = table[name].to_numpy()
-        else:
-            hold = table.index[table[name].isna()][0]
-            warnings.append(f"hold {hold} has no {name}; the column is left out")
-    notes = [*_taken(holds, settings, offset)]
+    warnings = _warnings(holds, gravity)
     if beside is not None:
         columns |= beside.columns
         warnings += beside.warnings
         left_out = {**beside.left_out, **left_out}
-        notes.append(beside.note)
+    note = "" if beside is None else beside.note
     campaign = _campaign(
         log.path,
         settings,
         forces,
         positions=table.index.to_numpy(),
-        sigma_force=holds.noise.sigma,
-        sigma_dof=float(round(holds.noise.dof)),
-        resolution=holds.windows.steps if _rounds(holds) else None,
+        sigma_force=noise.sigma,
+        sigma_dof=float(round(noise.dof)),
+        resolution=holds.windows.steps if rounded else None,
         n_samples=table["n"].to_numpy(),
         sd=np.column_stack([table[name] for name in SDS]),
         log=_layout_of(settings, log.first),
-        notes=tuple(_lines(holds, notes)),
+        notes=tuple(_notes(holds, settings, bool(offset.any()), note, rounded)),
         warnings=tuple(warnings),
         **columns,
     )
@@ -288,106 +282,47 @@ def _layout_of(settings: LogLayout, log: Log) -> LogLayout:
     return LogLayout.model_validate({**layout, "columns": columns, "time": time})
 
 
-# --- What is said of it --------------------------------------------------------------------------
-
-
-def _lines(holds: Holds, notes: list[str]) -> Iterator[str]:
-    """What was found in a log, in lines; `notes` say how it was read."""
-    accuracy, noise, step = holds.noise.accuracy, holds.noise, holds.log.step
-    counts = holds.table["n"]
-    mean, lengths = f"{accuracy.duration:.1f} s", counts * step
-    time = holds.log.time[holds.windows.centred]
-    log = f"log: {time[-1] - time[0]:.1f} s at {1 / step:.6g} per second"
-    found = f"holds: {len(counts)}, of {lengths.min():.1f} to {lengths.max():.1f} s"
-    if holds.size is not None:
-        mean = f"{accuracy.duration / step:.0f} samples"
-        each = mean if counts.min() == counts.max() else f"{counts.min()} to {counts.max()}"
-        log = f"log: {counts.sum()} samples"
-        found = f"blocks: {len(counts)}, of {each}, each a position"
-    yield log
-    yield from notes
-    yield f"threshold: {holds.threshold.sd:.3g} m/s², {holds.threshold.reason}"
-    yield found
-    if holds.left_out:
-        each = ", ".join(f"{n} ({why})" for n, why in sorted(holds.left_out.items()))
-        kind = "hold" if holds.size is None else "block"
-        yield f"left out: {counted(len(holds.left_out), kind)}: {each}"
-    yield (
-        f"sigma of a mean over {mean}: {shown(accuracy.allan)} (Allan), "
-        f"{shown(accuracy.white)} if the noise were white; ratio {accuracy.ratio:.2f}"
-    )
-    if _rounds(holds):
-        yield (
-            f"quantisation: readings in steps of {steps_text(holds.windows.steps)}; rounding "
-            f"leaves {shown(noise.rounding)} in a mean, however long the hold; together "
-            f"{shown(noise.sigma)}"
-        )
-
-
-def _rounds(holds: Holds) -> bool:
-    """Whether rounding to the steps of the readings counts beside the noise of a mean."""
-    return holds.noise.rounding > MIN_ROUNDING_RATIO * holds.noise.accuracy.allan
-
-
-def _taken(holds: Holds, settings: ImportSettings, offset: Array) -> Iterator[str]:
-    """How a log was read: its columns, axes and files, and an offset that was found."""
-    recording, log = holds.log, holds.log.first
+def _notes(
+    holds: Holds, settings: ImportSettings, offset: bool, reference: str, rounded: bool
+) -> list[str]:
+    """How a log was read, and what was found in it, a line each."""
+    log = holds.log.first
     names = [name if log.source.named else f"column {name}" for name in log.source.names]
-    used = {key: names[place] for key, place in log.places.items()}
-    sensors = (recording.parts, *recording.others)
+    sensors = (holds.log.parts, *holds.log.others)
     taken = {place for logs in sensors for place in logs[0].places.values()}
-    unused = [name for place, name in enumerate(names) if place not in taken]
-    forces = ", ".join(used[axis] for axis in AXES)
-    time = f"time from {used['time']}, " if "time" in used else ""
-    if time and log.places["time"] not in log.source.dates:
-        time = f"time from {used['time']} ({log.layout.time_unit}), "
-    conditions = "".join(f", {key} from {used[key]}" for key in log.conditions)
-    yield (
-        f"columns: {time}forces from {forces} ({log.layout.unit}){conditions}"
-        + (f"; not used: {short_list(unused)}" if unused else "")
+    time = holds.log.time[holds.windows.centred]
+    return lines(
+        TEMPLATE,
+        "notes",
+        holds,
+        settings,
+        used={"time": "", "temperature": ""} | {key: names[i] for key, i in log.places.items()},
+        dated=log.places.get("time") in log.source.dates,
+        unused=[name for place, name in enumerate(names) if place not in taken],
+        heat=[names[place] for place in thermometers(log.source.names)],
+        offset=offset,
+        reference=reference,
+        seconds=time[-1] - time[0],
+        steps=steps_text(holds.windows.steps) if rounded else "",
+        shown=shown,
     )
-    if "temperature" not in used and (heat := thermometers(log.source.names)):
-        each = short_list([names[place] for place in heat])
-        yield f"temperature: which of {each}, in °C? Give `columns` temperature=NAME"
-    yield from log.source.notes
-    if settings.frame != "frd":
-        yield f"axes: {settings.frame} in the log, turned to frd (forward, right, down) here"
-    if offset.any():
-        given = ", ".join(f"{x:.0f}" for x in settings.offset or ())
-        yield f"offset: {given} counts, from the positions, as none was given"
-    if len(recording.parts) > 1:
-        of_each = "each as a whole one position"
-        if holds.size is None:
-            of_each = (
-                "with the longest hold of each as one position; what is before and after it does "
-                "not count"
-            )
-        untold = (
-            "" if recording.timed else "; the times of the files do not tell that of a position"
-        )
-        yield f"files: {len(recording.parts)}, {of_each}{'' if recording.timed else untold}"
 
 
-def _doubts(holds: Holds, gravity: float) -> Iterator[str]:
-    """What the user should know about the accuracy of the mean over a typical hold."""
-    noise, accuracy = holds.noise, holds.noise.accuracy
-    if not noise.directed:
-        yield (
-            "the norms of the means differ too much for specific forces (is an offset missing?); "
-            "sigma is taken over all axes"
-        )
-    elif noise.across > MAX_ACROSS_RATIO * accuracy.allan:
+def _warnings(holds: Holds, gravity: float) -> list[str]:
+    """What the user should know of a log and its holds, a line each."""
+    noise, parts = holds.noise, holds.log.parts
+    turned = ""
+    if noise.across > MAX_ACROSS_RATIO * noise.accuracy.allan:
         turned = f"{to_display(noise.across / gravity, 'rad'):.0f} {display_unit('rad')}"
-        yield (
-            f"across gravity the means vary by {shown(noise.across)}, more than along it: the "
-            f"sensor turns by some {turned} within holds"
-        )
-    if accuracy.slope is not None:
-        known, whole = f"{accuracy.tau:.2g} s", f"{accuracy.duration:.2g} s of a hold"
-        if holds.size is not None:
-            known = f"{accuracy.tau / holds.log.step:.0f} samples"
-            whole = f"{holds.size} of a block"
-        yield (
-            f"the Allan deviation is known up to {known}, and extrapolated from there to the "
-            f"{whole} with slope {accuracy.slope:.2f}"
-        )
+    numbered = enumerate(parts, 1) if len(parts) > 1 else ()
+    unknown = {name: holds.table[name].isna() for name in holds.log.conditions}
+    return lines(
+        TEMPLATE,
+        "warnings",
+        holds,
+        holds.log,
+        missing=[(i, part) for i, part in numbered if i not in holds.table.index],
+        turned=turned,
+        lost=[(holds.table.index[lost][0], name) for name, lost in unknown.items() if lost.any()],
+        shown=shown,
+    )

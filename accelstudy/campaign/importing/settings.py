@@ -121,7 +121,7 @@ class ImportSettings(LogLayout):
             which: Which = (
                 Span(float(start), float(end)) if start else tuple(map(int, numbers.split(",")))
             )
-            chosen.append((which, why.strip()))
+            chosen.append((which, " ".join(why.split())))
         return chosen
 
 
