@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 import accelstudy
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.given import of_type, path_of, quantity
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.units import GON, Given
@@ -212,22 +212,6 @@ class Calibration(Result):
 
 
 # --- what is given ------------------------------------------------------------------------------
-
-
-def as_calibration(calibration: Any, name: str = "calibration") -> Calibration:
-    """Return a calibration, read if it is given as the path of its file or folder."""
-    if isinstance(calibration, str | PathLike):
-        file = path_of(name, calibration)
-        file = file / "calibration.json" if file.is_dir() else file
-        content = applying.read_calibration_content(file)
-        calibration_of(content, f"{file}: {applying.NO_CALIBRATION}")
-        return Calibration({"warnings": [], **content})
-    if not isinstance(calibration, Calibration):
-        raise InputError(
-            f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
-            f"{shown(calibration)}"
-        )
-    return calibration
 
 
 def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:

@@ -15,7 +15,6 @@ from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.sources import LogFile, Source
 from accelstudy.files.validation import checked
 from accelstudy.pages.notebook import notebook_html
@@ -50,17 +49,12 @@ class Log:
 
 
 def log_of(log: Any, given: Mapping[str, Any]) -> Log:
-    """Return a log, which is looked at, with the keywords that say how it is read.
-
-    They go before what a `Log` has already.
-    """
+    """Return a log with the keywords that say how it is read; they go before its own."""
     layout = layout_of(given)
     if isinstance(log, Log):
         return replace(log, layout=log.layout | layout)
     if not isinstance(log, pd.DataFrame):
-        path = path_of("log", log, "a path or a DataFrame")
-        open_source(path, layout.get("variable"), layout.get("delimiter"))
-        return Log(path, layout)
+        return Log(path_of("log", log, "a path or a DataFrame"), layout)
     table = log.copy()  # what its owner changes later is not of this log
     rows = table
     if "rate_hz" not in layout and "time" not in layout:

@@ -65,8 +65,9 @@ class Command(click.Command):
     ----------
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
     run : function that does all of it, with the verb's parameters, which are checked, and with
-        those of further options; by default the verb, whose result is written to --out if it has
+        those of further options; by default `make`, whose result is written to --out if it has
         files
+    make : function that returns what is written, with the verb's parameters; by default the verb
     name : str, of the command; that of the verb if omitted
     writes : Kind of the folder that --out names; of a result that is a file, a context manager as
         `accelstudy.files.outputs.new_file`
@@ -85,6 +86,7 @@ class Command(click.Command):
         verb: Callable[..., Any],
         run: Callable[..., None] | None = None,
         *,
+        make: Callable[..., Any] | None = None,
         name: str = "",
         writes: Kind | Place | None = None,
         out: str = "Folder to write to.",
@@ -98,7 +100,8 @@ class Command(click.Command):
     ) -> None:
         self.verb, self.writes, self.reads = verb, writes, reads
         place = partial(result_folder, kind=writes) if isinstance(writes, Kind) else writes
-        self.run = run or (partial(self._save, place) if place else inspect.unwrap(verb))
+        self.make = make or inspect.unwrap(verb)
+        self.run = run or (partial(self._save, place) if place else self.make)
         self.sections = {title: names.split() for title, names in (sections or {}).items()}
         signature = inspect.signature(verb).parameters.values()
         self.arguments = [p for p in signature if p.kind is p.POSITIONAL_OR_KEYWORD]
@@ -196,7 +199,7 @@ class Command(click.Command):
         opened = nullcontext() if out is None else place(out, inputs=inputs, force=force)
         work = stage(self.writes.name) if isinstance(self.writes, Kind) else nullcontext()
         with opened as part, work:
-            result = inspect.unwrap(self.verb)(**given)
+            result = self.make(**given)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)

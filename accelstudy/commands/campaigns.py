@@ -153,23 +153,12 @@ SIMULATE_CAMPAIGN = Command(
 )
 
 
-def run_apply(calibration: Path, log: Path, out: Path, force: bool, **given: Any) -> None:
-    """Write a log with roll and pitch."""
-    from accelstudy.api.logs import layout_of
-    from accelstudy.campaign.calibration.applying import read_calibration
-    from accelstudy.campaign.calibration.leveling import level
-
-    layout = layout_of(given)
-    with new_file(out, [calibration, log], force) as path:
-        read = read_calibration(calibration)
-        leveled = level(read, log, layout, given["sigma"], given["start"])
-        leveled.write(path)
-    for warning in leveled.warnings:
-        warn(warning)
-    click.echo(f"{leveled.rows - leveled.empty} of {leveled.rows} rows leveled: {out}")
-
-
-APPLY = Command(calibrations.apply, run_apply, writes=new_file, out="CSV or Parquet file to write.")
+APPLY = Command(
+    calibrations.apply,
+    make=calibrations.leveled,
+    writes=new_file,
+    out="CSV or Parquet file to write.",
+)
 
 
 DATA_SHEET = Command(

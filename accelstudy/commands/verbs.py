@@ -29,13 +29,14 @@ def run_check_sigmas(**given: Any) -> None:
 
 def run_export(calibration: Path, form: str) -> None:
     """Print a calibration in a form that a device takes, and warn of what the form cannot hold."""
-    from accelstudy.campaign.calibration.export import losses
+    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.calibration.export import export, losses
 
-    read = calibrations.read_calibration(calibration)
-    text = calibrations.export(read, form=form)
-    if mended := read.content.get("mended"):
+    sensor = read_calibration(calibration)
+    text = export(sensor, form)
+    if mended := sensor.content.get("mended"):
         warn(f"the calibration is of mended data: {mended['reason']}")
-    for loss in losses(read.sensor, form):
+    for loss in losses(sensor, form):
         warn(loss)
     click.echo(text, nl=False)
 

@@ -6,6 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.basics.bounds import SIGMA_READING, TIME, Range
+from accelstudy.basics.given import path_of
 from accelstudy.basics.progress import stage
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Quantity, si, verb
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy import Calibration, Campaign, Diagnosis, Log
+    from accelstudy.campaign.calibration.leveling import Leveled
 
 
 @verb
@@ -63,9 +65,13 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.api.calibrations import Calibration
+    from accelstudy.campaign.calibration import applying
 
-    return as_calibration(path, "path")
+    file = path_of("path", path)
+    content = applying.read_calibration_content(file)
+    applying.calibration_of(content, f"{file}: {applying.NO_CALIBRATION}")
+    return Calibration({"warnings": [], **content})
 
 
 @verb
@@ -167,15 +173,23 @@ def apply(
         accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv
     """
     given: dict[str, Any] = {**locals()}
-    from accelstudy.api.calibrations import as_calibration
     from accelstudy.api.logs import log_of
+
+    given["log"] = read = log_of(log, given)
+    result = leveled(**given)
+    table = result.to_frame(read.table)
+    table.attrs["warnings"] = list(result.warnings)
+    return table
+
+
+def leveled(calibration: Any, log: Any, **given: Any) -> Leveled:
+    """Level a log by the keywords of `apply`, checked."""
+    from accelstudy.api.logs import log_of
+    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.campaign.calibration.leveling import level
 
-    read, sensor = log_of(log, given), as_calibration(calibration).sensor
-    leveled = level(sensor, read.file, read.layout, given["sigma"], given["start"])
-    table = leveled.to_frame(read.table)
-    table.attrs["warnings"] = list(leveled.warnings)
-    return table
+    read, sensor = log_of(log, given), sensor_of(calibration)
+    return level(sensor, read.file, read.layout, given["sigma"], given["start"])
 
 
 @verb
@@ -209,9 +223,10 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     --------
         accelstudy export calibrated/calibration.json --form c
     """
-    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.campaign.calibration.applying import sensor_of
+    from accelstudy.campaign.calibration.export import export as text_of
 
-    return as_calibration(calibration).export(form)
+    return text_of(sensor_of(calibration), form)
 
 
 @verb

@@ -56,8 +56,11 @@ def read_log(
     """
     given = {**locals()}
     from accelstudy.api.logs import log_of
+    from accelstudy.campaign.importing.formats import open_source
 
-    return log_of(log, given)
+    read = log_of(log, given)
+    open_source(read.file, read.layout.get("variable"), read.layout.get("delimiter"))
+    return read
 
 
 @verb

@@ -53,10 +53,10 @@ def compare(
     --------
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
-    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.epochs.comparison import Comparison
 
-    pair = as_calibration(first, "first").sensor, as_calibration(second, "second").sensor
+    pair = sensor_of(first, "first"), sensor_of(second, "second")
     return Comparison(*pair, float(tilt_range))  # in SI by `verb`
 
 
@@ -105,11 +105,11 @@ def history(
             winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out
             years
     """
-    from accelstudy.api.calibrations import as_calibration
+    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.epochs.history import History, dated
 
     check_once(calibrations, "calibration")
-    sensors = [as_calibration(one).sensor for one in calibrations]
+    sensors = [sensor_of(one) for one in calibrations]
     names = [
         str(one) if isinstance(one, str | PathLike) else f"calibration {i}"
         for i, one in enumerate(calibrations, start=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -14,7 +15,8 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.given import path_of
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
 from accelstudy.effects import Course, Effect, HoldConditions
@@ -360,12 +362,23 @@ def read_calibration(path: str | Path) -> SensorCalibration:
 
 
 def read_calibration_content(path: str | Path) -> Any:
-    """Read all that `calibration.json` holds, without a check."""
+    """Read all that `calibration.json` holds, or that in a folder, without a check."""
     with readable(path):
-        is_folder = Path(path).is_dir()
-    if is_folder:
-        raise InputError(f"{path}: a folder; give the calibration.json in it")
-    return read_json(path, NO_CALIBRATION)
+        file = Path(path, "calibration.json") if Path(path).is_dir() else path
+    return read_json(file, NO_CALIBRATION)
+
+
+def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
+    """Return what stays with the sensor, of a calibration or of the path of its file or folder."""
+    if isinstance(given, str | PathLike):
+        return read_calibration(path_of(name, given))
+    sensor = getattr(given, "sensor", None)
+    if not isinstance(sensor, SensorCalibration):
+        raise InputError(
+            f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
+            f"{shown(given)}"
+        )
+    return sensor
 
 
 def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibration:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import track
+from accelstudy.basics.progress import show, track, warn
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
 from accelstudy.campaign.calibration.applying import (
     FORCES,
@@ -94,7 +94,13 @@ class Leveled:
         columns = zip(self.added.column_names, self.added.columns, strict=True)
         return frame.assign(**{name: column.to_numpy() for name, column in columns})
 
-    def write(self, out: str | Path) -> None:
+    def tell(self, place: Path) -> None:
+        """Print how many rows are leveled, and what the user should know."""
+        for warning in self.warnings:
+            warn(warning)
+        show(f"{self.rows - self.empty} of {self.rows} rows leveled: {place}")
+
+    def write(self, out: str | Path, place: Path | None = None) -> None:
         """Write the log with the added columns, CSV or Parquet; if that fails, there is no file."""
         source = self.log.source
         table = source.typed_table() if is_parquet(out) else source.table
