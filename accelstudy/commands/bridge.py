@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property, partial
 from pathlib import Path
@@ -118,19 +118,14 @@ class Command(click.Command):
     @cached_property
     def params(self) -> list[click.Parameter]:  # type: ignore[override]
         """Options and arguments."""
-        return [*self._params()]
-
-    def _params(self) -> Iterator[click.Parameter]:
         optional, out, options, shared = self._options
-        place = [click.Option(["--out"], type=PATH, required=not optional, help=out), FORCE]
-        place = [] if self.writes is None else place
-        first = 0 if optional else 1
-        yield from map(self._argument, self.arguments)
-        yield from (*place[:first], *options)
-        yield from map(self._option, kinds.keywords(self.verb).values())
-        yield from (*place[first:], *shared)
+        place = click.Option(["--out"], type=PATH, required=not optional, help=out)
+        first, last = ([], []) if self.writes is None else ([place], [FORCE])
         # It stands in the help of all commands together.
-        yield click.Option(["--plugin"], hidden=True, **PLUGIN)
+        plugin = click.Option(["--plugin"], hidden=True, **PLUGIN)
+        keywords = map(self._option, kinds.keywords(self.verb).values())
+        arguments = map(self._argument, self.arguments)
+        return [*arguments, *first, *options, *keywords, *last, *shared, plugin]
 
     def _argument(self, parameter: inspect.Parameter) -> click.Argument:
         """Argument of a positional parameter: a path or a name."""
