@@ -29,10 +29,10 @@ def run_check_sigmas(**given: Any) -> None:
 
 def run_export(calibration: Path, form: str) -> None:
     """Print a calibration in a form that a device takes, and warn of what the form cannot hold."""
-    from accelstudy.campaign.calibration.applying import read_calibration
+    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.campaign.calibration.export import export, losses
 
-    sensor = read_calibration(calibration)
+    sensor = sensor_of(calibration)
     text = export(sensor, form)
     if mended := sensor.content.get("mended"):
         warn(f"the calibration is of mended data: {mended['reason']}")

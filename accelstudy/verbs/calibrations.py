@@ -6,7 +6,6 @@ from os import PathLike
 from typing import TYPE_CHECKING, Annotated, Any
 
 from accelstudy.basics.bounds import SIGMA_READING, TIME, Range
-from accelstudy.basics.given import path_of
 from accelstudy.basics.progress import stage
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Quantity, si, verb
@@ -68,7 +67,7 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     from accelstudy.api.calibrations import Calibration
     from accelstudy.campaign.calibration import applying
 
-    file = path_of("path", path)
+    file = applying.file_of(path, "path")
     content = applying.read_calibration_content(file)
     applying.calibration_of(content, f"{file}: {applying.NO_CALIBRATION}")
     return Calibration({"warnings": [], **content})

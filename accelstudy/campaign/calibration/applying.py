@@ -362,16 +362,24 @@ def read_calibration(path: str | Path) -> SensorCalibration:
 
 
 def read_calibration_content(path: str | Path) -> Any:
-    """Read all that `calibration.json` holds, or that in a folder, without a check."""
+    """Read all that `calibration.json` holds, without a check."""
     with readable(path):
-        file = Path(path, "calibration.json") if Path(path).is_dir() else path
-    return read_json(file, NO_CALIBRATION)
+        is_folder = Path(path).is_dir()
+    if is_folder:
+        raise InputError(f"{path}: a folder; give the calibration.json in it")
+    return read_json(path, NO_CALIBRATION)
+
+
+def file_of(given: Any, name: str) -> Path:
+    """Path of a calibration.json, of which the folder may be given."""
+    path = path_of(name, given)
+    return path / "calibration.json" if path.is_dir() else path
 
 
 def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     """Return what stays with the sensor, of a calibration or of the path of its file or folder."""
     if isinstance(given, str | PathLike):
-        return read_calibration(path_of(name, given))
+        return read_calibration(file_of(given, name))
     sensor = getattr(given, "sensor", None)
     if not isinstance(sensor, SensorCalibration):
         raise InputError(
