@@ -62,7 +62,7 @@ DESIGN_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Optimum:
     """Positions that were found.
 
     Attributes
@@ -102,7 +102,7 @@ class Search:
     constraints: Constraints = field(default_factory=Constraints)
     seed: int = 1
 
-    def design(self, starts: int = STARTS, bounded: bool = True) -> Design:
+    def optimum(self, starts: int = STARTS, bounded: bool = True) -> Optimum:
         """Find the positions.
 
         Parameters
@@ -196,20 +196,20 @@ class Search:
         loss = self.value(joined) - self.value(directions)
         return joined if loss <= MAX_JOINING_LOSS else directions
 
-    def finished(self, directions: Array, bounded: bool) -> Design:
-        """The design of positions that were found; `InputError` if they do not suffice."""
+    def finished(self, directions: Array, bounded: bool) -> Optimum:
+        """The optimum of positions that were found; `InputError` if they do not suffice."""
         directions = rounded(self.joined(directions))
-        design = Design(directions, self.value(directions))
+        found = Optimum(directions, self.value(directions))
         if reason := self._missing(directions):
             raise InputError(
                 f"no {self.n} positions of {self.space.text} were found that suffice: {reason}"
             )
         if not bounded:
-            return design
+            return found
         at = self.criterion.convex, self.space, self.constraints, self.n
         bound = self.criterion.bound(continuous_optimum(self.task, *at).bound)
-        efficiency = min(1.0, self.criterion.efficiency(design.value, bound))
-        return replace(design, bound=bound, efficiency=efficiency)
+        efficiency = min(1.0, self.criterion.efficiency(found.value, bound))
+        return replace(found, bound=bound, efficiency=efficiency)
 
     @cached_property
     def candidates(self) -> Array:

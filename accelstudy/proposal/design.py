@@ -75,14 +75,14 @@ class Design(Result):
     def of(cls, *, sigma: float, robot_sigma: float, gravity_sigma: float, **given: Any) -> Design:
         """Search by the keywords of `accelstudy.find_positions`, checked, and order what is found.
 
-        Errors are those of `Search.design`.
+        Errors are those of `Search.optimum`.
         """
         bounds.SIGMA_FORCE.check_key(key("sigma"), sigma)
         bounds.SIGMA_ANGLE.check_key(key("robot_sigma"), robot_sigma / MGON)
         bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
         request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
         with stage("search"):
-            found, groups = request.search.design(request.starts), None
+            found, groups = request.search.optimum(request.starts), None
             if isinstance(request.space, Mountings):
                 groups = _fewest_axes(request.space, found.directions)
             order = field_order(request.task, found.directions, groups)

@@ -59,7 +59,7 @@ def efficiency_table(
         }
         shown = {scheme.title: scheme.directions for scheme in schemes}
         for n in positions:
-            best = Search(task, criteria["I"], n, seed=SEED).design(bounded=False)
+            best = Search(task, criteria["I"], n, seed=SEED).optimum(bounded=False)
             shown[f"{n} I-optimal"] = best.directions
         for i, (title, directions) in enumerate(shown.items()):
             n, reason = len(directions), task.missing(directions)

@@ -188,7 +188,7 @@ def test_a_file_that_is_no_scheme(tmp_path, text, wrong):
 ])  # fmt: skip
 def test_contradictory_wishes_are_said_in_one_line(asked, wrong):
     with pytest.raises(InputError, match=wrong):
-        Request(**{"positions": 8, **asked}).search.design()
+        Request(**{"positions": 8, **asked}).search.optimum()
 
 
 def test_what_is_known_before_and_what_is_neglected():
@@ -197,7 +197,7 @@ def test_what_is_known_before_and_what_is_neglected():
     task = Request(6, neglect=("quadratic_scale=20ppm", "warm")[:1]).task
     assert task.neglected == {"quadratic_scale": pytest.approx(2e-5)}
     after = Request(6, approach="gravity", after="faces-6")
-    assert after.task.missing(after.search.design(1, bounded=False).directions) == ""
+    assert after.task.missing(after.search.optimum(1, bounded=False).directions) == ""
 
 
 def test_two_effects_are_told_apart_by_what_neither_can_imitate():

@@ -142,7 +142,7 @@ def test_the_error_by_a_neglected_effect_is_that_of_calibrations_without_it():
 def test_no_positions_are_below_the_bound_of_a_neglected_effect():
     task = Task(NINE, GRAVITY, neglected={"quadratic_scale": 2.5e-3})
     criterion = get_criterion("robust", task)
-    found = Search(task, criterion, 24).design(starts=1)
+    found = Search(task, criterion, 24).optimum(starts=1)
     assert 0.9 < found.efficiency < 1
     others = [random_directions(24, seed) for seed in range(50)]
     assert min(criterion.value(task.normal(each)) for each in others) > found.value
@@ -170,7 +170,7 @@ def test_moments_of_the_sphere_are_d_optimal_for_the_norm_of_gravity():
 def test_nine_d_optimal_positions_are_the_extremal_points_of_degree_2():
     task, criterion = asked(BY_GRAVITY, "D")
     known = float(criterion.value(task.normal(get_scheme("d-optimal-9").directions)))
-    found = Search(task, criterion, 9).design(starts=6)
+    found = Search(task, criterion, 9).optimum(starts=6)
     assert found.value == pytest.approx(known, abs=1e-5)
     assert found.efficiency < 1
     values = [criterion.value(task.normal(random_directions(9, seed))) for seed in range(300)]
@@ -196,7 +196,7 @@ def test_a_continuous_optimum_has_its_own_equivalence_theorem(approach, name):
 
 def test_optimal_positions_level_better_than_those_of_the_literature():
     task = BY_GRAVITY
-    found = Search(task, get_criterion("I", task), 24).design(starts=2)
+    found = Search(task, get_criterion("I", task), 24).optimum(starts=2)
     assert found.efficiency > 0.995
     assert efficiency(task, "I", "mclaren-24", found.bound) == pytest.approx(0.676, abs=5e-3)
     assert np.all(task.rms_tilt(found.directions) < task.rms_tilt(MCLAREN))
@@ -209,7 +209,7 @@ def test_the_exchange_finds_the_best_of_all_choices():
         criterion = get_criterion(name, task)
         choices = combinations_with_replacement(range(8), 3)
         best = min(float(criterion.value(task.normal(points[list(c)]))) for c in choices)
-        found = Search(task, criterion, 3, Listed(points, "eight")).design(bounded=False)
+        found = Search(task, criterion, 3, Listed(points, "eight")).optimum(bounded=False)
         assert found.value == pytest.approx(best, abs=1e-9)
 
 
@@ -228,7 +228,7 @@ def test_stored_designs_have_their_efficiency_and_bound(family):
         efficiency = min(1.0, criterion.efficiency(value, one["bound"]))
         assert one["efficiency"] == pytest.approx(efficiency, abs=2e-5)
     for n in (10, 16):
-        found = Search(task, criterion, n).design(starts=1, bounded=False)
+        found = Search(task, criterion, n).optimum(starts=1, bounded=False)
         known = float(criterion.value(task.normal(stored[n]["directions"])))
         assert found.value > known - SEARCHED
 
@@ -248,7 +248,7 @@ def test_other_numbers_of_optimal_positions_are_refused_with_what_there_is():
 def free():
     """Twelve positions without a constraint."""
     task = BY_ROBOT
-    return Search(task, get_criterion("I", task), 12).design(starts=2)
+    return Search(task, get_criterion("I", task), 12).optimum(starts=2)
 
 
 LEVEL = (-60 * GON, 60 * GON)
@@ -260,7 +260,7 @@ LEVEL = (-60 * GON, 60 * GON)
 ])  # fmt: skip
 def test_constraints_are_kept_and_cost_efficiency(constraints, free):
     task, criterion = asked(BY_ROBOT, "I")
-    found = Search(task, criterion, 12, constraints=constraints).design(starts=1)
+    found = Search(task, criterion, 12, constraints=constraints).optimum(starts=1)
     assert constraints.met(found.directions)
     assert free.value < found.value < free.value + 0.2
     assert found.efficiency > 0.9
@@ -275,7 +275,7 @@ def test_constraints_are_kept_and_cost_efficiency(constraints, free):
 def test_few_mountings_turn_about_few_axes():
     task, space = BY_ROBOT, Mountings(2, ((1, 0, 0), (0, 1, 0), (0, 1, 1), (1, -1, 0)))
     assert len(Mountings(2).axes) == 9
-    found = Search(task, get_criterion("I", task), 10, space).design(starts=1)
+    found = Search(task, get_criterion("I", task), 10, space).optimum(starts=1)
     axes = np.array(space.axes) / np.linalg.norm(space.axes, axis=1, keepdims=True)
     horizontal = np.abs(found.directions @ axes.T) < 1e-8
     assert any(np.all(horizontal[:, i] | horizontal[:, j]) for i in range(4) for j in range(i))
@@ -299,7 +299,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     )
     task, criterion = asked(BY_ROBOT, "I")
     with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
-        Search(task, criterion, 9, Listed(listed.points[:2], "two")).design()
+        Search(task, criterion, 9, Listed(listed.points[:2], "two")).optimum()
     for text, wrong in {
         "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
         "x,y,z\n1,0,0\n1,?,0\n": "row 2: x, y, z must be numbers",
@@ -316,14 +316,14 @@ def test_what_cannot_be_is_said_in_one_line():
     with pytest.raises(
         InputError, match=r"9 positions at least 150 gon between positions were not"
     ):
-        Search(task, criterion, 9, constraints=Constraints(least_angle=150 * GON)).design()
+        Search(task, criterion, 9, constraints=Constraints(least_angle=150 * GON)).optimum()
     with pytest.raises(InputError, match="8 positions do not determine 9 parameters; at least 9"):
-        Search(task, criterion, 8).design()
+        Search(task, criterion, 8).optimum()
     nowhere = Constraints(pitch=(90 * GON, 100 * GON), pole_distance=30 * GON)
     with pytest.raises(
         InputError, match="no attitude is left of all attitudes with pitch from 90 gon"
     ):
-        Search(task, criterion, 9, constraints=nowhere).design()
+        Search(task, criterion, 9, constraints=nowhere).optimum()
     with pytest.raises(InputError, match=r"depends on the order of the positions \(step_x\)"):
         Task(get_model("bias-scale+hysteresis"), GRAVITY)
     with pytest.raises(InputError, match="needs the time of each position"):

@@ -32,7 +32,7 @@ def found():
     numbers = {}
     for approach, name, n, tilt in (("gravity", "I", 12, 30), ("robot", "I", 10, 50)):
         task = Task(NINE, get_approach(approach), tilt_range=tilt * GON)
-        design = Search(task, get_criterion(name, task), n).design(starts=2, bounded=tilt == 30)
+        design = Search(task, get_criterion(name, task), n).optimum(starts=2, bounded=tilt == 30)
         numbers[f"design {approach}"] = design.directions.tolist()
         if tilt == 30:
             numbers["efficiency"] = design.efficiency
