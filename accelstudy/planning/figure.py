@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from accelstudy.basics.units import display_unit, to_display
 from accelstudy.basics.wording import quantity_text
 from accelstudy.drawing.style import (
-    FULL,
     INK,
     approach_colour,
     approach_marker,
     log_ticks,
-    new_figure,
 )
 from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import by_time
@@ -25,15 +22,8 @@ IN_SIGHT = 8.0
 """Tilt error over the target up to which candidates are in the figure, if there are any."""
 
 
-def plan_figure(answer: Answer) -> Figure:
-    """Draw all candidates, the front of the best, and the simulated candidates of the table."""
-    figure = new_figure(FULL, 95)
-    draw_plan(figure.subplots(), answer)
-    return figure
-
-
 def draw_plan(ax: Axes, answer: Answer) -> None:
-    """Draw what `plan_figure` shows."""
+    """Draw all candidates, the front of the best, and the simulated candidates of the table."""
     question, target = answer.question, float(to_display(answer.question.target, "rad"))
     share, ordered = question.confidence, by_time(answer.compared)
     left = to_display(np.array([question.accuracy(c.tilt) for c in ordered]), "rad")

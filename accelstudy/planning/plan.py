@@ -143,9 +143,8 @@ class Plan(Result):
         import matplotlib as mpl
 
         from accelstudy.drawing.saving import save
-        from accelstudy.drawing.style import DPI, STYLE
+        from accelstudy.drawing.style import DPI, STYLE, new_figure
         from accelstudy.files.tables import write_table
-        from accelstudy.planning.figure import plan_figure
 
         if not self.answer.ranked:
             raise InputError(self.verdict)
@@ -158,7 +157,8 @@ class Plan(Result):
         (folder / "plan.md").write_text(self._page(), encoding="utf-8")
         self._write_positions(folder / "positions.yaml")
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-            figure = plan_figure(self.answer)
+            figure = new_figure(*self.size)
+            self.draw(figure.subplots())
         save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
 
     def _write_positions(self, path: Path) -> None:

@@ -37,12 +37,6 @@ def part_lines(part: str, answer: Answer) -> list[str]:
     return lines(SENTENCES, part, answer, HERE)
 
 
-def effort(candidate: Candidate) -> str:
-    """Positions and time of a candidate: ``28 positions by hand, 10 s each, about 14 minutes``."""
-    (line,) = lines(SENTENCES, "effort", candidate)
-    return line
-
-
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
     sizes = {

@@ -24,6 +24,7 @@ from accelstudy.design.estimability import estimability
 from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
+from accelstudy.pages import lines
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
 from accelstudy.planning.candidates import NINE, candidates, information_of, tilt_of
@@ -32,7 +33,7 @@ from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
 from accelstudy.planning.wording import (
-    effort,
+    SENTENCES,
     part_lines,
     positions_command,
     table_lines,
@@ -265,7 +266,8 @@ def test_a_plan_has_a_line_of_each_calibration_and_the_unit_of_angles_that_is_as
 
 def test_set_up_is_told_in_its_own_unit():
     candidate = replace(_candidate(asked(), equipment="robot"), hold=600.0)
-    assert effort(candidate).endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
+    (effort,) = lines(SENTENCES, "effort", candidate)
+    assert effort.endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
 
 
 @pytest.mark.parametrize(("options", "parts"), [
