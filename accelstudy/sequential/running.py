@@ -61,20 +61,16 @@ def read_running(folder: str | Path, settled: bool = False) -> Running:
             "in positions.csv"
         )
     header, path = read_header(folder), table_of(folder)
-    if path is None:
-        return Running(_without_positions(header), "")
-    if path.suffix != ".csv":
+    if path is not None and path.suffix != ".csv":
         return Running(read_campaign(folder), "")
     try:
-        text = read_text(path)
+        text = "" if path is None else read_text(path)
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
     end = len(text) if settled else max(text.rfind("\n"), text.rfind("\r")) + 1
     whole, unfinished = text[:end], text[end:]
-    if not whole.strip():
-        return Running(_without_positions(header), unfinished)
-    columns = columns_of(whole, path)
-    if not any(map(len, columns.values())):
+    columns = columns_of(whole, path) if path and whole.strip() else {}
+    if path is None or not any(map(len, columns.values())):
         return Running(_without_positions(header), unfinished)
     campaign = parse_table(columns, header, path)
     warnings = tuple(ignored_in(columns, path))
