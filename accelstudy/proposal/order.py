@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.design.criteria import RIDGE
 from accelstudy.design.information import position_rows
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best
@@ -94,8 +93,6 @@ def _drift_shown(task: Task, directions: Array) -> Array:
     rows = position_rows(model, task.approach, fixed_gravity, flat, task.gravity, hold)
     rows = rows.reshape(k, -1, rows.shape[-1])
     rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    normal = rows.swapaxes(1, 2) @ rows
-    of_drift, cross = normal[:, u:, u:], normal[:, :u, u:]
-    inside = np.linalg.solve(normal[:, :u, :u] + RIDGE * np.eye(u), cross)
-    left = of_drift - cross.swapaxes(1, 2) @ inside
-    return np.asarray(np.diagonal(left, axis1=1, axis2=2).min(axis=1))
+    # The last block of R is what orthogonalisation to the parameters leaves of the drift.
+    left = np.linalg.qr(rows).R[:, u:, u:]
+    return np.asarray(np.sum(left**2, axis=1).min(axis=1))
