@@ -25,7 +25,7 @@ from accelstudy.lots.sizes import ShapeEquations
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
-Tested = Mapping[str, NDArray[np.float32]]
+TestOdds = Mapping[str, NDArray[np.float32]]
 """Log odds of what is tested in a campaign and, behind that, in noise alone, (1 + s,) each."""
 
 DRAWS = 1000
@@ -77,7 +77,7 @@ def sensor_evidence(
     approach: Approach | None = None,
     seed: int = 1,
     noise: SensorNoise | None = None,
-) -> tuple[SensorEvidence, Tested]:
+) -> tuple[SensorEvidence, TestOdds]:
     """Weigh everything that a model may lack to explain a campaign.
 
     Parameters

@@ -25,12 +25,12 @@ from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit, fit_base
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.lots.evidence import SensorEvidence, Tested, sensor_evidence
+from accelstudy.lots.evidence import SensorEvidence, TestOdds, sensor_evidence
 from accelstudy.lots.mean import mean_sensor
-from accelstudy.lots.mixture import Anything
+from accelstudy.lots.mixture import LotTest
 from accelstudy.lots.noise import SensorNoise, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, Found, Pass, SensorState
-from accelstudy.lots.sizes import Names, TypeSizes, sensor_equations, together
+from accelstudy.lots.passes import LEVEL, ODD, LotEffect, Pass, SensorState
+from accelstudy.lots.sizes import Names, TypeSizes, sensor_equations, weigh_pooled
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
 
@@ -51,14 +51,14 @@ class LotDiagnosis:
     passes : tuple of Pass: by what each campaign says of its noise; then, by the noise of the lot,
         with the model and all that was found before, until nothing new is found
     model : SensorModel, with `effects`
-    effects : tuple of Found, in the order in which they were found
+    effects : tuple of LotEffect, in the order in which they were found
     close : tuple of names, which come closest to what has no name
     explained : bool; if false, the sensors have something in common that no names explain
     """
 
     passes: tuple[Pass, ...]
     model: SensorModel
-    effects: tuple[Found, ...] = ()
+    effects: tuple[LotEffect, ...] = ()
     close: tuple[Names, ...] = ()
     explained: bool = True
 
@@ -146,7 +146,7 @@ def weigh_lot(
     with _processes(cores, len(campaigns)) as mapped:
         sensors, n = _Sensors(campaigns, approach, seed, mapped), len(campaigns)
         passes, whole = [sensors.weighed([model] * n, model, [None] * n)], model
-        effects: list[Found] = []
+        effects: list[LotEffect] = []
         for _ in range(MAX_PASSES):
             known = {effect.name for effect in whole.effects}
             known |= {name for found in effects for name in found.names}
@@ -216,13 +216,13 @@ class _Sensors:
         n = len(self.campaigns)
         approaches, seeds = [self.approach] * n, range(self.seed, self.seed + n)
         each = self.mapped(sensor_evidence, self.campaigns, models, approaches, seeds, noises)
-        sensors, anything = [], Anything({})
+        sensors, anything = [], LotTest({})
         # What noise alone would say is most of what a sensor gives, and is not kept.
         for sensor, of_test in track(each, "evidence of the sensors", n):
             sensors.append(replace(sensor, pair_specs={}))
             anything.add(of_test)
 
-        def retested(i: int) -> Tested:
+        def retested(i: int) -> TestOdds:
             return sensor_evidence(
                 self.campaigns[i], models[i], self.approach, seeds[i], noises[i]
             )[1]
@@ -234,7 +234,7 @@ class _Sensors:
             now,
             sensors=tuple(replace(sensor, shown={}) for sensor in sensors),
             mean=self._mean([(self.campaigns[k], sensors[k], noises[k]) for k in usual], whole),
-            together=together([sensors[k] for k in usual]),
+            pooled=weigh_pooled([sensors[k] for k in usual]),
         )
         if len(usual) < 2 or not (shapes := now.strongest()):
             return now

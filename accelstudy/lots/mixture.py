@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.lots.evidence import Tested
-from accelstudy.lots.sizes import Names, OfType
+from accelstudy.lots.evidence import TestOdds
+from accelstudy.lots.sizes import Names, TypicalSet
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Mixture:
     pairs: Mapping[Names, Array]
     prior: Mapping[str, float]
     common: Mapping[Names, float] = field(default_factory=dict)
-    typical: Mapping[Names, OfType] = field(default_factory=dict)
+    typical: Mapping[Names, TypicalSet] = field(default_factory=dict)
 
     @cached_property
     def sets(self) -> dict[Names, float]:
@@ -262,7 +262,7 @@ def _log_weights(size: int) -> Array:
     return np.asarray(np.log(weights))
 
 
-class Anything:
+class LotTest:
     """The test whether anything is missing in a lot, to which sensors are added one by one.
 
     The statistic is the evidence that a share of the sensors has one effect. Lots of
@@ -277,7 +277,7 @@ class Anything:
     def __init__(self, logs: Mapping[str, Array]) -> None:
         self.logs = dict(logs)
 
-    def add(self, sensor: Tested, sign: float = 1.0) -> None:
+    def add(self, sensor: TestOdds, sign: float = 1.0) -> None:
         """Add what a sensor says; or take it away."""
         nodes, _ = _nodes(2)
         for name, odds in sensor.items():

@@ -60,7 +60,7 @@ from accelstudy.leveling.error import (
 from accelstudy.lots.evidence import shown
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.parameters import TypeParameter
-from accelstudy.lots.passes import LEVEL, Found
+from accelstudy.lots.passes import LEVEL, LotEffect
 from accelstudy.lots.type_file import write_type
 from accelstudy.pages import lines, write_page
 from accelstudy.pages.result import Result
@@ -192,7 +192,7 @@ class Lot(Result):
             for j, p in enumerate(diagnosis.model.parameters)
         }
 
-    def _sizes(self, found: Found) -> list[TypeParameter]:
+    def _sizes(self, found: LotEffect) -> list[TypeParameter]:
         """Parameters of an effect that was found."""
         return [self.parameters[name] for name in _parameters_of(found.spec)]
 

@@ -15,10 +15,10 @@ from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.lots.evidence import COMMON, SensorEvidence, Tested, lot_classes
-from accelstudy.lots.mixture import Anything, Mixture
+from accelstudy.lots.evidence import COMMON, SensorEvidence, TestOdds, lot_classes
+from accelstudy.lots.mixture import LotTest, Mixture
 from accelstudy.lots.noise import SensorNoise
-from accelstudy.lots.sizes import Joint, Names, OfType, Shapes, TypeSizes
+from accelstudy.lots.sizes import Names, PooledEffect, Shapes, TypeSizes, TypicalSet
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
 
-class Found(NamedTuple):
+class LotEffect(NamedTuple):
     """Something that the model of the lot lacks.
 
     Attributes
@@ -90,20 +90,20 @@ class Pass:
     Attributes
     ----------
     sensors : tuple of SensorEvidence
-    anything : Anything, the test of them
+    anything : LotTest, the test of them
     retested : function of a sensor's place that gives what it added to the test
     noises : tuple of SensorNoise, by all sensors; None where a campaign says its own
     mean : SensorEvidence, of their mean; None if they were in different positions
-    together : mapping of effects to what all campaigns say of them together
+    pooled : mapping of effects to what all campaigns say of them together
     sizes : TypeSizes, of the most probable effects; None where there are none
     """
 
     sensors: tuple[SensorEvidence, ...]
-    anything: Anything
-    retested: Callable[[int], Tested]
+    anything: LotTest
+    retested: Callable[[int], TestOdds]
     noises: tuple[SensorNoise | None, ...] = ()
     mean: SensorEvidence | None = None
-    together: Mapping[str, Joint] = field(default_factory=dict)
+    pooled: Mapping[str, PooledEffect] = field(default_factory=dict)
     sizes: TypeSizes | None = None
 
     @cached_property
@@ -130,7 +130,7 @@ class Pass:
         counts = [*kinds.values()]
         prior = {name: WEIGHTS[kind] / counts.count(kind) for name, kind in kinds.items()}
         total = sum(prior.values())
-        common: dict[Names, float] = {(name,): one.odds for name, one in self.together.items()}
+        common: dict[Names, float] = {(name,): one.odds for name, one in self.pooled.items()}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise; what is sudden has no mean.
             of_mean = {(name,): log for name, log in mean.odds.items() if name not in NOISES}
@@ -144,7 +144,7 @@ class Pass:
         return Mixture(odds, pairs, prior, common, self._typical)
 
     @property
-    def _typical(self) -> dict[Names, OfType]:
+    def _typical(self) -> dict[Names, TypicalSet]:
         """Odds with sizes of the type, of what more than few sensors have."""
         sets = {} if self.sizes is None else self.sizes.sets
         n = len(self.sensors)
@@ -164,11 +164,11 @@ class Pass:
         return {
             names: self._best_shapes(names)
             for names in sets
-            if 0 < len(names) < 3 and all(name in self.together for name in names)
+            if 0 < len(names) < 3 and all(name in self.pooled for name in names)
         }
 
     def _best_shapes(self, names: Names) -> Shapes:
-        of_all = {name: self.together[name].spec for name in names}
+        of_all = {name: self.pooled[name].spec for name in names}
         if self.mean is None:
             return of_all
         if (specs := self.mean.pair_specs.get((names[0], names[-1]))) is not None:
@@ -213,7 +213,7 @@ class Pass:
         return dict(sorted(given.items(), key=lambda item: -item[1]))
 
     @cached_property
-    def found(self) -> list[Found]:
+    def found(self) -> list[LotEffect]:
         """What is missing and has a name that is sure enough.
 
         What few sensors have makes these odd.
@@ -230,7 +230,7 @@ class Pass:
                 taken.update(alike)
                 members = tuple(member for one in alike for member in self.classes[one])
                 share, low, high = self.mixture.share(name)
-                found.append(Found(members, posterior, share, (low, high), self.spec(name)))
+                found.append(LotEffect(members, posterior, share, (low, high), self.spec(name)))
         return found
 
     def _rivals(self, name: str) -> list[str]:
@@ -309,7 +309,7 @@ class Pass:
         """The same without the sensors that are odd."""
         if not self.odd:
             return self
-        usual, anything = self.usual, Anything(self.anything.logs)
+        usual, anything = self.usual, LotTest(self.anything.logs)
         for i in {*range(len(self.sensors))} - {*usual}:
             anything.add(self.retested(i), -1.0)
         return replace(

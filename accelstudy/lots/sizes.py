@@ -145,12 +145,12 @@ class SensorEquations(NamedTuple):
 
     Attributes
     ----------
-    of : Equations
+    equations : Equations
     square : float, ‖z‖²
     redundancy : int
     """
 
-    of: Equations
+    equations: Equations
     square: float = 0.0
     redundancy: int = 0
 
@@ -182,14 +182,14 @@ def sensor_equations(
         except InputError:  # a column is absent
             columns.append(np.zeros((len(residuals.z), len(effect.parameters))))
     side_by_side = Equations.of(frame, np.concatenate(columns, axis=1)[:, None])
-    of = Equations(*(part[0] for part in side_by_side))
-    return SensorEquations(of, float(residuals.z @ residuals.z), residuals.redundancy)
+    equations = Equations(*(part[0] for part in side_by_side))
+    return SensorEquations(equations, float(residuals.z @ residuals.z), residuals.redundancy)
 
 
 # --- one size of all sensors --------------------------------------------------------------------
 
 
-class Joint(NamedTuple):
+class PooledEffect(NamedTuple):
     """An effect in all campaigns together.
 
     Attributes
@@ -202,7 +202,7 @@ class Joint(NamedTuple):
     spec: str
 
 
-def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
+def weigh_pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
     """Weigh each effect by all campaigns as one: the normal equations of residuals are added.
 
     Settings of an effect are those of the first campaign that shows it, or nearly so.
@@ -229,7 +229,7 @@ def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
                 logs[spec] = float(evidence.of_spaces(np.array([part]), [dim], square)[0])
         if logs:
             odds = float(log_mean(np.array([*logs.values()]))) - nothing
-            joint[name] = Joint(odds, max(logs, key=lambda spec: logs[spec]))
+            joint[name] = PooledEffect(odds, max(logs, key=lambda spec: logs[spec]))
     return joint
 
 
@@ -237,7 +237,7 @@ def together(used: Sequence[SensorEvidence]) -> dict[str, Joint]:
 
 
 @dataclass(frozen=True)
-class OfType:
+class TypicalSet:
     """A set of effects in the sensors of a type.
 
     Attributes
@@ -292,8 +292,8 @@ class TypeSizes:
         each : what the sensors tell of `specs`, the effects with their settings
         shapes, usual : as above
         """
-        normal, right, _ = map(np.array, zip(*(one.of for one in each), strict=True))
-        pooled = Equations.pooled(one.of for one in each)
+        normal, right, _ = map(np.array, zip(*(one.equations for one in each), strict=True))
+        pooled = Equations.pooled(one.equations for one in each)
         ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)])
         turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
         for spec, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
@@ -334,7 +334,7 @@ class TypeSizes:
         return max(min(left), 1e-12)
 
     @cached_property
-    def sets(self) -> dict[Names, OfType]:
+    def sets(self) -> dict[Names, TypicalSet]:
         """Those of the sets of effects that show: odds of each sensor, with sizes of the type."""
         return {
             names: self._of_set(names)
@@ -342,7 +342,7 @@ class TypeSizes:
             if all(len(self.columns[spec]) for spec in shapes.values())
         }
 
-    def _of_set(self, names: Names) -> OfType:
+    def _of_set(self, names: Names) -> TypicalSet:
         """Odds of a set with the sizes and shares that are most probable."""
         parts = [self.columns[self.shapes[names][name]] for name in names]
         at, of = np.concatenate(parts), np.repeat(names, [len(part) for part in parts])
@@ -355,7 +355,7 @@ class TypeSizes:
 
     def _search(
         self, at: NDArray[np.int_], of: NDArray[np.str_], start: Mapping[str, float], scatter: float
-    ) -> OfType:
+    ) -> TypicalSet:
         """Search for sizes and shares with a scatter, by expectation and maximization.
 
         Parameters
@@ -405,7 +405,7 @@ class TypeSizes:
                 pulled[at] += w @ b
             shares = np.clip(weights.sum(axis=1) @ has[1:] / len(self.usual), 0.01, 0.999)
             mean = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
-        return OfType(
+        return TypicalSet(
             odds=dict(zip(((), *subsets), odds, strict=True)),
             log_likelihood=before,
             sizes={name: mean[of == name] for name in names},

@@ -9,19 +9,11 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, write_document
 
-from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import (
-    calibration_document,
-    json_text,
-    quality_document,
-)
-from accelstudy.campaign.calibration.fit import fit_campaign
+import accelstudy
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL, POWER
 from accelstudy.epochs.course import Course
-from accelstudy.sensors.models import get_model
 
 N = 500
 STANDARD_ERRORS = 3.3
@@ -208,19 +200,15 @@ def test_bad_input_ends_in_one_line(tmp_path):
 
 def test_dates_come_from_the_campaigns(tmp_path):
     """Of a header, by the calibration, to the history."""
-    paths = []
+    calibrations = []
     for k, date in enumerate(YEARS[:3]):
         folder = tmp_path / f"session-{k}"
         write_campaign(simulate_campaign(CampaignSettings(seed=k))[0], folder)
         with (folder / "campaign.yaml").open("a", encoding="utf-8") as file:
             file.write(f"date: {date}\n")
         write_campaign(read_campaign(folder), folder)
-        fit = fit_campaign(read_campaign(folder), get_model("bias"), get_approach("gravity"))
-        content = {**calibration_document(fit), "quality": quality_document(assess(fit))}
-        paths.append(tmp_path / f"{k}.json")
-        paths[-1].write_text(json_text(content), encoding="utf-8")
-    succeed("history", *paths, "--out", tmp_path / "out")
-    content = json.loads((tmp_path / "out/history.json").read_text(encoding="utf-8"))
+        calibrations.append(accelstudy.calibrate(folder, model="bias", approach="gravity"))
+    content = accelstudy.history(calibrations).content
     assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
     header = folder / "campaign.yaml"
     header.write_text(header.read_text(encoding="utf-8").replace(date, "spring"), encoding="utf-8")

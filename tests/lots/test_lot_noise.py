@@ -10,10 +10,8 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import SensorEvidence
-from accelstudy.lots.lot import weigh_lot
 from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
-from accelstudy.sensors.models import get_model
 
 N, REDUNDANCY = 16, 40
 QUIET, ROUGH = 3e-4, 2e-3
@@ -106,20 +104,6 @@ def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
     assert noise.freedom == pytest.approx(min(freedom, 200.0), rel=0.5)
 
 
-def test_the_mean_of_sensors_has_their_noise_over_the_root_of_their_number():
-    """Also with the seed zero. Of 3 times 63 degrees of freedom an sd has a sigma of 5 %."""
-    made = [simulate_campaign(CampaignSettings(name=f"s{i}", seed=i))[0] for i in range(3)]
-    lot = weigh_lot(made, get_model("bias-scale-nonorthogonality"), seed=0)
-    assert lot.passes[0].mean is not None
-    mean, noise = mean_sensor(made, lot.sensors, [None] * 3)
-    sigma = np.sqrt(np.mean([np.sum(e.residuals**2) / e.redundancy for e in lot.sensors]) / 3)
-    assert noise.sigma == pytest.approx(sigma, rel=0.2)
-    np.testing.assert_allclose(mean.forces, np.mean([one.forces for one in made], axis=0))
-    turned, untimed = replace(made[0], forces=made[0].forces[::-1]), replace(made[0], time=None)
-    for other in (turned, untimed):
-        assert mean_sensor([other, *made[1:]], lot.sensors, [None] * 3) is None
-
-
 def test_the_mean_has_weights_by_known_noise_and_its_variance():
     """Readings that differ by ±1 in units of their own noise, and those of two that have none."""
     base, _ = simulate_campaign(CampaignSettings(name="s", seed=1))
@@ -147,3 +131,6 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
         np.testing.assert_allclose(mean.forces - base.forces, shift, rtol=1e-6)
         assert noise.sigma == pytest.approx(sigma)
         assert mean.sigma_angle == pytest.approx(base.sigma_angle * np.sqrt(np.sum(weights**2)))
+    turned = replace(base, forces=base.forces[::-1])
+    for other in (turned, replace(base, time=None)):
+        assert mean_sensor([other, *campaigns[1:]], sensors, known) is None

@@ -18,18 +18,18 @@ from accelstudy.lots.mixture import (
     PRIOR_FURTHER,
     PRIOR_MISSING,
     PRIOR_ODD,
-    Anything,
+    LotTest,
     Mixture,
 )
 from accelstudy.lots.passes import LEVEL, Pass
 from accelstudy.lots.sizes import (
     SCATTERS,
     Equations,
-    Joint,
+    PooledEffect,
     SensorEquations,
     ShapeEquations,
     TypeSizes,
-    together,
+    weigh_pooled,
 )
 from accelstudy.sensors.models import get_model
 
@@ -63,7 +63,7 @@ def mixture_of(odds, **known):
 
 def weighed(odds, rng):
     """A pass over sensors with these odds (n, 3), whose chances are those of their numbers."""
-    sensors, tested, anything = [], [], Anything({})
+    sensors, tested, anything = [], [], LotTest({})
     for i, each in enumerate(odds):
         known = dict(zip(NAMES, each.tolist(), strict=True))
         pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
@@ -169,7 +169,7 @@ def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
         each = Equations((d.T @ d)[None], (d.T @ one)[None], np.sum(d**2, axis=0)[None])
         shown = {"effect": ShapeEquations(("effect",), np.zeros((1, 0)), each)}
         sensors.append(SensorEvidence("c", shown=shown, redundancy=ROWS, square=float(one @ one)))
-    joint = together(sensors)["effect"]
+    joint = weigh_pooled(sensors)["effect"]
     d, one = derivatives.reshape(-1, 3), z.ravel()
     fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
     evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 4 * ROWS)
@@ -295,8 +295,8 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     true[:, 0] = 0.6
     *_, sizes = type_of(rng, true)
     alone = replace(sizes, shapes={NAMES[:1]: {NAMES[0]: NAMES[0]}})
-    joint = {NAMES[0]: Joint(alone.sets[NAMES[:1]].alike, NAMES[0])}
-    rest = replace(one, together=joint, sizes=alone).without_odd()
+    joint = {NAMES[0]: PooledEffect(alone.sets[NAMES[:1]].alike, NAMES[0])}
+    rest = replace(one, pooled=joint, sizes=alone).without_odd()
     assert len(rest.sensors) == 19
     assert [*rest.classes] != [*one.classes]  # their order follows the evidence
     assert rest.p_value > one.p_value

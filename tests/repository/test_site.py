@@ -35,7 +35,7 @@ from accelstudy.epochs.comparison import Comparison
 from accelstudy.epochs.history import History
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.lot import LotDiagnosis
-from accelstudy.lots.mixture import Anything
+from accelstudy.lots.mixture import LotTest
 from accelstudy.lots.output import Lot
 from accelstudy.lots.passes import Pass
 from accelstudy.sensors.models import get_model
@@ -143,7 +143,7 @@ def test_each_name_of_an_exported_calibration_is_described():
 
 def _lot():
     """Content of lot.json, of sensors that lack the same."""
-    name, anything = "thermal_bias", Anything({})
+    name, anything = "thermal_bias", LotTest({})
     each = [SensorEvidence(c, 0.5, {name: 20.0}, classes=((name,),)) for c in "abc"]
     for _ in each:
         anything.add({name: np.array([20.0, *[0.0] * 1000])})
