@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.units import display_unit
 from accelstudy.drawing.style import model_title, shown
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
@@ -53,34 +54,37 @@ def noise_levels(cells: pd.DataFrame) -> dict[Factor, pd.Series]:
 
 
 def setups(cells: pd.DataFrame, tables: Tables) -> tuple[pd.DataFrame, dict[str, str]]:
-    """Set-ups, a row each; and what is in its columns `sd-0`, `sd-1`, ...: titles with units."""
+    """Set-ups, a row each; and titles of the columns that a reader sees, in their order."""
+    unit, tilt = display_unit("rad"), _tilt(cells, tables)
+    columns: dict[str, tuple[str, Any]] = {
+        "model": ("model", _titles(cells["model"], model_title)),
+        "scheme": ("scheme", _titles(cells["scheme"], lambda name: get_scheme(name).title)),
+        "approach": ("approach", cells["approach"].astype(str)),
+        "n": ("positions", cells["n_positions"]),
+    }
+    for factor, levels in noise_levels(cells).items():
+        if levels.min() < levels.max():
+            columns[factor.name] = f"{factor.title} / {factor.shown_unit}", levels
+    for name in ("roll_rms", "roll_q95", "pitch_rms", "pitch_q95", "both_q95"):
+        title = name.replace("_q95", " 95 % below").replace("_", " ")
+        columns[name] = f"{title} / {unit}", tilt.pop(name)
+    groups = group_sds(tables["summary"]).groupby(["label", "unit"], sort=False)
+    for number, (_, rows) in enumerate(groups):
+        title = "sd of {label} / {unit}".format_map(rows.iloc[0])
+        columns[f"sd-{number}"] = title, cells["cell"].map(by_cell(rows, "value"))
     counts = zip(cells["reason"], cells["n_converged"], cells["n_replicates"], strict=True)
-    table = pd.DataFrame(
-        {
-            "i": range(len(cells)),
-            "cell": cells["cell"].astype(str),
-            "model": _titles(cells["model"], model_title),
-            "scheme": _titles(cells["scheme"], lambda name: get_scheme(name).title),
-            "approach": cells["approach"].astype(str),
-            "n": cells["n_positions"],
-            **{f.name: x for f, x in noise_levels(cells).items() if x.min() < x.max()},
-            "state": [
-                f"not estimable: {reason}" if reason else f"{some} of {all_of} converged"
-                for reason, some, all_of in counts
-            ],
-            **_tilt(cells, tables),
-            "redundancy": cells["redundancy"],
-            "condition": cells["condition"].astype(float),
-        }
-    )
+    states = [
+        f"not estimable: {reason}" if reason else f"{some} of {all_of} converged"
+        for reason, some, all_of in counts
+    ]
+    columns["redundancy"] = "redundancy", cells["redundancy"]
+    columns["condition"] = "condition", cells["condition"].astype(float)
+    columns["state"] = "state", states
+    table = pd.DataFrame({"i": range(len(cells)), "cell": cells["cell"].astype(str)})
+    table = table.assign(**{name: each for name, (_, each) in columns.items()}, **tilt)
     ends = table[[f"{angle}_{name}" for angle in ANGLES for name in ("low", "rms", "high")]]
     table = table.assign(least=ends.min(axis=1), most=ends.max(axis=1))
-    titles: dict[str, str] = {}
-    groups = group_sds(tables["summary"]).groupby(["label", "unit"], sort=False)
-    for number, ((label, unit), rows) in enumerate(groups):
-        table[f"sd-{number}"] = cells["cell"].map(by_cell(rows, "value"))
-        titles[f"sd-{number}"] = f"sd of {label} / {unit}"
-    return table, titles
+    return table, {name: title for name, (title, _) in columns.items()}
 
 
 def _titles(names: pd.Series, title: Callable[[str], str]) -> list[str]:

@@ -66,22 +66,14 @@ def write_explorer(study: Study, tables: Mapping[str, pd.DataFrame], output: str
 def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
     """Return the page; parameters as in `write_explorer`."""
     cells, unit = tables["cells"], display_unit("rad")
-    rows, sds = setups(cells, tables)
+    rows, titles = setups(cells, tables)
     details, levels = parameters(cells, tables), noise_levels(cells)
     approaches, units = list(rows["approach"].unique()), list(details["unit"].unique())
-    noises = {f.name: f"{f.title} / {f.shown_unit}" for f in levels if f.name in rows}
-    fields = {"model": "model", "scheme": "scheme", "n": "positions", **noises}
-    columns = {
-        **{"model": "model", "scheme": "scheme", "approach": "approach", "n": "positions"},
-        **noises,
-        **{"roll_rms": f"roll rms / {unit}", "roll_q95": f"roll 95 % below / {unit}"},
-        **{"pitch_rms": f"pitch rms / {unit}", "pitch_q95": f"pitch 95 % below / {unit}"},
-        **{"both_q95": f"both 95 % below / {unit}", **sds},
-        **{"redundancy": "redundancy", "condition": "condition", "state": "state"},
-    }
+    noises = [factor.name for factor in levels if factor.name in titles]
+    fields = {name: titles[name] for name in ("model", "scheme", "n", *noises)}
     page = {
         **{"approaches": approaches, "fields": [*fields], "start": _start(study, cells)},
-        "columns": {"setups": columns, "parameters": QUANTITIES},
+        "columns": {"setups": titles, "parameters": QUANTITIES},
         "charts": charts.all_charts(approaches, [*fields]),
     }
     fixed = [
