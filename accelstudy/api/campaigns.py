@@ -18,7 +18,7 @@ from accelstudy.basics.given import each, path_of
 from accelstudy.basics.names import matches, natural
 from accelstudy.basics.units import UNITS
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
-from accelstudy.campaign.importing.logs import import_sensors
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.reference_log import ReferenceLog, open_reference
@@ -68,11 +68,7 @@ class Import:
 
     def campaign(self) -> Campaign:
         """Campaign of the one sensor."""
-        if self.settings.sensors:
-            raise InputError(
-                "sensors: several sensors make several campaigns; give the columns of one"
-            )
-        return import_sensors(self.files, self.settings, self.reference)[""][0]
+        return import_log(self.files, self.settings, self.reference)[0]
 
 
 def settings_of(

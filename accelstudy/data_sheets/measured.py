@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES, AllanDeviation
-from accelstudy.campaign.importing.logs import import_sensors
+from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
@@ -35,7 +35,7 @@ def sheet_of_log(path: str | Path, settings: ImportSettings) -> DataSheet:
     InputError
         If the log cannot be read, has no static hold, or is too short for an Allan deviation.
     """
-    ((_, holds),) = import_sensors([path], settings).values()
+    _, holds = import_log(path, settings)
     assert holds is not None
     noise = holds.noise
     curve = noise.allan.channels(noise.of_sensor)

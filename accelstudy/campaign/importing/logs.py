@@ -43,12 +43,17 @@ MIN_ROUNDING_RATIO = 0.1
 """Sigma of rounding over that of noise, from which on the resolution is told and kept."""
 
 
-def import_log(path: LogFile, settings: ImportSettings | None = None) -> Imported:
-    """Import a log of one sensor or a table of means; see `import_sensors`."""
+def import_log(
+    path: LogFile | Sequence[LogFile],
+    settings: ImportSettings | None = None,
+    reference: ReferenceLog | None = None,
+) -> Imported:
+    """Import the log, the logs, or the table of means of one sensor; see `import_sensors`."""
     settings = settings or ImportSettings()
     if settings.sensors:
-        raise InputError("sensors: several sensors make several campaigns; only one fits here")
-    return import_sensors([path], settings)[""]
+        raise InputError("sensors: several sensors make several campaigns; give the columns of one")
+    paths = [path] if isinstance(path, LogFile) else path
+    return import_sensors(paths, settings, reference)[""]
 
 
 def import_sensors(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -122,7 +122,7 @@ class Source:
         return column.to_numpy()
 
 
-LogFile: TypeAlias = str | Path | Source
+LogFile = str | Path | Source
 """Where a log is: the path of a file, or a table in memory."""
 
 
