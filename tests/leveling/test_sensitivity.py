@@ -37,18 +37,6 @@ def test_ishigami():
     assert sd[0] == pytest.approx(np.sqrt(variance), rel=0.01)
 
 
-def test_linear_function():
-    """(aσ)² over the sum, whatever the means; an input without sigma has no effect."""
-    coefficients, sigma = np.array([1.0, -2.0, 3.0, 50.0]), np.array([2.0, 1.0, 0.5, 0.0])
-    total, ci95, sd = total_effects(
-        lambda x: x @ coefficients[:, None], [5, 0, -3, 100], sigma, 1024, 50, 3
-    )
-    variance = (coefficients * sigma) ** 2
-    assert total[0, 3] == ci95[0, 3] == 0
-    assert np.all(np.abs(total[0] - variance / variance.sum())[:3] < WIDTHS * ci95[0, :3])
-    assert sd[0] == pytest.approx(np.sqrt(variance.sum()), rel=0.01)
-
-
 def test_effects_and_intervals_are_those_of_salib():
     """Effects to the last bit and intervals to rounding, from the same samples and resamples."""
     problem = {"num_vars": 3, "names": [*"abc"], "bounds": [[0, 1]] * 3, "dists": ["norm"] * 3}
@@ -117,6 +105,8 @@ def test_a_force_without_noise_gives_no_variance():
     assert table.loc["roll", "total_effect"].isna().all()
     assert table.loc["pitch", "defined"].all()
     assert table.loc[("pitch", "b_x"), "total_effect"] == pytest.approx(1, abs=0.02)
+    others = table.loc["pitch"].drop("b_x")
+    assert (others[["total_effect", "ci95"]] == 0).all(axis=None)
 
 
 # --- with the parameters of a calibration (figures 5 and 6) --------------------------------------
