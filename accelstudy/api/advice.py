@@ -77,12 +77,6 @@ class SessionAdvice(Result):
         return self.lines[-1]
 
     @cached_property
-    def heading(self) -> str:
-        """What was advised on."""
-        model, approach = self._adviser.model, self._adviser.approach.name
-        return wording.heading(self.advice, self.session, model, approach)
-
-    @cached_property
     def lines(self) -> list[str]:
         """The advice, most important last."""
         return wording.lines(self.advice, self.session, self._adviser.model, self._adviser.promise)
@@ -90,7 +84,9 @@ class SessionAdvice(Result):
     @property
     def command(self) -> str:
         """Command that calibrates the session if it is enough; else empty."""
-        return self._adviser.calibrate() if self.enough else ""
+        asked = self._adviser
+        known = asked.place, asked.called, asked.approach.name, asked.type
+        return suggested.calibrate(*known) if self.enough else ""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -140,7 +136,9 @@ class SessionAdvice(Result):
     def summary(self) -> str:
         """Return the advice as text."""
         more = [f"calibrate: {self.command}"] if self.command else []
-        return "\n".join([self.heading, *(f"  {line}" for line in (*self.lines, *more))])
+        model, approach = self._adviser.model, self._adviser.approach.name
+        heading = wording.heading(self.advice, self.session, model, approach)
+        return "\n".join([heading, *(f"  {line}" for line in (*self.lines, *more))])
 
 
 class Adviser:
@@ -168,7 +166,7 @@ class Adviser:
     ) -> None:
         self.place, self.promise = place or Path("CAMPAIGN"), Promise(tilt_accuracy, tilt_range)
         self.approach = get_approach(approach) if approach else usual_approach(session)
-        self.model, self._called = get_model(model), model
+        self.model, self.called = get_model(model), model
         chosen = attitudes or DEFAULTS.get(self.approach.name, "grid")
         self.directions = candidates(chosen, **limits)
         self.prior = _prior(prior, self.model)
@@ -178,10 +176,6 @@ class Adviser:
         """Advise on the session as it is now."""
         known = self.model, self.approach, self.promise, self.directions, self.prior
         return SessionAdvice(advise(session, *known), session, self)
-
-    def calibrate(self) -> str:
-        """Command that calibrates the session."""
-        return suggested.calibrate(self.place, self._called, self.approach.name, self.type)
 
 
 def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:
