@@ -17,7 +17,7 @@ from accelstudy.diagnosis.decision.verdict import Finding, Reason, withdraw_refu
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import held_out_gap
-from accelstudy.diagnosis.report.words import headline
+from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import specific_force
@@ -53,8 +53,8 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     before, after = found.leveling
     assert after < before / 3
     assert {change.parameter for change in found.changes} >= {"b_x", "s_z"}
-    assert "The model lacks warm up, and" in headline(found)
-    assert "something smaller: " in headline(found)
+    assert "The model lacks warm up, and" in verdict_lines(found)[0]
+    assert "something smaller: " in verdict_lines(found)[0]
 
 
 def test_what_an_effect_only_imitates_is_not_certain():

@@ -14,7 +14,7 @@ from accelstudy.diagnosis.formulas import ranked
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
-from accelstudy.diagnosis.report.words import advice, headline, verdict_lines
+from accelstudy.diagnosis.report.words import advice, verdict_lines
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.effects import get_effect
 
@@ -135,7 +135,7 @@ def test_what_was_learned_is_said(learned):
     assert learned.found[0].posterior > 0.7
     assert learned.gap.confirmed
     assert learned.gap.after < 2 < learned.gap.before
-    assert headline(learned) == (
+    assert verdict_lines(learned)[0] == (
         "The model lacks something that has no name here: the bias of x and y depends on the yaw."
     )
     assert shape.ranking.axes == ("x", "y")

@@ -15,7 +15,7 @@ from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
-from accelstudy.diagnosis.report.words import TEMPLATE, badge, headline
+from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.pages import lines
@@ -88,5 +88,5 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         assert (found.verdict, found.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:
-            assert "weak" in headline(found)
+            assert "weak" in verdict_lines(found)[0]
             assert lines(TEMPLATE, "agreement", found)[0] in says

@@ -178,7 +178,7 @@ class Posterior:
         """Share what has some names with something unknown that they may only imitate."""
         shared: list[Explanation] = []
         for one in self.all:
-            others = [cause for cause in one.causes if cause != NOT_LISTED]
+            others = [cause for cause in one.causes if cause.name != UNKNOWN]
             kept = [cause for cause in others if not {*cause.members} & {*names}]
             if len(kept) == len(others):
                 shared.append(one)

@@ -69,11 +69,6 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     return said("verdict", diagnosis)
 
 
-def headline(diagnosis: Diagnosis) -> str:
-    """Say the verdict in one sentence."""
-    return said("headline", diagnosis)[0]
-
-
 def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what would show more, apart from further positions."""
     return said("advice", diagnosis)
@@ -86,15 +81,10 @@ def warnings(diagnosis: Diagnosis, axes: Sequence[float]) -> list[str]:
 
 def reason(diagnosis: Diagnosis) -> str:
     """Say why the verdict is what it is; nothing where that needs no reason."""
-    return "; ".join(clauses(diagnosis))
+    return "; ".join(clauses(diagnosis.reason))
 
 
-def clauses(diagnosis: Diagnosis) -> list[str]:
-    """Clauses of the reason."""
-    return clauses_of(diagnosis.reason)
-
-
-def clauses_of(of: Reason | None) -> list[str]:
+def clauses(of: Reason | None) -> list[str]:
     """Clauses of a reason; none where there is none."""
     return [] if of is None else said("reason", of)
 

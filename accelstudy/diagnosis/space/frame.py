@@ -40,7 +40,7 @@ class Frame:
     sensed : (n, 3) array, m/s², the same along the sensitive axes as the base fit finds them
     output : (n, 3) array, m/s², adjusted readings, on which effects act that act last
     angles : (n, 2) array, rad, attitude as the robot reads it, else as the forces show it
-    hold : HoldConditions, completed with what is implied
+    hold : HoldConditions, with the attitude, and with yaw 0 where none is given
     """
 
     solution: Solution
@@ -72,6 +72,8 @@ class Frame:
         else:
             angles = angles_of(forces)
         t = model.axes_matrix(solution.parameters[: model.n_parameters])
+        hold = observed.hold or HoldConditions()
+        yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
         return cls(
             solution=solution,
             residuals=Residuals.of(solution),
@@ -80,7 +82,7 @@ class Frame:
             sensed=np.asarray(np.linalg.solve(t, forces.T).T),
             output=observed.forces[0] + solution.residuals[:, :3],
             angles=angles,
-            hold=implied_hold(solution, angles),
+            hold=replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw),
         )
 
     def rows(self, effect: Effect) -> Array:
@@ -149,13 +151,6 @@ def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
     shown = hypothesis.basis.T @ columns
     most = qr(shown, mode="r", pivoting=True)[1][: hypothesis.dim]
     return np.asarray(np.linalg.inv(shown[:, most]))
-
-
-def implied_hold(solution: Solution, angles: Array) -> HoldConditions:
-    """Complete the holds with what is implied: the attitude, and yaw 0 where none is given."""
-    hold = solution.observed.hold or HoldConditions()
-    yaw = np.zeros(len(angles)) if hold.yaw is None else hold.yaw
-    return replace(hold, roll=angles[:, 0], pitch=angles[:, 1], yaw=yaw)
 
 
 # --- signatures -----------------------------------------------------------------------------------
