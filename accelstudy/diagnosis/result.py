@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -184,11 +184,6 @@ class Diagnosis:
         """Effects that the parameters of the model absorb whatever their size."""
         return self.problem.examined.invisible
 
-    @property
-    def untestable(self) -> Mapping[str, str]:
-        """Effects that cannot be tested, with the reasons."""
-        return self.problem.examined.untestable
-
     # --- the verdict --------------------------------------------------------------------------
 
     @cached_property
@@ -352,11 +347,6 @@ class Diagnosis:
         variances = self.frame.solution.variances[0, :3]
         differ = self.frame.solution is not self.base
         return (variances / variances.mean()).tolist() if differ else []
-
-    @property
-    def level(self) -> float:
-        """Level of the test for anything that is missing."""
-        return RULES.level(self.sigma_known)
 
     @property
     def global_test(self) -> GlobalTest | None:

@@ -180,7 +180,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     smallest = float(np.nanmin([*tested, 1.0]))
     left.hlines(place, tested, 1, color=colours, linewidth=1.2)
     left.scatter(tested, place, color=colours, s=18, zorder=3)
-    level = diagnosis.level
+    level = RULES.level(diagnosis.sigma_known)
     left.axvline(level, color=BEFORE, linewidth=1, linestyle="--")
     left.text(level, 1.0, f"level {level:g}", transform=left.get_xaxis_transform(),
               color=BEFORE, ha="center", va="bottom", fontsize=7.5)  # fmt: skip
