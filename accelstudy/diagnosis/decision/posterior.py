@@ -331,7 +331,7 @@ class Case(Alternatives):
     def slow(self) -> float:
         """Probability that the noise lasts for some holds, by the evidence alone."""
         by_level, weights = self.detection.noise, self.problem.evidence.level.weights
-        fast = max(self._colours[0], *(by_level[1:] - np.log(weights[1:])))
+        fast = max((self._colours[0], *(by_level[1:] - np.log(weights[1:]))))
         return float(special.expit(log_mean(self._colours[1:]) - fast))
 
     @cached_property
