@@ -93,7 +93,7 @@ def _type(value, known, links):
         return " or ".join(code("null" if each is None else each) for each in value["enum"])
     if any_of := value.get("anyOf") or value.get("oneOf"):
         kinds = [_type(each, known, links) for each in any_of if each.get("type") != "null"]
-        ones = [k for k in kinds if f"list of {k}" not in kinds and f"list of: {k}" not in kinds]
+        ones = [kind for kind in kinds if f"list of {kind}" not in kinds]
         if len(ones) < len(kinds):  # one, or a list of such
             return " or ".join(kind.replace("list of", "one or more of", 1) for kind in ones)
         return " or ".join(dict.fromkeys(kinds))

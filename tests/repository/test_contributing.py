@@ -57,12 +57,8 @@ def test_effects_are_in_the_catalogue_and_in_models():
     assert "dead_zone: −k_i f_i exp(−(f_i/w)²)\n" in catalogue
     assert "settings: width=1 m/s^2" in catalogue
     assert "shared_noise: √(1 − ρ) v + √ρ σ w" in catalogue
-    effects = (
-        "--effect",
-        "dead_zone(width=2): 0.02, 0.01, -0.01",
-        "--noise-effect",
-        "shared_noise",
-    )
+    effects = ("--effect", "dead_zone(width=2): 0.02, 0.01, -0.01")
+    effects += ("--noise-effect", "shared_noise")
     succeed("simulate-campaign", "--out", "mine", "--scheme", "fibonacci-60", *effects)
     words = ("--model", "bias-scale+dead_zone(width=2)", "--approach", "turntable")
     said = succeed("check-sigmas", "mine", *words, "--replicates", "10").stdout

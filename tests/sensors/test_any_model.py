@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -158,16 +159,12 @@ def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
     assert re.search(r"accelstudy calibrate CAMPAIGN --model \S*model\.yaml --approach robot", page)
 
 
+@cache
 def calibration_of(**settings):
+    """A campaign, its diagnosis, and the calibration that this writes."""
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", **settings))
     diagnosis = diagnose(campaign, get_model(NINE))
     return campaign, diagnosis, diagnosed_calibration(diagnosis)
-
-
-@pytest.fixture(scope="module")
-def whole():
-    """Calibration of a campaign without a gross error."""
-    return calibration_of()[2]
 
 
 @pytest.mark.parametrize(("error", "words"), [
@@ -175,7 +172,8 @@ def whole():
     ("unit_error(force=0.1019716212978)", "the forces are in g"),
     ("unit_error(angle=0.9)", "the robot's angles are in degrees"),
 ])  # fmt: skip
-def test_a_calibration_of_mended_data_says_so(error, words, whole):
+def test_a_calibration_of_mended_data_says_so(error, words):
+    whole = calibration_of()[2]
     assert whole["mended"] is None
     campaign, diagnosis, content = calibration_of(gross_errors=(error,))
     assert (content["mended"]["reason"], whole["warnings"]) == (words, [])
@@ -214,13 +212,15 @@ def test_forms_hold_what_they_can(diagnosed):
 
 
 @pytest.mark.parametrize("frame", ["frd", "flu", "rfu"])
-def test_forms_take_and_give_the_axes_of_the_log(frame, whole, tmp_path):
+def test_forms_take_and_give_the_axes_of_the_log(frame, tmp_path):
     """With data of a campaign whose axes were mended, in counts of a log with axes of its own."""
     scale, offset = [0.02, 0.021, 0.019], [500, 510, 490]
     log = {"unit": "counts", "scale": scale, "offset": offset, "frame": frame}
     mended = {"error": "axis_error", "reason": "x is read as −y", "matrix": TURNED}
     path = tmp_path / "calibration.json"
-    path.write_text(json.dumps({**whole, "log": log, "mended": mended}), encoding="utf-8")
+    path.write_text(
+        json.dumps({**calibration_of()[2], "log": log, "mended": mended}), encoding="utf-8"
+    )
     calibration = read_calibration(path)
     raw = np.random.default_rng(2).normal(500, 300, (6, 3))
     axes = parse_frame(frame)
