@@ -48,7 +48,7 @@ POSITIONS = 60
 STEP = 1e-2
 """Step of its derivatives, of the sigmas."""
 GOLDEN = (np.sqrt(5) - 1) / 2
-COLUMNS = 3
+PANELS = 3
 """Panels side by side."""
 
 
@@ -127,9 +127,9 @@ class Calibrations(Result):
         at : (n,) array, where the calibrations stand
         draw_more : function that adds to the panel of a parameter, by its number
         """
-        rows = -(-len(self.parameters) // COLUMNS)
+        rows = -(-len(self.parameters) // PANELS)
         figure = new_figure(FULL, 12 + 36 * rows)
-        panels = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+        panels = figure.subplots(rows, PANELS, sharex=True, squeeze=False).ravel()
         for k, (ax, parameter) in enumerate(zip(panels, self.parameters, strict=False)):
             unit, found = parameter.unit, self.found[k]
             values, halves = (
@@ -139,7 +139,7 @@ class Calibrations(Result):
             draw_more(ax, k)
             ax.set_title(symbol(parameter.name) + (f" ({' and '.join(found)})" if found else ""))
             ax.set_ylabel(shown_unit(unit))
-            ax.tick_params(axis="x", labelbottom=k + COLUMNS >= len(self.parameters))
+            ax.tick_params(axis="x", labelbottom=k + PANELS >= len(self.parameters))
         for ax in panels[len(self.parameters) :]:
             ax.set_visible(False)
         figure.suptitle(title)

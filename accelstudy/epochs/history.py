@@ -29,15 +29,13 @@ from accelstudy.epochs.calibrations import (
 )
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.course import YEAR, Course
-from accelstudy.epochs.interval import SHOWN_YEARS, Interval, interval_figure
+from accelstudy.epochs.interval import LINE_POINTS, SHOWN_YEARS, Interval, interval_figure
 from accelstudy.files.outputs import HISTORY
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import lines
 
 MIN_CALIBRATIONS = 3
 """Calibrations of which a line leaves a degree of freedom."""
-LINE_POINTS = 50
-"""Points of a line."""
 
 
 class History(Calibrations):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -113,6 +114,11 @@ class Pass:
         return lot_classes(self.sensors) | of_mean
 
     @cached_property
+    def _stands(self) -> dict[str, str]:
+        """The name that stands for each one."""
+        return {name: first for first, members in self.classes.items() for name in members}
+
+    @cached_property
     def mixture(self) -> Mixture:
         """Posterior of all sets of effects."""
         odds = {
@@ -127,9 +133,9 @@ class Pass:
             for names, log in self._pairs(one).items():
                 pairs.setdefault(names, np.full(len(self.sensors), np.nan))[i] = log
         kinds = {name: _kind(name) for name in self.classes}
-        counts = [*kinds.values()]
-        prior = {name: WEIGHTS[kind] / counts.count(kind) for name, kind in kinds.items()}
-        total = sum(prior.values())
+        counts = Counter(kinds.values())
+        total = sum(WEIGHTS[kind] for kind in counts)
+        prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
         common: dict[Names, float] = {(name,): one.odds for name, one in self.pooled.items()}
         if (mean := self.mean) is not None:
             # What is larger than noise in the mean is no noise; what is sudden has no mean.
@@ -140,7 +146,6 @@ class Pass:
                 if not any(map(_is_sudden, names))
             }
             common[COMMON,] = mean.odds[LEVEL_OF_NOISE]
-        prior = {name: weight / total for name, weight in prior.items()}
         return Mixture(odds, pairs, prior, common, self._typical)
 
     @property
@@ -177,10 +182,9 @@ class Pass:
 
     def _pairs(self, one: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
-        stands = {name: first for first, members in self.classes.items() for name in members}
         pairs: dict[Names, float] = {}
         for both, log in one.pairs.items():
-            names = tuple(sorted({stands[name] for name in both if name in stands}))
+            names = tuple(sorted({self._stands[name] for name in both if name in self._stands}))
             if len(names) == 2:
                 pairs[names] = max(log, pairs.get(names, -np.inf))
         return pairs

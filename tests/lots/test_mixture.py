@@ -10,7 +10,7 @@ from scipy import integrate, stats
 
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import DRAWS, SensorEvidence, lot_classes
+from accelstudy.lots.evidence import SensorEvidence, lot_classes
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import (
     PRIOR_ALL,
@@ -38,6 +38,8 @@ NAMES = ("axis_nonperpendicularity", "gravity_error", "settling")
 """Effects with a parameter each, whose names alone matter here."""
 SPREAD = 3.0
 """Sd of what is missing, in units of the noise; a sensor shows it in one number."""
+CHANCES = 200
+"""Sets of numbers without any effect, of each sensor."""
 N, ROWS = 24, 30
 """Sensors of a type, and the numbers in which each shows its effects."""
 
@@ -68,7 +70,7 @@ def weighed(odds, rng):
         known = dict(zip(NAMES, each.tolist(), strict=True))
         pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
         sensors.append(SensorEvidence(f"sensor {i}", 0.5, known, pairs, [(n,) for n in NAMES]))
-        chance = odds_of(rng.standard_normal((DRAWS, len(NAMES))))
+        chance = odds_of(rng.standard_normal((CHANCES, len(NAMES))))
         tested.append(dict(zip(NAMES, np.vstack([each, chance]).T, strict=True)))
         anything.add(tested[-1])
     return Pass(tuple(sensors), anything, tested.__getitem__)
