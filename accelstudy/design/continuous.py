@@ -25,6 +25,8 @@ SHARED_ATTITUDES, BOUND_ATTITUDES = 600, 6000
 ROUNDS = 8
 UPDATES = 2000
 """Number of updates of all shares in a round."""
+LOWEST = 60
+"""Number of attitudes of a grid near which the smallest derivatives are sought."""
 MAX_GAP = 1e-4
 """Relative gap between the criterion and its bound at which the search stops."""
 
@@ -76,9 +78,8 @@ def continuous_optimum(
         normal = task.prior + n * (shares @ flat).reshape(u, u)
         value = float(criterion.value(normal))
         slope = criterion.gradient(normal).ravel()
-        here = flat @ slope
-        gradient, everywhere = slope.reshape(u, u), fine_flat @ slope
-        lowest, least = _lowest(task, gradient, space, constraints, fine, everywhere)
+        here, low = flat @ slope, np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]
+        lowest, least = _lowest(task, slope.reshape(u, u), space, constraints, fine[low])
         least = min(least, float(here.min()))
         bound = max(best.bound, value + n * (least - float(shares @ here)))
         best = Continuous(points, shares, value, bound)
@@ -118,15 +119,13 @@ def _share(prior: Array, criterion: Criterion, flat: Array, shares: Array, n: in
 
 
 def _lowest(
-    task: Task,
-    gradient: Array,
-    space: Space,
-    constraints: Constraints,
-    fine: Array,
-    slopes: Array,
+    task: Task, gradient: Array, space: Space, constraints: Constraints, points: Array
 ) -> tuple[Array, float]:
-    """Attitudes with the smallest derivatives, also between those of the grid; and the smallest."""
-    points = fine[np.argsort(slopes, kind="stable")[:60]]
+    """Attitudes near some with the smallest derivatives, also between a grid; and the smallest."""
+
+    def slopes(directions: Array) -> Array:
+        return np.einsum("kuw,uw->k", task.informations(directions), gradient)
+
     step = np.sqrt(4 * np.pi / BOUND_ATTITUDES)
     for _ in range(12):
         tangents = space.tangents(points)
@@ -135,11 +134,9 @@ def _lowest(
         moves = step * np.concatenate([np.zeros_like(tangents[..., :1]), tangents, -tangents], 2)
         around = np.moveaxis(points[..., None] + moves, 2, 1)
         around = around / np.linalg.norm(around, axis=-1, keepdims=True)
-        values = np.einsum("kuw,uw->k", task.informations(around.reshape(-1, 3)), gradient)
-        values = np.where(constraints.allow(around.reshape(-1, 3)), values, np.inf).reshape(
-            around.shape[:2]
-        )
-        points = around[np.arange(len(points)), np.argmin(values, axis=1)]
+        flat = around.reshape(-1, 3)
+        values = np.where(constraints.allow(flat), slopes(flat), np.inf)
+        best = np.argmin(values.reshape(around.shape[:2]), axis=1)
+        points = around[np.arange(len(points)), best]
         step /= 2
-    values = np.einsum("kuw,uw->k", task.informations(points), gradient)
-    return points, float(values.min())
+    return points, float(slopes(points).min())

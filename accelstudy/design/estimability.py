@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,17 +101,19 @@ def estimability(
         count, as unit vectors would have the sensor's errors in their directions.
     blur : float, m/s², noise of readings by which they are judged
     """
-    known = known or {}
     noise = noise or Noise()
     ideal = np.zeros(model.n_parameters)
     names = (*model.parameter_names, "g") if noise.sigma_gravity > 0 else model.parameter_names
     directions = scheme.directions if forces is None else -forces / gravity
-    given = (model, approach, noise, ideal, gravity, hold, known)
-    a = _design(directions, *given)
+    design = partial(
+        _design, model=model, approach=approach, noise=noise, gravity=gravity, hold=hold,
+        known=known or {},
+    )  # fmt: skip
+    a = design(directions, ideal)
     rank, condition, free = exact = rank_of(a)
     if blur and not free.any():
         shifts = blur / gravity * np.eye(3)
-        changes = np.concatenate([_design(directions + shift, *given) - a for shift in shifts])
+        changes = np.concatenate([design(directions + shift, ideal) - a for shift in shifts])
         rank, condition, free = rank_of(a, ABOVE_NOISE * changes)
     not_estimable = tuple(name for name, is_free in zip(names, free, strict=True) if is_free)
     reason = ""
@@ -126,8 +129,7 @@ def estimability(
         )
     else:
         if parameters is not None:
-            at = np.asarray(parameters, dtype=float)
-            a = _design(scheme.directions, model, approach, noise, at, gravity, hold, known)
+            a = design(scheme.directions, np.asarray(parameters, dtype=float))
         scale = np.linalg.norm(a, axis=0)
         cofactors = np.linalg.inv((a / scale).T @ (a / scale)) / np.outer(scale, scale)
     return Estimability(
@@ -143,10 +145,10 @@ def estimability(
 
 def _design(
     directions: Array,
+    parameters: Array,
     model: SensorModel,
     approach: Approach,
     noise: Noise,
-    parameters: Array,
     gravity: float,
     hold: HoldConditions | None,
     known: Known,
@@ -161,7 +163,6 @@ def is_blind(model: SensorModel, approach: Approach, noise: Noise, gravity: floa
     """Whether an approach cannot determine a model in any scheme, whatever the conditions are."""
     ideal = np.zeros(model.n_parameters)
     hold = EVERYTHING_VARIES.hold(SUFFICIENT_POSITIONS)
-    a = _design(
-        evenly_spread(SUFFICIENT_POSITIONS), model, approach, noise, ideal, gravity, hold, {}
-    )
+    many = evenly_spread(SUFFICIENT_POSITIONS)
+    a = _design(many, ideal, model, approach, noise, gravity, hold, {})
     return rank_of(a)[0] < a.shape[1]
