@@ -25,7 +25,6 @@ from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.importing.windows import usual_window
 from accelstudy.campaign.session import Campaign
-from accelstudy.pages import lines
 from accelstudy.sensors.conversion import Conversion, conversion_of
 
 if TYPE_CHECKING:
@@ -296,8 +295,7 @@ def _notes(
     sensors = (holds.log.parts, *holds.log.others)
     taken = {place for logs in sensors for place in logs[0].places.values()}
     time = holds.log.time[holds.windows.centred]
-    return lines(
-        TEMPLATE,
+    return _lines(
         "notes",
         holds,
         settings,
@@ -321,8 +319,7 @@ def _warnings(holds: Holds, gravity: float) -> list[str]:
         turned = f"{to_display(noise.across / gravity, 'rad'):.0f} {display_unit('rad')}"
     numbered = enumerate(parts, 1) if len(parts) > 1 else ()
     unknown = {name: holds.table[name].isna() for name in holds.log.conditions}
-    return lines(
-        TEMPLATE,
+    return _lines(
         "warnings",
         holds,
         holds.log,
@@ -331,3 +328,10 @@ def _warnings(holds: Holds, gravity: float) -> list[str]:
         lost=[(holds.table.index[lost][0], name) for name, lost in unknown.items() if lost.any()],
         shown=shown,
     )
+
+
+def _lines(part: str, *content: Any, **named: Any) -> list[str]:
+    """Say a part of the template; who reads logs without saying anything loads no templates."""
+    from accelstudy.pages import lines
+
+    return lines(TEMPLATE, part, *content, **named)
