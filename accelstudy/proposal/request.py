@@ -89,14 +89,13 @@ class Request:
         """What is to be calibrated."""
         model = get_model(self.model)
         prior: dict[str, float] = {}
+        named = {effect.name: effect.parameters for effect in model.effects}
+        named |= {parameter.name: (parameter,) for parameter in model.parameters}
         for text in self.prior:
-            effects = {effect.name: effect.parameters for effect in model.effects}
-            parameters = {p.name: (p,) for p in model.parameters}
             name, size = _named(text, "prior")
-            if name not in effects and name not in parameters:
-                known = (*effects, *parameters)
-                raise UnknownNameError(f"effect or parameter of {self.model!r}", name, known)
-            for parameter in effects.get(name) or parameters[name]:
+            if name not in named:
+                raise UnknownNameError(f"effect or parameter of {self.model!r}", name, [*named])
+            for parameter in named[name]:
                 prior[parameter.name] = _positive(text, size, parameter.unit, "prior")
         neglected: dict[str, float] = dict.fromkeys(self._rivals, 0.0)
         for text in self.neglect:
