@@ -47,9 +47,9 @@ def quantity(name: str, value: Any, given: Given) -> float:
         raise InputError(f"{name}: {error}") from None
 
 
-def tidy(value: float) -> float:
+def tidy(value: float, digits: int = 12) -> float:
     """Round a quantity in the unit of a file, so that 3.2 mgon stays that number."""
-    return float(f"{value:.12g}")
+    return float(f"{value:.{digits}g}") + 0.0  # -0.0 becomes 0.0
 
 
 def each(value: Any) -> Sequence[Any]:

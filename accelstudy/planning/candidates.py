@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.given import tidy
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.information import Information, position_rows
@@ -227,4 +228,4 @@ def names_of(model: SensorModel) -> tuple[str, ...]:
 
 def sigma_of(question: Question, equipment: Equipment, n: int, hold: float) -> float:
     """Noise of the mean of a position, m/s², with four digits: so names of cells stay short."""
-    return float(f"{question.sheet.sigma_mean(hold, n * (hold + equipment.moving)):.4g}")
+    return tidy(question.sheet.sigma_mean(hold, n * (hold + equipment.moving)), 4)

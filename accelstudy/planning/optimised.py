@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.given import tidy
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX
 from accelstudy.design.search import STEPS
@@ -85,10 +86,9 @@ class Kind:
         """
         noise = Noise()
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
-            angle = angle_sigma(self.question, self.equipment)
-            sigma_angle = float(f"{angle / MGON:.6g}") * MGON
-            noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), sigma_angle)
-        tilt_range = float(f"{self.question.tilt_range / GON:.6g}") * GON
+            angle = tidy(angle_sigma(self.question, self.equipment) / MGON, 6) * MGON
+            noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), angle)
+        tilt_range = tidy(self.question.tilt_range / GON, 6) * GON
         at = self.model.name, self.equipment.approach, MINIMAX
         return Request(n, *at, tilt_range, noise, starts=1)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.given import tidy
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
@@ -90,14 +91,14 @@ def study_of(
         "gravity_mps2": STANDARD_GRAVITY,
         "noise": {
             "sensor": {"sigma_mps2": sigma, "per": "position"},
-            "robot": {"sigma_mgon": _tidy(question.sigma_angle / MGON)},
+            "robot": {"sigma_mgon": tidy(question.sigma_angle / MGON, 6)},
             "gravity": {"sigma_mps2": 0.0, "error_mps2": 0.0},
             "effects": [],
         },
         "sensor": sensor,
         "simulated_effects": [*BASE_EFFECTS, *has],
         **({"schemes": of_files} if of_files else {}),
-        "leveling": {"max_tilt_gon": _tidy(question.tilt_range / GON), "attitudes": ATTITUDES},
+        "leveling": {"max_tilt_gon": tidy(question.tilt_range / GON, 6), "attitudes": ATTITUDES},
         "presets": None,
         "sensitivity": None,
         "paper": False,
@@ -134,7 +135,7 @@ def _quantity(question: Question, effect: str) -> dict[str, Any]:
     """True parameters of an effect as a configuration has them."""
     unit = get_effect(effect).parameters[0].unit
     size = true_size(question, effect)
-    value = [_tidy(sign * float(to_recorded(size, unit))) for sign in SIGNS]
+    value = [tidy(sign * float(to_recorded(size, unit)), 6) for sign in SIGNS]
     return {"value": value, "unit": recorded_unit(unit)}
 
 
@@ -146,7 +147,3 @@ def true_size(question: Question, effect: str) -> float:
         return question.sizes[effect]
     stated: float | None = getattr(question.sheet, effect)
     return usual_size(effect) if stated is None else stated
-
-
-def _tidy(value: float) -> float:
-    return float(f"{value:.6g}") + 0.0

@@ -18,7 +18,7 @@ from accelstudy import __version__
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.given import path_of
+from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.units import (
@@ -162,10 +162,10 @@ class Design(Result):
             "criterion": f"{request.chosen.name}: {request.chosen.text}",
             "model": request.task.model.name,
             "approach": request.approach,
-            "tilt_range_gon": _brief(request.tilt_range / GON),
-            "sigma_mps2": _brief(noise.sigma_force),
-            "robot_sigma_mgon": _brief(noise.sigma_angle / MGON),
-            "gravity_sigma_mps2": _brief(noise.sigma_gravity),
+            "tilt_range_gon": tidy(request.tilt_range / GON, 6),
+            "sigma_mps2": tidy(noise.sigma_force, 6),
+            "robot_sigma_mgon": tidy(noise.sigma_angle / MGON, 6),
+            "gravity_sigma_mps2": tidy(noise.sigma_gravity, 6),
             "attitudes": request.space.text,
             "constraints": constraints,
             "prior": list(request.prior),
@@ -174,9 +174,9 @@ class Design(Result):
             "discriminate": list(request.discriminate or ()),
             "seed": request.seed,
             "starts": request.starts,
-            "efficiency": _brief(self.efficiency),
-            "rms_roll_mgon": _brief(self.rms[0] / MGON),
-            "rms_pitch_mgon": _brief(self.rms[1] / MGON),
+            "efficiency": tidy(self.efficiency, 6),
+            "rms_roll_mgon": tidy(self.rms[0] / MGON, 6),
+            "rms_pitch_mgon": tidy(self.rms[1] / MGON, 6),
         }
         return {k: v for k, v in content.items() if v not in (None, [], 0.0) and v == v}
 
@@ -306,10 +306,6 @@ def _fewest_axes(space: Mountings, directions: Array) -> NDArray[np.int_]:
         chosen[taken] = best
         left &= ~taken
     return chosen
-
-
-def _brief(value: float) -> float:
-    return float(f"{value:.6g}")
 
 
 def write_design(
