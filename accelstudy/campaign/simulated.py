@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,12 +34,20 @@ STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
 
 ORDERS = ("scheme", "random")
 
+_RANGES = {
+    "seed": bounds.SEED,
+    "repeats": bounds.POSITIONS,
+    "repeat_first": replace(bounds.POSITIONS, least=0),
+    "n_samples": bounds.SAMPLES,
+    "sigma": bounds.SIGMA_FORCE,
+    "gravity": bounds.GRAVITY,
+    "size": bounds.SIZE,
+}
+
 
 @dataclass(frozen=True)
 class CampaignSettings:
     """Settings of a simulated campaign, in SI apart from temperatures in °C.
-
-    `accelstudy.simulate_campaign` checks ranges; here is checked what depends on other settings.
 
     Parameters
     ----------
@@ -90,6 +98,9 @@ class CampaignSettings:
     def __post_init__(self) -> None:
         if self.order not in ORDERS:
             raise UnknownNameError("order", self.order, ORDERS)
+        for key, allowed in _RANGES.items():
+            if (value := getattr(self, key)) is not None:
+                allowed.check_key(key, value)
         bounds.SIGMA_ANGLE.check_key("robot_sigma", self.robot_sigma / MGON)
         n = self.repeats * get_scheme(self.scheme).n_positions + self.repeat_first
         bounds.POSITIONS.check_key("repeats: number of positions", n)
