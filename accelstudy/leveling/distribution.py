@@ -63,6 +63,11 @@ class Tilt:
         factors = np.array([factor if cause == NOISE else 1.0 for cause in self.causes])
         return replace(self, form=self.form * np.outer(factors, factors))
 
+    def of(self, cause: str) -> Tilt:
+        """What one cause leaves by itself."""
+        own = [i for i, each in enumerate(self.causes) if each == cause]
+        return Tilt(self.form[:, own][:, :, own], (cause,) * len(own))
+
     @cached_property
     def squares(self) -> dict[str, Array]:
         """Mean square of the errors of roll and of pitch, (2,), rad², by each cause."""

@@ -14,6 +14,7 @@ from accelstudy.basics.given import tidy
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX
 from accelstudy.design.search import STEPS
+from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
@@ -32,8 +33,11 @@ from accelstudy.simulation.sessions import Noise
 USUAL_SHARE, MIN_SHARE = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
 MISSED = (math.inf, 1.03, 1.01, 1.003, 1.002, 1.0)
-"""Accuracies over the target beyond which positions miss it, as moves on finer grids bring less:
-before any move, and after those on each grid."""
+"""What noise alone leaves over the target, beyond which positions miss it, as moves on finer grids
+bring less: before any move, and after those on each grid."""
+NOISE_SHARE = 0.99
+"""Part of an accuracy that has to be of the noise for a search to end early. Moves lower what noise
+leaves, and may raise what neglected effects leave."""
 SURE_SHARE = 0.99
 """Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
@@ -130,9 +134,15 @@ class Kind:
         for moves, missed in enumerate(MISSED):
             scheme = Scheme("", "", _positions(request, moves), "generated", "")
             candidate = self._in_positions(scheme)
-            if candidate is not None:
-                share = self.question.accuracy(candidate.tilt) / self.question.target
-            if share > missed or share * _of_one_less(n) <= 1:
+            if candidate is None:
+                continue
+            share, noise = (
+                self.question.accuracy(tilt) / self.question.target
+                for tilt in (candidate.tilt, candidate.tilt.of(NOISE))
+            )
+            if noise > missed:
+                break
+            if noise > NOISE_SHARE * share and share * _of_one_less(n) <= 1:
                 break
         return share
 

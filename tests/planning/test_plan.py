@@ -406,6 +406,16 @@ def test_one_position_less_does_not_suffice(plan):
     assert f"{n - 1} positions leave" in part_lines("answer", plan)[2]
 
 
+@pytest.mark.parametrize("target", [17 * MGON, 20 * MGON])
+def test_the_fewest_positions_suffice_although_their_refinement_neglects_effects(target):
+    bent = DataSheet("s", position_sigma=SIGMA, nonlinearity=0.001, full_scale=19.6133)
+    question = Question(target, 50 * GON, bent, (BY_HAND,), holds=(10.0,))
+    found = Kind(question, BY_HAND, MODEL, 10.0).fewest(20)
+    assert found.tilt.of("quadratic_scale").rms.max() > 0.2 * target
+    assert found.tilt.rms.max() <= target
+    assert found.scheme.n_positions < 30
+
+
 def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
     question = Question(20 * MGON, 30 * GON, of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
     found = answer(question, replicates=4000).first
