@@ -11,8 +11,9 @@ import click
 from accelstudy.commands.main import main
 
 ROOT = Path(__file__).parents[2]
-CODE = re.compile(r"^```.*?^```|(?:^ {4}.*\n)+|`[^`]+`", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"^```.*?^```|(?:^ {4}.*\n)+|(?<!`)``(?!`).+?``|`[^`]+`", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"`((?:accelstudy|benchmarks|config|docs|examples|profiles|workflow)/[\w/.-]*)`")
+PART = re.compile(r"`([\w/]+\.py)`")  # of a walk through a room
 COMMAND = re.compile(r"(?:^ *|`)accelstudy ([^`\n]*(?:\\\n[^`\n]*)*)", re.MULTILINE)
 DOTTED = re.compile(r"\b(accelstudy\.[a-z_]\w*(?:\.\w+)*)(?: import (\([^)]*|[\w, ]+))?")
 TARGET = re.compile(r"(?:^ *|`)make ([a-z][a-z-]*)", re.MULTILINE)
@@ -25,12 +26,17 @@ def on_page_markdown(markdown, page, **_):
     code = "\n".join(found[0] for found in CODE.finditer(markdown))
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     missing = [name for name in FILE.findall(code) if not (ROOT / name).exists()]
+    missing += [name for name in PART.findall(code) if not _is_file(name)]
     missing += [f"make {t}" for t in TARGET.findall(code) if f"\n{t}:" not in makefile]
     missing += re.findall(r"--8 .*", code)  # a formatter took a snippet for Python
     missing += filter(None, map(_unknown, COMMAND.findall(code)))
     missing += [name for found in DOTTED.findall(code) for name in _names(*found) if _absent(name)]
     for name in dict.fromkeys(missing):
         log.warning("%s names %s, which there is not", page.file.src_uri, name)
+
+
+def _is_file(name):
+    return (ROOT / name).exists() or any(ROOT.glob(f"accelstudy/**/{name}"))
 
 
 def _names(name, imported):
