@@ -11,7 +11,9 @@ import click
 from accelstudy.commands.main import main
 
 ROOT = Path(__file__).parents[2]
-CODE = re.compile(r"^```.*?^```|(?:^ {4}.*\n)+|(?<!`)``(?!`).+?``|`[^`]+`", re.MULTILINE | re.DOTALL)
+CODE = re.compile(
+    r"^```.*?^```|(?:^ {4}.*\n)+|(?<!`)``(?!`).+?``|`[^`]+`", re.MULTILINE | re.DOTALL
+)
 FILE = re.compile(r"`((?:accelstudy|benchmarks|config|docs|examples|profiles|workflow)/[\w/.-]*)`")
 PART = re.compile(r"`([\w/]+\.py)`")  # of a walk through a room
 COMMAND = re.compile(r"(?:^ *|`)accelstudy ([^`\n]*(?:\\\n[^`\n]*)*)", re.MULTILINE)
