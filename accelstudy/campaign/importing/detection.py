@@ -235,9 +235,9 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     named = (which for which, _ in settings.left_out)
     if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
         raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
-    block, row = log.part, log.row
+    block = log.part
     if (size := settings.block) is not None:
-        total = len(log.first.forces)
+        row, total = log.row, len(log.first.forces)
         fewer = total // size * size
         if len(row) and row[-1] >= fewer:  # a note at the end is no sample
             raise InputError(

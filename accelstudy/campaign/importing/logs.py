@@ -130,9 +130,7 @@ def write_imported(
 # --- Kinds of logs -------------------------------------------------------------------------------
 
 
-def _check_kinds(
-    files: int, settings: ImportSettings, reference: ReferenceLog | None = None
-) -> None:
+def _check_kinds(files: int, settings: ImportSettings, reference: ReferenceLog | None) -> None:
     """Check that means, blocks, several files, several sensors and a reference go together."""
     means, block = settings.means, settings.block is not None
     placed = settings.sensors and {*AXES} & settings.columns.keys()

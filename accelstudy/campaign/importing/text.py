@@ -152,21 +152,22 @@ class TextSource(Source):
         return pa.concat_tables([table, more]).take(np.delete(order, none))
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
-        """See `Source`; reads the file again, which only errors need."""
-        number, cells = next(islice(self._numbered(), row, None), (0, []))
+        """See `Source`; reads the file again, which only errors and warnings need."""
+        number, line = next(islice(self._numbered(), row, None), (0, ""))
         if not number:
             return f"row {row + 1}", "unreadable"
+        cells = self._rows.split(line.split(self._rows.comment)[0])
         if any(cells[self._rows.width :]):
             return f"line {number}", f"{len(cells)} columns instead of {self._rows.width}"
         if place >= len(cells):
             return f"line {number}", "the line ends before it"
         return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
-    def _numbered(self) -> Iterator[tuple[int, list[str]]]:
-        """Cells of the rows, with the numbers of their lines, counted from 1."""
+    def _numbered(self) -> Iterator[tuple[int, str]]:
+        """Rows with the numbers of their lines, counted from 1."""
         for number, line in enumerate(_read(self.path).decode().split("\n"), 1):
             if number > self._rows.first and (row := self._rows.clean(line)) is not None:
-                yield number, self._rows.split(row.split(self._rows.comment)[0])
+                yield number, row
 
     def _rows_only(self) -> pa.Buffer:
         """Rows of the table, each in a line of its own, in UTF-8."""
@@ -176,7 +177,7 @@ class TextSource(Source):
             lines.readline()
         if self._rows.are_clean(content, lines.tell()):
             return pa.py_buffer(content).slice(lines.tell())
-        blocks = iter(lambda: b"".join(lines.readlines(_BLOCK)), b"")
+        blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
         return pa.py_buffer(b"".join(map(self._cleaned, blocks)))
 
     def _cleaned(self, block: bytes) -> bytes:
@@ -436,12 +437,16 @@ def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
 def _typed(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Cells as numbers if that loses no digit of any; as text otherwise."""
     filled = pc.if_else(pc.equal(column, ""), None, column)
-    whole = pc.match_substring_regex(column, r"^\s*[+-]?[0-9]{16,}\s*$")
     for kind in (pa.int64(), pa.float64()):
         try:
             numbers = filled.cast(kind)
         except pa.ArrowInvalid:
             continue
-        if pa.types.is_integer(kind) or not pc.any(whole).as_py():
+        if pa.types.is_integer(kind) or not _has_long(column):
             return numbers
     return column
+
+
+def _has_long(column: pa.ChunkedArray) -> bool:
+    """Whether a cell is a whole number of more digits than a float has."""
+    return bool(pc.any(pc.match_substring_regex(column, r"^\s*[+-]?[0-9]{16,}\s*$")).as_py())

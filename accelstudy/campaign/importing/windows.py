@@ -157,7 +157,7 @@ class Windows:
             noise <= MAX_COARSE_RATIO * self.rounding or noise > MAX_REST_NOISE * STANDARD_GRAVITY
         )
 
-    @property
+    @cached_property
     def _all_counts(self) -> NDArray[np.int_]:
         return self.counts + _histogram(self.variance[self.frozen])
 
@@ -198,7 +198,7 @@ class Windows:
             return Threshold(given, np.nan, "as given")
         counts = self.counts
         if self.coarse:
-            counts = self._all_counts
+            counts = self._all_counts.copy()
             least = int(np.searchsorted(_BINS, 2 * np.log10(self.rounding)))
             counts[least] += counts[:least].sum() + np.sum(self.variance == 0)
             counts[:least] = 0
