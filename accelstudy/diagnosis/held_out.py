@@ -199,13 +199,14 @@ def _prefers(
     """Whether held-out positions by themselves prefer some names to the other explanations."""
     assert finding.posterior is not None
     errors = problem.residuals.errors[None]
+    missed = split.beside(errors)[1]
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
     for one in finding.posterior.reported[: RULES.held_out_rivals + 1]:
         if len(one.best) == 1 and one.best[0].effect is not None:
             (columns,) = problem.frame.columns(one.best)
-            missed = split.beside(errors)[1] - split.corrections(errors, [(0, columns, 0.0)])
-            logs.append(-float(np.sum(missed**2)) / (2 * variance))
+            left = missed - split.corrections(errors, [(0, columns, 0.0)])
+            logs.append(-float(np.sum(left**2)) / (2 * variance))
             of_group.append(one.names[0] in group)
     return bool(np.sum(softmax(logs)[of_group]) >= RULES.sure)
 
@@ -309,7 +310,9 @@ def chosen_names(
     candidate = np.argmax(field.densities(part.evidence, seen), axis=1)
 
     def groups() -> Iterator[Group]:
-        for k in np.unique(candidate[[names[k] != OUTLIER for k in candidate]]):
+        for k in np.unique(candidate):
+            if names[k] == OUTLIER:
+                continue
             shapes, rows = field.named[k], np.flatnonzero(candidate == k)
             logs = shapes.logs(part.evidence, seen.parts[k][rows], seen.squares[rows])
             places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)

@@ -170,7 +170,7 @@ def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigm
 
 @BOTH
 def test_unequal_axes_do_not_look_like_colour(approach):
-    """PlaceShape as they are, the axes leave the test what it is; unweighted it errs twice as often
+    """Weighted as they are, the axes leave the test what it is; unweighted it errs twice as often
     at most, while the test of the axes finds them."""
     kappa = np.array([1.0, 1.0, 4.0])
     drawn = draw(14, noise=Noise(effects=("axis_noise(kappa_z=4)",)), replicates=120)

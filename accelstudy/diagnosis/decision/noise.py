@@ -123,7 +123,7 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
 
 
 def judged_noise(problem: Problem, frame: Frame) -> JudgedNoise:
-    """Judge sigma by the residuals of a fit; where it is refuted, or none is given, they are it."""
+    """Judge the noise by the residuals of a fit, which give it where no stated sigma holds."""
     residuals = frame.residuals
     stated, r = problem.evidence.level.known, residuals.redundancy
     if not stated or level_test_of(problem, frame).p_value < REFUTATION_LEVEL:

@@ -67,7 +67,7 @@ class Explanation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the causes."""
         return tuple(one.name for one in self.causes)
 
     @property
@@ -312,7 +312,7 @@ class Case(Alternatives):
         """Explanations by wrong noise alone, one of each kind."""
         problem, by_level = self.problem, self.detection.noise
         nothing = float(np.logaddexp.reduce(by_level))
-        # PlaceShape axes need no further evidence that they differ.
+        # Weighted axes need no further evidence that they differ.
         weighted = problem.frame.solution is not problem.base.solution
         unequal = by_level[0] if weighted else nothing + problem.unequal_axes
         tails = most_evidence(tail_test(problem.residuals, self.chance).p_value)

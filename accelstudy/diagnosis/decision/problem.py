@@ -120,7 +120,7 @@ class Problem:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """By which all that may be missing is weighed."""
+        """Evidence by which all that may be missing is weighed."""
         return Evidence(self.base.level, self.residuals.redundancy)
 
     @cached_property
