@@ -17,7 +17,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.basics.progress import show
 from accelstudy.basics.units import attitude_unit, to_attitude
-from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.calibration.applying import sensor_of
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.sensor_type import SensorType, read_type
@@ -184,7 +184,7 @@ def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None
         return None
     if given.suffix in TYPES:
         return read_type(given, wanted)
-    earlier = read_calibration(given)
+    earlier = sensor_of(given)
     if earlier.model.parameter_names != wanted.parameter_names:
         raise InputError(
             f"{given}: calibrates {', '.join(earlier.model.parameter_names)}, but the model "

@@ -165,7 +165,7 @@ class Command(click.Command):
         return re.sub(r"`(\w+)`", lambda name: options.get(name[1], name[0]), text)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the options, as which messages call keywords from now on."""
+        """Read the options, by whose names messages call keywords from now on."""
         options = (p for p in self.params if isinstance(p, click.Option))
         OPTIONS.set({str(p.name): p.opts[0] for p in options})
         try:

@@ -87,7 +87,7 @@ _WITH_MARKERS = (
     *(BATCH_JOB, DIAGNOSIS, CALIBRATION, CAMPAIGN, COMPARISON, HISTORY, LOT, PLAN, SIMULATION),
     ADVICE,
 )
-"""Kinds that a folder can be told to be; one that holds the files of another comes first."""
+"""Kinds that a folder is recognised as; one that holds the files of another comes first."""
 
 
 @contextmanager
@@ -204,8 +204,10 @@ def _staging(near: Path, out: Path, name: str) -> Iterator[Path]:
         if (lock := _locked(left)) is not None:
             shutil.rmtree(left, ignore_errors=True)
             os.close(lock)
-    stage = Path(mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=folder))
-    lock, part = _locked(stage), stage / name
+    made = Path(mkdtemp(prefix=_PREFIX, dir=folder))
+    lock = _locked(made)  # before it has the ending by which other runs know leftovers
+    stage = made.rename(made.with_name(made.name + _SUFFIX))
+    part = stage / name
     try:
         yield part
     except InputError as error:

@@ -68,6 +68,13 @@ class SensorModel:
         return tuple(p.name for p in self.parameters)
 
     @property
+    def parts(self) -> Iterator[tuple[Effect, slice]]:
+        """Each effect, and where its parameters stand in a vector (u,)."""
+        first = 0
+        for effect in self.effects:
+            yield effect, slice(first, first := first + len(effect.parameters))
+
+    @property
     def stays(self) -> NDArray[np.bool_]:
         """Which parameters, (u,), belong to the sensor and not to the rig."""
         return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)

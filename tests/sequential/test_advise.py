@@ -219,6 +219,7 @@ def test_a_calibration_of_before_saves_positions(begun, sessions, tmp_path):
     text = advise(begun(0, "robot"), "--prior", earlier, "--approach", "gravity")
     assert "not determined" not in text
     assert "tilt error left: roll " in text
+    assert text == advise(begun(0, "robot"), "--prior", earlier.parent, "--approach", "gravity")
     message = error(begun(0), *WANTED, "--prior", earlier, "--model", "bias-scale")
     assert "calibration.json: calibrates b_x, " in message
 

@@ -231,9 +231,8 @@ class SensorCalibration:
         time = hold.column("time")
         kept = np.clip(time, 0.0, self.ranges["time_s"][1])
         part = np.divide(kept, time, out=np.ones_like(time), where=time != 0)[:, None]
-        before_last, first = np.zeros_like(forces), 0
-        for effect in self.model.effects:
-            columns = slice(first, first := first + len(effect.parameters))
+        before_last = np.zeros_like(forces)
+        for effect, columns in self.model.parts:
             if effect.drifts:  # in proportion to time
                 f, p = tuple(forces.T), tuple(self.parameters[columns])
                 added = np.stack(effect.output(f, p, self.gravity, hold, np), axis=-1)

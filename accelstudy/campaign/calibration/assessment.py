@@ -48,7 +48,7 @@ class TiltLeft:
 
     @property
     def total(self) -> Array:
-        """By the parameters, and by what the model lacks."""
+        """Tilt error by the parameters and by what the model lacks together."""
         return np.hypot(self.parameters, self.missing)
 
 
@@ -163,12 +163,7 @@ def tilt_left(fit: CampaignFit, max_tilt: float = MAX_TILT_GON * GON) -> TiltLef
         part, block = slope[..., columns], covariance[columns, columns]
         return np.sqrt(np.einsum("kau,uw,kaw->a", part, block, part) / len(part))
 
-    shares, first = {}, 0
-    for effect in model.effects:
-        last = first + len(effect.parameters)
-        if effect.part == "sensor":
-            shares[effect.name] = rms(slice(first, last))
-        first = last
+    shares = {effect.name: rms(own) for effect, own in model.parts if effect.part == "sensor"}
     missing = np.zeros(2)
     if fit.sigma_known and not fit.trusts_sigma:
         excess = fit.sigma_position_posteriori**2 - campaign_noise(campaign).sigma_force ** 2

@@ -141,9 +141,6 @@ def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
 
 def _alone(calibration: SensorCalibration) -> Iterator[tuple[str, SensorCalibration]]:
     """Each effect with a calibration that has it alone."""
-    first = 0
-    for effect in calibration.model.effects:
-        last = first + len(effect.parameters)
-        model, values = compose(effect.spec, (effect.spec,)), calibration.parameters[first:last]
+    for effect, own in calibration.model.parts:
+        model, values = compose(effect.spec, (effect.spec,)), calibration.parameters[own]
         yield effect.name, replace(calibration, model=model, parameters=values)
-        first = last

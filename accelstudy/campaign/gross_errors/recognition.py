@@ -223,7 +223,7 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     doubts = check_size(where, campaign.forces, campaign.gravity, campaign.unit, conversion)
     if campaign.angles is None:
         return doubts
-    for error in _mendings(campaign, True, angle_unit):
+    for error in _everywhere(campaign, True, angle_unit):
         if error.name == "unit_error":
             raise InputError(f"{where}: {error.reason}, not in {angle_unit}")
         if error.matrix is not None and np.array_equal(error.matrix, -np.eye(3)):
@@ -261,23 +261,32 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognised | None:
     return Recognised(errors) if errors else None
 
 
-def _mendings(campaign: Campaign, attitude: bool, angle_unit: str = "gon") -> Iterator[Mending]:
+def _mendings(campaign: Campaign, attitude: bool) -> Iterator[Mending]:
     """Undo gross errors one after the other, first those that all positions have."""
-    everywhere = axes, partial(units, angle_unit=angle_unit)
-    # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
-    for of_attitude in sorted({False, attitude}):
-        campaign = yield from _undo(RealSensor(campaign, of_attitude), *everywhere)
+    sensor = yield from _everywhere(campaign, attitude)
     # A sensor that is mounted askew is no reason to reorder its positions.
-    mounted = RealSensor(campaign, attitude).is_askew
+    sensor = sensor.free if sensor.is_askew else sensor
     # A row that was not exchanged may still be wrong by itself.
     for alone in (rows, outliers):
-        campaign = yield from _undo(RealSensor(campaign, attitude, mounted), alone)
+        sensor = yield from _undo(sensor, alone)
+
+
+def _everywhere(
+    campaign: Campaign, attitude: bool, angle_unit: str = "gon"
+) -> Generator[Mending, None, RealSensor]:
+    """Undo a wrong unit and wrong axes, which all positions have; return the sensor after it."""
+    hypotheses = axes, partial(units, angle_unit=angle_unit)
+    # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
+    sensor = yield from _undo(RealSensor(campaign, False), *hypotheses)
+    if attitude:
+        sensor = yield from _undo(replace(sensor, attitude=True), *hypotheses)
+    return sensor
 
 
 def _undo(
     sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Mending]]
-) -> Generator[Mending, None, Campaign]:
-    """Yield what helps most first, until nothing helps clearly; return the mended campaign."""
+) -> Generator[Mending, None, RealSensor]:
+    """Yield what helps most first, until nothing helps clearly; return the sensor after it."""
     for _ in range(MAX_ERRORS):
         helps = [
             (mending, after)
@@ -289,7 +298,7 @@ def _undo(
         least = min(after.misfit for _, after in helps)
         best, sensor = next(one for one in helps if one[1].misfit <= AS_GOOD * least)
         yield best
-    return sensor.campaign
+    return sensor
 
 
 def _is_clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
@@ -467,7 +476,7 @@ class RealSensor:
 
     @property
     def gravity(self) -> float:
-        """m/s²."""
+        """Gravity of the campaign, m/s²."""
         return self.campaign.gravity
 
     @cached_property
@@ -491,7 +500,7 @@ class RealSensor:
 
     @cached_property
     def _fitted(self) -> Array:
-        """What of the lack a sensor explains, as large as that."""
+        """Part of that lack, of the same shape, that the fitted sensor explains."""
         return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
 
     @cached_property
