@@ -114,7 +114,7 @@ class Mixture:
                 nodes, weights = _nodes(len(names))
                 place = names.index(name)
                 others = tuple(axis for axis in range(len(names)) if axis != place)
-                mass = self._of_shares(names).sum(axis=others)
+                mass = self._of_shares(names, self._judging(names)).sum(axis=others)
                 log = np.log(np.maximum(mass / weights, 1e-300))
                 fine = np.exp(np.interp(grid, nodes[:-1], log[:-1]))
                 density += p * mass[:-1].sum() * fine / fine.sum()
@@ -139,8 +139,9 @@ class Mixture:
 
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the model of the lot lacks some effects."""
-        weights, each = np.ravel(self._of_shares(names)), []
-        for logs in self._contributions(names, self._judging(names)):
+        odds_of = self._judging(names)
+        weights, each = np.ravel(self._of_shares(names, odds_of)), []
+        for logs in self._contributions(names, odds_of):
             shares = np.exp(logs - np.logaddexp.reduce(logs))
             each.append(shares.reshape(*logs.shape[:2], -1) @ weights)
         *parts, odd = np.concatenate(each, axis=1)
@@ -225,9 +226,9 @@ class Mixture:
             return self.typical[names].odds.__getitem__
         return self._of_own_sizes
 
-    def _of_shares(self, names: Names) -> Array:
+    def _of_shares(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
         """Posterior probabilities of the nodes of each share, (nodes ...)."""
-        return np.asarray(special.softmax(self._log_likelihood(names, self._judging(names))))
+        return np.asarray(special.softmax(self._log_likelihood(names, odds_of)))
 
 
 def _with(names: Names, name: str) -> Names:

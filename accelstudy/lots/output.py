@@ -164,7 +164,7 @@ class Lot(Result):
 
     @property
     def usual(self) -> dict[int, CampaignFit]:
-        """Those of the sensors that are not odd."""
+        """Calibrations of the sensors that are not odd, by their numbers."""
         return {i: self.fitted[i] for i in self.diagnosis.usual if i in self.fitted}
 
     @property
@@ -177,19 +177,18 @@ class Lot(Result):
     def parameters(self) -> dict[str, TypeParameter]:
         """Parameters of the model of the type; of an effect, over the sensors that have it."""
         diagnosis, n = self.diagnosis, len(self.fits)
-        values, sigmas = np.full((2, n, diagnosis.model.n_parameters), np.nan)
+        model, each = diagnosis.model, diagnosis.each
+        values, sigmas = np.full((2, n, model.n_parameters), np.nan)
         for i, fit in self.fitted.items():
             values[i], sigmas[i] = fit.parameters, np.sqrt(self._variances(i, fit))
-        usual, has = np.isin(np.arange(n), diagnosis.usual), dict[str, NDArray[np.bool_]]()
+        usual = np.isin(np.arange(n), diagnosis.usual)
+        has = dict.fromkeys(model.parameter_names, np.ones(n, dtype=bool))
         for found in diagnosis.effects:
-            having = np.array([found.names[0] in one.names for one in diagnosis.each])
+            having = np.array([found.names[0] in one.names for one in each])
             has |= dict.fromkeys(_parameters_of(found.spec), having)
         return {
-            p.name: TypeParameter(
-                *(p.name, p.unit, values[:, j], sigmas[:, j], usual),
-                has.get(p.name, np.ones(n, dtype=bool)),
-            )
-            for j, p in enumerate(diagnosis.model.parameters)
+            p.name: TypeParameter(p.name, p.unit, values[:, j], sigmas[:, j], usual, has[p.name])
+            for j, p in enumerate(model.parameters)
         }
 
     def _sizes(self, found: LotEffect) -> list[TypeParameter]:

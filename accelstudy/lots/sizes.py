@@ -74,7 +74,7 @@ class Equations(NamedTuple):
 
     @classmethod
     def of(cls, frame: Frame, columns: Array) -> Equations:
-        """Of derivatives (m, s, k), whitened, before the model is estimated."""
+        """Equations of derivatives (m, s, k), whitened, before the model is estimated."""
         residuals = frame.residuals
         d = residuals.project(columns.reshape(len(columns), -1)).reshape(columns.shape)
         return cls(
@@ -85,7 +85,7 @@ class Equations(NamedTuple):
 
     @classmethod
     def pooled(cls, each: Iterable[Equations]) -> Equations:
-        """Those of all campaigns as one."""
+        """Equations of all campaigns as one."""
         normal, right, squares = (np.sum(parts, axis=0) for parts in zip(*each, strict=True))
         return cls(normal, right, squares)
 
@@ -119,7 +119,7 @@ class ShapeEquations(NamedTuple):
 
     @classmethod
     def of(cls, frame: Frame, effects: Sequence[Effect], variance: float) -> ShapeEquations:
-        """Of shapes of an effect, by a campaign whose residuals have a variance of unit weight."""
+        """Equations of shapes of an effect, by a campaign with this variance of unit weight."""
         columns = frame.residuals.whitened(frame.signatures(effects))
         each = Equations.of(frame, columns.reshape(len(columns), len(effects), -1))
         return cls(
@@ -129,7 +129,7 @@ class ShapeEquations(NamedTuple):
         )
 
     def nearest(self, settings: Array) -> Equations | None:
-        """Return those of the shape with these settings, or nearly so."""
+        """Return the equations of the shape with these settings, or nearly so."""
         best = 0
         if settings.size:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -335,7 +335,7 @@ class TypeSizes:
 
     @cached_property
     def sets(self) -> dict[Names, TypicalSet]:
-        """Those of the sets of effects that show: odds of each sensor, with sizes of the type."""
+        """Sets of effects that show: odds of each sensor, with sizes of the type."""
         return {
             names: self._of_set(names)
             for names, shapes in self.shapes.items()

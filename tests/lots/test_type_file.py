@@ -49,7 +49,7 @@ def type_of(sensors, folder):
     fits = [fitted(one) for one in sensors]
     named = [SimpleNamespace(campaign=one.name) for one in sensors]
     lot = SimpleNamespace(
-        usual=range(len(sensors)), sensors=named, effects=(), model=MODEL,
+        usual=range(len(sensors)), sensors=named, each=(), effects=(), model=MODEL,
         noises=[SensorNoise(0.002, 200.0)] * len(sensors),
     )  # fmt: skip
     assert write_type(Lot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
