@@ -121,7 +121,7 @@ def _share(prior: Array, criterion: Criterion, flat: Array, shares: Array, n: in
 def _lowest(
     task: Task, gradient: Array, space: Space, constraints: Constraints, points: Array
 ) -> tuple[Array, float]:
-    """Attitudes near some with the smallest derivatives, also between a grid; and the smallest."""
+    """Attitudes near given ones where derivatives are smallest, and the smallest derivative."""
 
     def slopes(directions: Array) -> Array:
         return np.einsum("kuw,uw->k", task.informations(directions), gradient)

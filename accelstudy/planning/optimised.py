@@ -126,7 +126,7 @@ class Kind:
         return self.best(high)
 
     def _share(self, n: int) -> float:
-        """Accuracy of the best n positions over the target, as finely as it decides what is next.
+        """Accuracy of the best n positions over the target, as fine as the next step needs it.
 
         That is whether they reach it, and whether one position less is worth a try.
         """
@@ -190,5 +190,5 @@ def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | N
         if least <= found[0].seconds:
             no_longer = replace(question, most_seconds=found[0].seconds)  # else it costs more
             fewest = replace(kind, question=no_longer).fewest(USUAL_SHARE * n)
-            found = by_time([*found, *([fewest] if fewest else [])])
+            found = by_time(filter(None, [*found, fewest]))
     return found[0] if found else None

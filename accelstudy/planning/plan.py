@@ -151,7 +151,7 @@ class Plan(Result):
         provenance = {"config_hash": None, "seed": self.answer.seed}
         write_table(folder / "plan.parquet", self.compared, provenance)
         head = STUDY_HEAD.format(command=study_again(place / "study.yaml"))
-        study = {**as_a_key(), **self.answer.study, "study": "plan"}
+        study = {**as_a_key(), **self.answer.study}
         content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
         (folder / "study.yaml").write_text(head + content, encoding="utf-8")
         (folder / "plan.md").write_text(self._page(), encoding="utf-8")

@@ -19,7 +19,7 @@ from accelstudy.planning.candidates import (
     names_of,
     tilt_of,
 )
-from accelstudy.planning.question import Question
+from accelstudy.planning.question import NONLINEAR, Question
 
 PLAIN = {
     "nonorthogonality": "angles between the axes",
@@ -106,7 +106,7 @@ def limits(question: Question, candidate: Candidate) -> str:
 def spoilers(question: Question, candidate: Candidate) -> list[Spoiler]:
     """Sizes at which effects that are not in the model would by themselves use up the target."""
     inside = names_of(candidate.model)
-    effects = [e for e in ("quadratic_scale", "cubic_scale") if e not in inside]
+    effects = [e for e in NONLINEAR if e not in inside]
     if candidate.equipment.name == "robot":
         # Without a robot the mounting of the sensor neither shows nor does harm.
         effects += [] if "cross_axis_misalignment" in inside else ["mounting_rotation"]

@@ -63,7 +63,7 @@ class Simulated:
         return float(self._bound(BOTH, probability).value)
 
     def uncertainty(self, confidence: float | None) -> float:
-        """Standard error of `accuracy`, rad, by the number of calibrations."""
+        """Standard error of `Question.accuracy`, rad, by the number of calibrations."""
         if confidence is None:
             return float(self.error[self.rms.argmax()])
         return float(self._bound(BOTH, confidence).error)

@@ -258,7 +258,7 @@ def _undetermined(
 
 
 def _vague(model: SensorModel, information: Information, ratio: float = 1.0) -> tuple[str, ...]:
-    """Parameters whose sigma is a larger part of their size in a cheap sensor."""
+    """Parameters whose sigma is more than `ratio` of their size in a cheap sensor."""
     sigma = np.sqrt(np.diag(information.covariance))[: model.n_parameters]
     large = sigma > ratio * typical_sizes(model, model.n_parameters)
     return tuple(np.array(model.parameter_names)[large].tolist())

@@ -100,7 +100,7 @@ class Knowledge:
 
     @property
     def determined(self) -> bool:
-        """Whether all parameters are."""
+        """Whether all parameters are determined."""
         return not np.isnan(self.omega)
 
 

@@ -56,7 +56,7 @@ def effects(part):
 
 
 def each(kind):
-    """All of a kind, one after the other."""
+    """All things of a kind, one after the other."""
     get, names, facts = KINDS[kind]
     return page(*(_entry(thing, facts(thing)) for thing in map(get, names())))
 

@@ -1,4 +1,4 @@
-"""Tables of what is no schema: the columns of a campaign, and the rules of a diagnosis."""
+"""Tables of what no schema describes: columns of a campaign, rules of a diagnosis."""
 
 import griffe
 from markdown_text import code, plain, table

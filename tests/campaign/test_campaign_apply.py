@@ -58,10 +58,8 @@ def calibrated_in(table):
 
 
 def test_the_file_gives_back_the_fit(tmp_path):
-    fit, path = (
-        fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY),
-        tmp_path / "calibration.json",
-    )
+    fit = fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY)
+    path = tmp_path / "calibration.json"
     path.write_text(json.dumps(calibration_document(fit), allow_nan=False), encoding="utf-8")
     read = read_calibration(path)
     np.testing.assert_array_equal(read.parameters, fit.parameters)

@@ -42,8 +42,9 @@ def table_text(table):
 
     Of what comes from differences three digits are the same on all processors.
     """
-    for name in table.columns[table.columns.str.contains(OF_DIFFERENCES)]:
-        table = table.assign(**{name: [float(f"{value:.3g}") for value in table[name]]})
+    rough = table.columns[table.columns.str.contains(OF_DIFFERENCES)]
+    rounded = {name: [float(f"{value:.3g}") for value in table[name]] for name in rough}
+    table = table.assign(**rounded)
     lines = [f"{len(table)} rows"]
     for name, column in table.items():
         numbers = pd.to_numeric(column, errors="coerce").astype(float)

@@ -23,11 +23,6 @@ from accelstudy.simulation.sessions import Noise
 NINE = get_model("bias-scale-nonorthogonality")
 
 
-def rows_of(approach, scheme):
-    directions = get_scheme(scheme).directions
-    return position_rows(NINE, get_approach(approach), Noise(), directions)
-
-
 # --- the choice of a position --------------------------------------------------------------------
 
 
@@ -59,7 +54,7 @@ def known(rows, determined):
 
 def test_of_positions_that_are_as_good_the_first_is_chosen():
     """A position and its opposite tell of roll and pitch alike, but for the last attitude."""
-    measured = rows_of("gravity", "mclaren-24").reshape(-1, 9)
+    measured = chooser("gravity", "mclaren-24").rows.reshape(-1, 9)
     directions = np.repeat(get_scheme("faces-edges-corners-26").directions[[7, 20]], 2, axis=0)
     of_four = chooser("gravity", "", directions)
     rms = np.full(2, 20 * MGON)

@@ -78,7 +78,7 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables):
     """Function that gives the evidence where the study, its tables or `by_scheme` are others."""
-    estimates_of = dict([*tables["estimates"].groupby("cell", observed=True)]).__getitem__
+    estimates_of = tables["estimates"].groupby("cell", observed=True).get_group
     usual = Evidence(make_study(**KEYS), tables, estimates_of)
 
     def of(by_scheme=usual.by_scheme, noise=(), **changed):

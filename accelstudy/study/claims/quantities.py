@@ -287,7 +287,7 @@ def correlations(
     second: str = "",
     but_of: str = "",
 ) -> Array:
-    """Mean |correlation|, from the adjustment, of each pair of parameters that begin so.
+    """Mean |correlation|, from the adjustment, of pairs that begin with `first` and `second`.
 
     Without pairs of which both begin with `but_of`, if it is given.
     """
