@@ -126,7 +126,8 @@ class KernelFunction:
     @property
     def work(self) -> int:
         """Vectors of `work` per position."""
-        return 2 * self.o + len(self.latent) + self.c * (self.u + 1 + self.o)
+        latent = 0 if self.equations.knows_force else 3  # `latent` itself would load SymPy
+        return 2 * self.o + latent + self.c * (self.u + 1 + self.o)
 
 
 Rows: TypeAlias = list[list[Term]]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from accelstudy.leveling.error import TiltError
 
@@ -88,7 +88,7 @@ class Tilt:
     def quantile(self, probability: float) -> Array:
         """Error of each angle by itself that this share of the calibrations stays below, (2,)."""
         factor, freedom = self._chi_squared
-        return np.sqrt(factor * special.chdtri(freedom, 1 - probability))
+        return np.sqrt(factor * scipy.special.chdtri(freedom, 1 - probability))
 
     def of_both(self, probability: float) -> float:
         """Error that roll and pitch both stay below in this share of the calibrations, rad.
@@ -99,7 +99,7 @@ class Tilt:
         factor, freedom = self._chi_squared
         ends = [self.quantile(p).max() for p in (probability, (1 + probability) / 2)]
         squares = np.linspace(ends[0] ** 2, ends[1] ** 2, STEPS_OF_BOTH)[:, None]
-        both = special.chdtr(freedom, squares / factor).prod(axis=1)
+        both = scipy.special.chdtr(freedom, squares / factor).prod(axis=1)
         return float(np.sqrt(np.interp(probability, both, squares[:, 0])))
 
 
@@ -142,24 +142,24 @@ class TiltDistribution:
 
     def quantile(self, probabilities: ArrayLike) -> Array:
         """Quantiles of roll, of pitch and of the larger, (3, k), rad."""
-        wanted = special.ndtri(np.asarray(probabilities, dtype=float))
-        start = np.log(self.approximate_quantile(special.ndtr(wanted)))
+        wanted = scipy.special.ndtri(np.asarray(probabilities, dtype=float))
+        start = np.log(self.approximate_quantile(scipy.special.ndtr(wanted)))
         if not self._central:
             return np.exp(_solved(self._scores_with_offset, start, wanted)[0])
 
         def scores(angle: int) -> Callable[[Array], Array]:
-            return lambda at: np.asarray(special.ndtri(self._exact(angle, np.exp(at))))
+            return lambda at: np.asarray(scipy.special.ndtri(self._exact(angle, np.exp(at))))
 
         each = [_solved(scores(a), start[a], wanted)[0] for a in (0, 1)]
         largest = np.sqrt(np.sort(self._along[2].max(axis=0)))
 
         def uncorrected(at: Array) -> Array:
             shares = [self._length(bound / largest).mean() for bound in np.exp(at)]
-            return np.asarray(special.ndtri(shares))
+            return np.asarray(scipy.special.ndtri(shares))
 
         both, slope = _solved(uncorrected, np.maximum(*each), wanted)
         for _ in range(2):
-            exact = special.ndtri(self._share_of_both(np.exp(both)))
+            exact = scipy.special.ndtri(self._share_of_both(np.exp(both)))
             step = np.where(np.isfinite(slope) & np.isfinite(exact), (wanted - exact) / slope, 0.0)
             both = both + step
         return np.exp([*each, both])
@@ -175,7 +175,7 @@ class TiltDistribution:
         """Quantiles as of `quantile`, of the scaled χ²; for the larger, the larger quantile."""
         factor, freedom = (each[:, None] for each in self.chi_squared)
         beyond = 1 - np.asarray(probabilities, dtype=float)
-        each = np.sqrt(special.chdtri(freedom, beyond) * factor)
+        each = np.sqrt(scipy.special.chdtri(freedom, beyond) * factor)
         return np.vstack([each, each.max(axis=0)])
 
     def _scores_with_offset(self, at: Array) -> Array:
@@ -183,7 +183,7 @@ class TiltDistribution:
         roll, pitch, (near, far) = (self._ends(bounds) for bounds in np.exp(at))
         ends = np.stack([roll[:, 0], pitch[:, 1], [near.max(axis=0), far.min(axis=0)]], axis=1)
         below = self._length(ends[1]) - (self._length(ends[0]) if ends[0].any() else 0.0)
-        return np.asarray(special.ndtri(np.maximum(below, 0.0).mean(axis=2)))
+        return np.asarray(scipy.special.ndtri(np.maximum(below, 0.0).mean(axis=2)))
 
     def _share_of_both(self, bounds: Array) -> Array:
         """Share of the larger error that is below bounds (k,), without offset."""
@@ -298,7 +298,7 @@ def _directions(u: int) -> Array:
     for _ in range(60):
         phi = (1 + phi) ** (1 / (u + 1))
     points = (0.5 + np.outer(np.arange(1, DIRECTIONS + 1), phi ** -np.arange(1.0, u + 1))) % 1
-    normal = special.ndtri(points)
+    normal = scipy.special.ndtri(points)
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
@@ -306,7 +306,7 @@ def _directions(u: int) -> Array:
 def _lengths(u: int) -> Callable[[Array], Array]:
     """The share of standard normals in u dimensions whose length is below given ones."""
     length, step = np.linspace(0.0, np.sqrt(u) + 9.0, LENGTHS, retstep=True)
-    below = special.gammainc(u / 2, length**2 / 2)
+    below = scipy.special.gammainc(u / 2, length**2 / 2)
     slope = np.append(np.diff(below), 0.0)
 
     def share(at: Array) -> Array:

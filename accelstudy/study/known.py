@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from accelstudy.adjustment.linear_theory import LinearTheory
 from accelstudy.leveling.distribution import TiltDistribution
@@ -54,8 +54,8 @@ class KnownValues:
             return np.full(len(self.theory.sigma), np.nan)
         # The mean of σ̂0, which is the root of a (noncentral) χ² over its degrees of freedom.
         r, offset = self.theory.redundancy, self.theory.misfit
-        ratio = np.exp(special.gammaln((r + 1) / 2) - special.gammaln(r / 2))
-        root = np.sqrt(2 / r) * ratio * special.hyp1f1(-0.5, r / 2, -offset / 2)
+        ratio = np.exp(scipy.special.gammaln((r + 1) / 2) - scipy.special.gammaln(r / 2))
+        root = np.sqrt(2 / r) * ratio * scipy.special.hyp1f1(-0.5, r / 2, -offset / 2)
         return np.asarray(root * self.theory.sigma)
 
     @cached_property
@@ -88,8 +88,8 @@ class KnownValues:
         """Quantiles (m, k) of each quantity of a study, and their relative errors."""
         r, factor = self.theory.redundancy, np.full(len(levels), np.nan)
         if self._determines_factor:
-            factor = np.sqrt(special.chndtrix(levels, r, self.theory.misfit) / r)
-        error = self.bias[:, None] + self.sd[:, None] * special.ndtri(levels)
+            factor = np.sqrt(scipy.special.chndtrix(levels, r, self.theory.misfit) / r)
+        error = self.bias[:, None] + self.sd[:, None] * scipy.special.ndtri(levels)
         return {
             "error": (error, np.zeros_like(error)),
             "sd_posteriori": (np.outer(self.theory.sigma, factor), np.zeros_like(error)),
@@ -103,7 +103,7 @@ class KnownValues:
             return np.full(len(levels), np.nan)
         sigma, other_sigma = (e.theory.sigma[e.cell.columns_of(effect)].mean() for e in pair)
         freedom = self.theory.redundancy, other.theory.redundancy
-        return np.asarray(sigma / other_sigma * np.sqrt(special.fdtri(*freedom, levels)))
+        return np.asarray(sigma / other_sigma * np.sqrt(scipy.special.fdtri(*freedom, levels)))
 
     @property
     def _determines_factor(self) -> bool:

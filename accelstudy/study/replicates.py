@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -116,17 +117,18 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     """Rows of `ESTIMATES` of a cell."""
     simulated, linear = replicates
     count, u = simulated.estimates.shape
-    parameter = np.tile(np.arange(u), count)
 
-    def coded(codes: Any, names: Any) -> pa.DictionaryArray:
-        return pa.array([*names]).dictionary_encode().take(pa.array(codes, pa.int32()))
+    def coded(names: Collection[str]) -> pa.DictionaryArray:
+        different = [*dict.fromkeys(names)]
+        codes = np.array([different.index(name) for name in names], np.int32)
+        return pa.DictionaryArray.from_arrays(np.resize(codes, count * u), different)
 
     columns = {
-        "cell": coded(np.zeros(count * u), [cell.name]),
+        "cell": coded([cell.name]),
         "replicate": np.repeat(np.arange(count), u),
-        "parameter": coded(parameter, cell.parameter_units),
-        "unit": coded(parameter, cell.parameter_units.values()),
-        "truth": cell.true_values[parameter],
+        "parameter": coded(cell.parameter_units.keys()),
+        "unit": coded(cell.parameter_units.values()),
+        "truth": np.tile(cell.true_values, count),
         "estimate": simulated.estimates.ravel(),
         "linear_estimate": linear.estimates.ravel(),
         "sigma_priori": simulated.sigma_priori.ravel(),

@@ -8,7 +8,7 @@ from quality_helpers import GRAVITY, NINE, ROBOT
 from study_helpers import grid, make_cells, simulated
 
 from accelstudy import adjustment
-from accelstudy.adjustment.calibration import Block
+from accelstudy.adjustment.calibration import Block, CalibrationProblem
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions, effect_names
@@ -176,6 +176,14 @@ def test_what_is_compiled_is_kept_whole_or_not_at_all(tmp_path, monkeypatch):
     closed.write_text("no folder", encoding="utf-8")
     before = len(made)
     assert doubled(closed) == before + 1
+
+
+def test_code_that_is_kept_needs_no_symbols():
+    problem = CalibrationProblem.of(NINE, GRAVITY, drawn(NINE, Noise(), 5, 1))
+    for _ in range(2):
+        kernel = calibrate.Kernel(problem.conditions.equations)
+        assert kernel.calibrate(problem).converged.all()
+    assert "latent" not in vars(kernel.function)
 
 
 @pytest.mark.parametrize("approach", ["gravity", "robot"])
