@@ -62,14 +62,11 @@ def test_york_line_is_the_published_one():
 
 @pytest.mark.parametrize("initial", [(5.0, -0.5), (0.0, 0.0), (10.0, -3.0)])
 def test_the_default_stops_at_a_millionth_of_sigma_from_any_start(initial):
+    """Residuals fulfil the conditions and have the Ω that is said."""
     result = york(initial=initial)
     assert np.abs((result.parameters[0] - YORK) / result.sigma_priori[0]).max() < 1e-6
-
-
-def test_adjusted_observations_fulfil_the_conditions():
-    result = york()
-    adjusted = PEARSON + result.residuals
-    assert np.abs(LINE.psi(result.parameters, adjusted)).max() < 1e-9
+    assert np.abs(LINE.psi(result.parameters, PEARSON + result.residuals)).max() < 1e-9
+    assert result.omega[0] == pytest.approx(np.sum(YORK_WEIGHTS * result.residuals[0] ** 2))
 
 
 def test_residuals_converge_even_where_the_parameters_are_found_at_once():
@@ -81,11 +78,6 @@ def test_residuals_converge_even_where_the_parameters_are_found_at_once():
     result = adjust(circle, l, np.ones((1, 3)), [0.0])
     np.testing.assert_allclose(l + result.residuals, [[[5.0, 0.6, 0.8]]], rtol=1e-9)
     assert result.omega[0] == pytest.approx(4**2, rel=1e-9)
-
-
-def test_omega_is_that_of_the_residuals():
-    result = york()
-    assert result.omega[0] == pytest.approx(np.sum(YORK_WEIGHTS * result.residuals[0] ** 2))
 
 
 # --- cofactor matrices and dense blocks ----------------------------------------------------------

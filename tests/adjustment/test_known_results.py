@@ -9,12 +9,12 @@ import json
 import math
 import re
 from functools import cache
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call
+from calling import succeed
 from places import DATA, needs_data
 from scipy.stats import f as f_distribution
 
@@ -46,36 +46,6 @@ IMPORTS = {
 }  # fmt: skip
 
 
-class Outcome(NamedTuple):
-    """What both commands said, and the content of calibration.json."""
-
-    imported: str
-    calibrated: str
-    content: dict
-
-    @property
-    def verdict(self):
-        return self.content["quality"]["verdict"]
-
-    @property
-    def test(self):
-        return self.content["quality"]["global_test"]
-
-    @property
-    def rms(self):
-        return self.content["rms_norm_residual_mps2"]
-
-    @property
-    def sigma0(self):
-        """Sigma of a position a posteriori, m/s²."""
-        return self.content["sigma_position_posteriori_mps2"]
-
-    def affine(self, gauge):
-        """K in a gauge, and the bias in m/s²."""
-        affine = self.content["affine"]
-        return np.array(affine["gauges"][gauge]), np.array(affine["bias_mps2"])
-
-
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     """What the import said, and the folder that it wrote; each log is imported once."""
@@ -85,27 +55,38 @@ def campaign(tmp_path_factory):
     def imported(name):
         file, *options = IMPORTS[name]
         out = folder / name
-        result = call("import", DATA / file, "--out", out, "--no-figure", *options)
-        assert result.exit_code == 0, result.output
-        return result.output, out
+        return succeed("import", DATA / file, "--out", out, "--no-figure", *options).output, out
 
     return imported
 
 
+def calibrated(folder, out, model):
+    """The content of calibration.json."""
+    succeed("calibrate", folder, "--model", model, "--out", out)
+    return json.loads((out / "calibration.json").read_text(encoding="utf-8"))
+
+
 @pytest.fixture(scope="module")
 def known(campaign):
-    """Import and calibrate, each once for a log and a model."""
+    """Import and calibrate, each once for a log and a model; what is looked at most has a name."""
 
     @cache
-    def calibrated(name, model=NINE):
+    def outcome(name, model=NINE):
         said, folder = campaign(name)
-        out = folder.with_name(f"{name}, {model}")
-        result = call("calibrate", folder, "--model", model, "--out", out)
-        assert result.exit_code == 0, result.output
-        content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
-        return Outcome(said, result.output, content)
+        content = calibrated(folder, folder.with_name(f"{name}, {model}"), model)
+        return SimpleNamespace(
+            imported=said, content=content, test=content["quality"]["global_test"],
+            verdict=content["quality"]["verdict"], rms=content["rms_norm_residual_mps2"],
+            sigma0=content["sigma_position_posteriori_mps2"],
+        )  # fmt: skip
 
-    return calibrated
+    return outcome
+
+
+def affine(outcome, gauge):
+    """K in a gauge, and the bias in m/s²."""
+    found = outcome.content["affine"]
+    return np.array(found["gauges"][gauge]), np.array(found["bias_mps2"])
 
 
 def no_effect_is_missing(campaign, name, least):
@@ -150,7 +131,7 @@ def test_xsens_residuals(known):
 
 def test_xsens_parameters_are_those_of_imu_tk(known):
     """Within the spread over the detector's threshold: 0.03 counts per m/s² and 0.0005 rad."""
-    k, bias = known("xsens").affine("upper")
+    k, bias = affine(known("xsens"), "upper")
     inverse_scale = 1 / (np.diag(k) * SCALE)
     np.testing.assert_allclose(inverse_scale, [414.4143, 412.0467, 414.6139], rtol=0, atol=0.03)
     # Of the offsets no spread is given; 0.1 counts are 0.24 mm/s², a third of their sigma.
@@ -190,7 +171,7 @@ def test_mpu9150_lacks_nothing(campaign, known, i):
 def test_mpu9150_agrees_with_its_authors(known, i):
     """Within 0.027 % in scale, 0.018° and 1.8 mm/s², and the rounding of their numbers."""
     scale, angles, offset = AUTHORS[i]
-    k, bias = known(f"mpu9150 {i}").affine("upper")
+    k, bias = affine(known(f"mpu9150 {i}"), "upper")
     m = np.linalg.inv(k)
     np.testing.assert_allclose(100 * (np.diag(m) - 1), scale, rtol=0, atol=0.027 + 0.0005)
     found = np.degrees([m[1, 2], m[0, 1], m[0, 2]])
@@ -221,7 +202,7 @@ def test_ctu_residuals(campaign, known, n, rms, sigma0):
 
 def test_ctu_parameters(known):
     """Lower-triangular T S (f − b); the weights move them by 0.03 sigma at most."""
-    k, bias = known("ctu 24").affine("lower")
+    k, bias = affine(known("ctu 24"), "lower")
     scale = np.diag(k)
     t = k / scale
     np.testing.assert_allclose(
@@ -243,12 +224,10 @@ def six_positions(tmp_path_factory):
     notes = json.loads((DATA / "ferraris/example_ferraris_session_list.json").read_text())
     sections = [s for name, s in notes.items() if not name.endswith("rot")]
     forces = session[["acc_x", "acc_y", "acc_z"]]
-    means = pd.DataFrame([forces[s["start"] : s["end"]].mean() for s in sections])
-    means.to_csv(folder / "means.csv", index=False)
-    imported = call(
-        *("import", folder / "means.csv", "--means", "--gravity", 9.81, "--out", folder / "six")
-    )
-    assert imported.exit_code == 0, imported.output
+    means = folder / "means.csv"
+    held = [forces[s["start"] : s["end"]].mean() for s in sections]
+    pd.DataFrame(held).to_csv(means, index=False)
+    succeed("import", means, "--means", "--gravity", 9.81, "--out", folder / "six")
     return folder / "six"
 
 
@@ -257,10 +236,8 @@ def test_ferraris_determines_six_parameters(six_positions, tmp_path):
 
     Exactly so if the sensor stood upright; at an angle of ε they differ by g ε²/2.
     """
-    result = call("calibrate", six_positions, "--model", "bias-scale", "--out", tmp_path)
-    assert result.exit_code == 0, result.output
-    assert "no redundancy" in result.output
-    content = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
+    content = calibrated(six_positions, tmp_path, "bias-scale")
+    assert "no redundancy" in content["quality"]["verdict"]
     found = {entry["name"]: entry["value"] for entry in content["parameters"]}
     means = pd.read_csv(six_positions / "positions.csv")[["fx", "fy", "fz"]].to_numpy()
     half = 9.81 * math.radians(5) ** 2 / 2

@@ -45,10 +45,6 @@ def design(scheme, model=NINE, approach=GRAVITY, **more):
     return estimability(scheme, model, approach, **more)
 
 
-def aligned(directions):
-    return Scheme("aligned", "aligned", directions, "generated", "test")
-
-
 # --- ranks and reasons ---------------------------------------------------------------------------
 
 
@@ -108,25 +104,19 @@ ALIGNED = {
 }
 
 
+GENERIC = {"24 McLaren", "24 truncated octahedron", "20 faces of the icosahedron"}
+"""Of which a generic rotation makes cubic terms estimable."""
+
+
 @pytest.mark.parametrize("name", ALIGNED)
 def test_gravity_does_not_see_cubic_terms_in_aligned_orbits(name):
     """One orbit of the cube's rotations: Σ f⁴ over the axes is a multiple of Σ f²."""
-    found = design(aligned(ALIGNED[name]), CUBIC)
+    scheme = Scheme("aligned", "aligned", ALIGNED[name], "generated", "test")
+    found = design(scheme, CUBIC)
     assert {"s_x", "s_y", "s_z", "k3_x", "k3_y", "k3_z"} <= set(found.not_estimable)
     assert "these positions" in found.reason
-
-
-@pytest.mark.parametrize(
-    "name", ["24 McLaren", "24 truncated octahedron", "20 faces of the icosahedron"]
-)
-def test_a_generic_rotation_makes_cubic_terms_estimable(name):
-    turned = aligned(ALIGNED[name]).rotated(np.radians([15, 25, 35]))
-    assert design(turned, CUBIC).estimable
-    of_scheme = design("mclaren-24", CUBIC)
-    assert of_scheme.condition == pytest.approx(16, abs=0.5)
-    assert np.degrees(get_scheme("mclaren-24").pole_distance) == pytest.approx(
-        13.8, abs=0.05
-    )  # off the pole
+    if name in GENERIC:
+        assert design(scheme.rotated(np.radians([15, 25, 35])), CUBIC).estimable
 
 
 class _Quintic(Effect):
@@ -220,9 +210,3 @@ def test_table_of_schemes(scheme, m, correlation, gravity, robot):
         assert worst["nonorthogonality"] / MGON == pytest.approx(misalignment, abs=0.05)
         assert worst["scale"] * 1e6 == pytest.approx(scale, abs=0.5)
         assert worst["bias"] * 1e3 == pytest.approx(bias, abs=0.005)
-
-
-def test_sigma_scales_with_the_noise():
-    one = design("mclaren-24", approach=ROBOT).sigma
-    noise = Noise(sigma_force=0.004, sigma_angle=6.4 * MGON)
-    np.testing.assert_allclose(design("mclaren-24", approach=ROBOT, noise=noise).sigma, 2 * one)

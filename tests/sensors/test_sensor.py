@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
-from accelstudy.effects import Effect, HoldConditions, Parameter, get_effect, register
+from accelstudy.effects import Effect, HoldConditions, get_effect, register
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -164,17 +164,9 @@ def test_presets_name_models_and_schemes_that_exist():
 # --- the robot's reading -------------------------------------------------------------------------
 
 
-class _EncoderScale(Effect):
-    name = "encoder_scale_of_the_test"
-    parameters = (Parameter("k_roll", "1", "$k_1$"), Parameter("k_pitch", "1", "$k_2$"))
-
-    def reading(self, angles, p, hold, xp):
-        return tuple(k * a for k, a in zip(p, angles, strict=True))
-
-
 def test_reading_errors_are_functions_of_what_is_read():
     """r = a + k r, so r = a / (1 − k)."""
-    model = SensorModel("encoder", (_EncoderScale(),))
+    model = SensorModel.of("encoder", ["encoder_scale"])
     angles = np.array([[0.3, -0.2], [3.0, 1.5], [0.0, 0.0]])
     k = np.array([2e-3, -1e-3])
     expected = angles / (1 - k) - angles
