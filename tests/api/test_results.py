@@ -148,6 +148,9 @@ def test_a_function_and_its_command_write_the_same(results, verb, tmp_path):
         ways = (tmp_path / way / name for way in ("function", "command"))
         function, written = (json.loads(path.read_text()) for path in ways)
         assert function == written, name
+    for name in (name for name in names[0] if name.endswith(".parquet")):
+        tables = (pd.read_parquet(tmp_path / way / name) for way in ("function", "command"))
+        pd.testing.assert_frame_equal(*tables)
     other = tmp_path / "other"
     other.mkdir()
     (other / "report.html").write_text("mine")

@@ -1,12 +1,10 @@
 """The diagnosis: what is hidden is named, what is not there is not, and the gap shrinks."""
 
 import math
-from functools import partial
 
-import diagnosis_helpers
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROTATIONS
+from diagnosis_helpers import NINE, ROTATIONS, campaign
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
@@ -14,15 +12,11 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.diagnosis import prediction
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.pipeline import diagnose
+from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import compose
 from accelstudy.simulation.sessions import Noise, session
-
-campaign = partial(
-    diagnosis_helpers.campaign, temperature=(15.0, 40.0), vibration=(0.0, 1.0), n_samples=200
-)
-
 
 # --- statistics ----------------------------------------------------------------------------------
 
@@ -49,26 +43,44 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
 # --- hidden effects ------------------------------------------------------------------------------
 
 HIDDEN = {
-    "axis_nonperpendicularity": 3.0, "bias_jump(t=750)": 1.0, "mounting_rotation": 1.0,
-    "saturation(knee=8)": 0.1, "vibration_rectification": 60.0,
-}  # fmt: skip
-"""Of kinds that `test_where.py` has not; the golden set has all effects of the catalogue, pairs and
-triples of them, and each kind of noise and of gross errors."""
+    "thermal_bias: 0.002, -0.002, 0.001": ("temperature", "bias"),
+    "thermal_scale: 3e-4, -3e-4, 2e-4": ("temperature", "scale"),
+    "warm_up(tau=600): 0.05, -0.05, 0.05": ("time", "bias"),
+    "hysteresis: 0.03, -0.03, 0.03": ("previous", "bias"),
+    "cubic_scale: 0.01, -0.01, 0.01": ("force", "bias"),
+    "encoder_eccentricity: 1e-3, -9e-4, -9e-4, -9e-4": ("angle", "reading"),
+    "axis_nonperpendicularity: 6e-4": None,
+    "bias_jump(t=750): 0.05, -0.05, 0.05": ("time", "bias"),
+    "mounting_rotation: 2e-3, -2e-3, 2e-3": None,
+    "saturation(knee=8): 0.02, 0.02, 0.02": ("force", "bias"),
+    "vibration_rectification: 0.06, -0.06, 0.06": ("vibration", "bias"),
+}
+"""Effects, and of what they make which part of the reading a function, if they do; the golden set
+has all of the catalogue, pairs and triples of them, and each kind of noise and of gross errors."""
 
 
-@pytest.mark.parametrize("spec", HIDDEN)
-def test_a_large_hidden_effect_is_named_and_confirmed(spec):
-    measured, truth = campaign(11, effects=(spec,), size=HIDDEN[spec])
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_a_large_effect_is_named_confirmed_and_placed_where_its_formula_has_it(effect):
+    measured, truth = campaign(11, scheme="fibonacci-36", effects=(effect,))
     found = diagnose(measured, NINE)
     assert found.verdict == "named"
     (named,) = found.found
-    assert spec.split("(")[0] in named.equivalence_class
+    spec, place = effect.partition(":")[0], HIDDEN[effect]
+    assert spec.partition("(")[0] in named.equivalence_class
     assert found.gap.confirmed
     assert found.gap.after < 2 < found.gap.before
     if named.name == spec:  # estimates are only comparable in the same shape
         true = {p["name"]: p["value"] for p in truth["effects"][0]["parameters"]}
         for name, value, sigma, _ in named.parameters:
             assert abs(value - true[name]) < 5 * sigma
+    if place is not None:
+        assert (found.like[0].coordinate, found.like[0].target) == place
+        posteriors = [each.posterior for each in found.like]
+        assert posteriors[0] > 0.5
+        assert posteriors == sorted(posteriors, reverse=True)
+        assert sum(posteriors) == pytest.approx(1)
+        said = "As a smooth function, what is missing"
+        assert any(line.startswith(said) for line in verdict_lines(found))
 
 
 @pytest.mark.parametrize(("tau", "seed"), [(100, 0), (1200, 2)])

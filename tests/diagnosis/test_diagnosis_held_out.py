@@ -1,7 +1,5 @@
 """Held-out positions: what they need to confirm a name, given that a name was given."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, some_holds
@@ -139,10 +137,3 @@ def test_an_imitator_leaves_nothing_of_what_it_imitates():
             )
             could |= {name for rest in left if np.linalg.norm(rest, 2) <= np.sqrt(1 - 0.9995**2)}
     assert set(frame_of.imitators(one)) == could == {"cross_coupling"}
-
-
-def test_a_part_that_can_show_no_pair_chooses_none():
-    """Positions that are too few for two effects at once would not have chosen these two."""
-    part = SimpleNamespace(sets=[])
-    finding = SimpleNamespace(chosen=("one", "other"), alternatives=(), place=None)
-    assert held_out._chosen_alike(part, finding) == (("one", "other"), True)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -15,7 +14,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import succeed
 from diagnosis_helpers import NINE, ROBOT, explanation, otherwise
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
@@ -332,22 +330,6 @@ def test_the_model_is_a_study(written, case):
     assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
 
 
-def test_same_seed_same_files(written, tmp_path):
-    """From the command, which says the verdict, and from the function."""
-    out = written("named").folder
-    first = Path(shutil.copytree(out, tmp_path / "first"))
-    with composed(*RENDERED["named"]):
-        # Its commands name the folder.
-        words = ("diagnose", out.parent / "named", "--out", out, "--replicates", 100, "--force")
-        assert HEADLINES["named"] in succeed(*words).output
-    for path in sorted(first.rglob("*.*")):
-        if path.suffix != ".parquet":
-            assert path.read_bytes() == (out / path.relative_to(first)).read_bytes(), path.name
-    for name in ("positions", "loop"):
-        tables = [pd.read_parquet(f / f"{name}.parquet") for f in (first, out)]
-        pd.testing.assert_frame_equal(*tables)
-
-
 def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
     loop = written("named").diagnosed.loop
     old, real, new = loop.document["cases"]
@@ -384,10 +366,19 @@ def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     assert page.count("<svg") == 1  # that of the residuals
 
 
-def test_nothing_to_compare_without_an_effect_or_a_tilt(written, named):
-    """A sensor that clips may have no tilt."""
+def test_nothing_is_compared_without_an_effect_a_tilt_or_a_variance(written, named, monkeypatch):
+    """A sensor that clips may have no tilt; variances that are nothing say nothing of the noise."""
     assert written("no_effect").diagnosed.loop is None
     assert close_loop(otherwise(named, leveling=None)) is None
+    sessions = pd.DataFrame(
+        [{"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
+         for s, c in CASES_OF_LOOP for i, value in enumerate((0.0, np.nan, np.inf, 1.2))],
+    ).assign(converged=True, tilt_error_rad=1e-3)  # fmt: skip
+    loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
+    assert loop.document["cases"][0]["sigma0_squared_central95"] == [1.2, 1.2]
+    nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
+    monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
+    assert close_loop(named, 1) is None
 
 
 @pytest.mark.usefixtures("composed")
@@ -409,19 +400,6 @@ def test_a_figure_that_fails_takes_nothing_with_it(written, tmp_path, monkeypatc
         page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert said in page.replace("&#x27;", "'")
         assert page.count("<svg") == 1
-
-
-def test_variances_of_unit_weight_that_are_nothing_are_not_compared(named, monkeypatch):
-    """They say nothing of the noise."""
-    sessions = pd.DataFrame(
-        [{"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
-         for s, c in CASES_OF_LOOP for i, value in enumerate((0.0, np.nan, np.inf, 1.2))],
-    ).assign(converged=True, tilt_error_rad=1e-3)  # fmt: skip
-    loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
-    assert loop.document["cases"][0]["sigma0_squared_central95"] == [1.2, 1.2]
-    nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
-    monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
-    assert close_loop(named, 1) is None
 
 
 def test_numbers_of_many_positions_do_not_meet():

@@ -97,6 +97,9 @@ def test_a_spec_holds_all_and_is_not_listed():
         assert effect.spec == spec
         assert len(effect.parameters) == len(effect.deviations) == count
         assert get_model(f"bias-scale+{spec}").effects[-1].spec == spec
+    names = get_model(f"bias+{effect.spec}").parameter_names
+    assert [symbol(name) for name in names[3:5]] == ["$h_{x,1}$", "$h_{x,2}$"]
+    assert {group_of(name) for name in names} == {"bias", "learned"}
     assert "learned" not in effect_names()
     for spec, message in {
         "learned(coordinate=colour, target=bias)": "coordinate=colour is none of force, previous,",
@@ -125,9 +128,3 @@ def test_a_learned_rotation_of_the_mounting_turns_the_force():
     np.testing.assert_allclose(
         np.ravel(added), turned - force, atol=angle**2 * np.linalg.norm(force)
     )
-
-
-def test_its_parameters_have_symbols_in_figures():
-    names = get_model(f"bias+{SPEC}, length=0.25, amplitude=0.01)").parameter_names
-    assert [symbol(name) for name in names[3:]][:2] == ["$h_{x,1}$", "$h_{x,2}$"]
-    assert {group_of(name) for name in names} == {"bias", "learned"}

@@ -11,6 +11,8 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_lines
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem
+from accelstudy.diagnosis.evidence import detection
+from accelstudy.diagnosis.evidence.candidates import Field
 from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import Gap
@@ -18,6 +20,7 @@ from accelstudy.diagnosis.pipeline import decide, diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.pages import lines
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
@@ -47,15 +50,15 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
     for seed in range(RUNS):
         chance = Chance(np.random.SeedSequence(seed), len(residuals.design))
         errors = rng.standard_normal((SETS, len(residuals.design)))
-        detection = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
+        found = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
         z = residuals.project(errors.T).T
         odds = total_odds(field.odds(evidence, field.seen(z)))
-        p = np.array([tail(detection.by_chance, detection.weights, value) for value in odds])
+        p = np.array([tail(found.by_chance, found.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
-        assert p[0] == pytest.approx(detection.p_value, abs=0.005)
+        assert p[0] == pytest.approx(found.p_value, abs=0.005)
         rates.append(np.mean(p < RULES.level(level.known)))
         seen.append(odds)
-        weights.append(np.mean(detection.weights))
+        weights.append(np.mean(found.weights))
     error = np.std(rates, ddof=1) / np.sqrt(RUNS)
     # Small enough that a level of one percent more or less would not pass.
     assert STANDARD_ERRORS * error < 0.012
@@ -90,3 +93,20 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         if weak:
             assert "weak" in verdict_lines(found)[0]
             assert lines(TEMPLATE, "agreement", found)[0] in says
+
+
+def test_no_random_number_is_drawn_twice(monkeypatch):
+    """Positions, priors and effects have streams of their own, all of one seed."""
+    n, priors, sets = 12, 3, 50
+    design = np.eye(n + priors, 2)  # takes up two conditions, and leaves the others
+    one = np.ones((n, 1, 1))
+    residuals = Residuals(design, np.zeros(n + priors), one, one, np.ones((n, 1)))
+    chance = Chance(np.random.SeedSequence(1), n, sets)
+    monkeypatch.setattr(
+        detection, "simulated", lambda _, m, count, rng: rng.standard_normal((count, m))
+    )
+    plain = np.concatenate(list(chance.errors(residuals)))
+    changed = np.concatenate(list(chance.errors_with_effects(residuals, Field({}))))[sets // 2 :]
+    left = np.concatenate([plain, changed - plain[sets // 2 :]])[:, 2:].round(9)
+    assert left.shape == (sets + sets // 2, n + priors - 2)
+    assert len(np.unique(left)) == left.size

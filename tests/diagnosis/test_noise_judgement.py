@@ -106,17 +106,14 @@ def test_what_a_significant_test_means(monkeypatch, case, said, code):
     found = judged(monkeypatch, **case)
     assert (found.verdict, found.code) == (said, code)
     assert found.posterior is not None
+    if code == "noise or effect":
+        assert found.reason.facts["p"] == pytest.approx(case["of_noise"])
+        assert found.reason.facts["other"] == "hysteresis"
     if code != "lack of fit":
         assert (found.reason.facts["name"], found.reason.facts["remark"]) == (
             case["name"],
             "what it says",
         )
-
-
-def test_an_effect_that_is_not_excluded_is_named(monkeypatch):
-    found = judged(monkeypatch, LEVEL, of_noise=0.3)
-    assert found.reason.facts["p"] == pytest.approx(0.3)
-    assert found.reason.facts["other"] == "hysteresis"
 
 
 # --- sigma and repeats ---------------------------------------------------------------------------

@@ -35,20 +35,26 @@ def test_shapes_live_in_the_space_of_the_residuals(frame, shapes):
     assert ("tilt" in targets) == ("reading" in targets) == frame.solution.approach.uses_angles
 
 
+def shares(frame, shapes, change):
+    """Share of what a change of the force (n, 3) shows that lies in a shape of each place."""
+    residuals = frame.residuals
+    row = residuals.by_observations[..., :3] @ change[..., None]
+    row = residuals.project(residuals.stacked(row))
+    row /= np.linalg.norm(row)
+    found = {}
+    for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
+        found[place] = max(found.get(place, 0.0), float(np.sum((row.T @ vectors) ** 2)))
+    return found
+
+
 def test_a_shape_holds_any_smooth_function_of_its_coordinate(frame, shapes):
     """A bump in the temperature of a bias lies nearly all in one shape, and in no other place."""
-    hold, residuals = frame.hold, frame.residuals
-    bump = np.exp(-(((hold.temperature - 22) / 6) ** 2))
-    change = np.einsum("n,a->na", bump, [1.0, -0.4, 0.7])[..., None]
-    row = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
-    row /= np.linalg.norm(row)
-    share = {}
-    for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
-        share[place] = max(share.get(place, 0.0), float(np.sum((row.T @ vectors) ** 2)))
-    assert share["temperature", "bias"] > 0.95
+    bump = np.exp(-(((frame.hold.temperature - 22) / 6) ** 2))
+    share = shares(frame, shapes, np.outer(bump, [1.0, -0.4, 0.7]))
+    assert share.pop(("temperature", "bias")) > 0.95
     # Few conditions leave room for chance: by gravity there are 21.
     if frame.solution.approach.uses_angles:
-        assert max(s for place, s in share.items() if place != ("temperature", "bias")) < 0.8
+        assert max(share.values()) < 0.8
 
 
 def test_a_rotation_of_the_mounting_has_its_place_where_a_robot_sees_it(frame, shapes):
@@ -56,26 +62,17 @@ def test_a_rotation_of_the_mounting_has_its_place_where_a_robot_sees_it(frame, s
     if not frame.solution.approach.uses_angles:
         assert not any(target == "mounting" for _, target in shapes.places)
         return
-    residuals, angle = frame.residuals, (frame.hold.vibration - 1) ** 2
-    change = np.cross(np.outer(angle - angle.mean(), [1.0, -0.4, 0.7]), frame.forces)[..., None]
-    row = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
-    row /= np.linalg.norm(row)
-    of_place = [
-        np.sum((row.T @ vectors) ** 2)
-        for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True)
-        if place == ("vibration", "mounting")
-    ]
-    assert max(of_place) > 0.95
+    angle = (frame.hold.vibration - 1) ** 2
+    turned = np.cross(np.outer(angle - angle.mean(), [1.0, -0.4, 0.7]), frame.forces)
+    assert shares(frame, shapes, turned)["vibration", "mounting"] > 0.95
 
 
-def test_what_is_the_same_in_all_positions_is_no_function(frame, shapes):
+@pytest.mark.parametrize("frame", [ROBOT], indirect=True)
+def test_what_is_the_same_in_all_positions_is_no_function(frame):
     """A tilt of the base and offsets of its encoders are effects of the catalogue."""
-    if not frame.solution.approach.uses_angles:
-        return
-    residuals = frame.residuals
+    residuals, shapes = frame.residuals, LearnedShapes.of(frame)
     for name in ("base_tilt", "encoder_offset"):
-        rows = residuals.project(frame.rows(get_effect(name)))
-        basis = np.linalg.qr(rows)[0]
+        basis = np.linalg.qr(residuals.project(frame.rows(get_effect(name))))[0]
         for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
             if place[1] in ("tilt", "reading") and place[0] != "angle":
                 assert np.linalg.norm(basis.T @ vectors[:, -1]) < 0.75, place
