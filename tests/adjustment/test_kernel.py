@@ -12,7 +12,6 @@ from accelstudy.adjustment.calibration import Block, CalibrationProblem
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.basics.errors import InputError
 from accelstudy.effects import HoldConditions, effect_names
-from accelstudy.files.cache import cache_folder
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -148,34 +147,17 @@ def test_the_formulas_of_every_effect(approach):
         assert result == pytest.approx(expected, rel=1e-11, abs=1e-11)
 
 
-def test_what_is_compiled_is_kept_whole_or_not_at_all(tmp_path, monkeypatch):
-    made = []
-    make = compiled._compiled
+def test_what_is_compiled_is_compiled_once(monkeypatch):
+    made, make = [], compiled._compiled
     monkeypatch.setattr(compiled, "_compiled", lambda *a: made.append(1) or make(*a))
-
-    def doubled(folder):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    for _ in range(2):
         code = Code("f", (), ("x",))
         x = code.load("x", "0")
         code.store(x + x, "x", "0")
         values = np.arange(float(LANES))
         compiled.Compiled(str(code), "f", 0, 1).call(values.ctypes.data)
         assert np.array_equal(values, 2 * np.arange(LANES))
-        return len(made)
-
-    assert [doubled(tmp_path), doubled(tmp_path)] == [1, 1]
-    (file,) = cache_folder(compiled.KIND).iterdir()
-    content = file.read_bytes()
-    for damaged in (content[:-8], content[:-1] + bytes([content[-1] ^ 1]), b""):
-        file.write_bytes(damaged)
-        before = len(made)
-        assert doubled(tmp_path) == before + 1
-        assert file.read_bytes() == content
-    assert [path.name for path in cache_folder(compiled.KIND).iterdir()] == [file.name]
-    closed = tmp_path / "closed"
-    closed.write_text("no folder", encoding="utf-8")
-    before = len(made)
-    assert doubled(closed) == before + 1
+    assert len(made) == 1
 
 
 def test_code_that_is_kept_needs_no_symbols():

