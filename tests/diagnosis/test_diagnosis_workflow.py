@@ -1,7 +1,6 @@
 """The workflow of a diagnosis: all is made, once, and what cannot be used is said in a line."""
 
 import json
-import re
 import shutil
 from functools import partial
 from pathlib import Path
@@ -78,11 +77,3 @@ def test_a_campaign_that_is_too_small(made, tmp_path):
     one_line(result.stdout, "error: tiny: 18 positions leave no redundancy", "more positions")
     assert not (folder / "results/tiny/diagnosis").exists()
     assert remains(folder) == []
-
-
-def test_a_wrong_key(tmp_path):
-    result = run(tmp_path, {**TINY, "replicate": 100})
-    assert result.returncode != 0
-    assert not re.search("Traceback|Building DAG", result.stdout)
-    one_line(result.stdout, "tiny.yaml: replicate: unknown key; did you mean 'replicates'?")
-    assert not (tmp_path / "results").exists()

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from calling import refusal, succeed
+from calling import succeed
 from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, document, write_document
 
@@ -99,11 +99,3 @@ def test_the_command_writes_what_it_says(changed, tmp_path):
     assert_sound(page)
     assert "session-1 and session-2 compared" in text_of(page)
     assert (out / "figures/changes.svg").is_file()
-
-
-def test_bad_input_ends_in_one_line(tmp_path):
-    path = tmp_path / "a.json"
-    path.write_text("{}", encoding="utf-8")
-    line = refusal("compare", path, path, "--out", tmp_path / "out")
-    assert line.startswith(f"error: {path}: not a calibration.json")
-    assert not (tmp_path / "out").exists()

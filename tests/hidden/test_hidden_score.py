@@ -253,25 +253,6 @@ def test_the_places_at_which_a_function_can_be_learned():
     assert places == set(LearnedShapes.of(frame).places)
 
 
-def test_the_place_of_what_is_learned(judged):
-    rows = judged["campaigns"].query("set == 'outside'")
-    told = rows[["learned", "has_place", "place_right", "place_wrong", "answered", "wrong"]]
-    yes, no = True, False
-    assert told.to_numpy().tolist() == [
-        [no, no, no, no, yes, yes],
-        *[[yes, yes, yes, no, no, no]] * 2,
-        [yes, yes, no, yes, no, no],
-        [no, yes, no, no, yes, yes],
-        [yes, no, no, no, no, no],
-        [yes, yes, no, yes, no, no],
-        [no, yes, no, no, yes, yes],
-    ]
-    explained = rows["explained"].to_numpy()
-    assert explained == pytest.approx(
-        [np.nan, 0.9, 0.8, 0.8, np.nan, 0.3, 0.8, np.nan], nan_ok=True
-    )
-
-
 def test_tables_of_shares(judged):
     sizes = rows_of("One effect, over its size", judged, "λ")
     # Narrowed to a set that holds the truth is not wrong.

@@ -177,6 +177,8 @@ def said(
         {"names": ["thermal_bias"], "posterior": 0.5},
         {"names": ["hysteresis"], "posterior": 0.45}]}),
     ("other name", {"verdict": "named", "found": ["warm_up"]}),
+    # What a log has by itself is neither right nor wrong.
+    ("nothing", {"verdict": "named", "found": ["warm_up"], "own": ["warm_up"]}),
     ("other name", {"verdict": "named", "found": ["cubic_scale"], "recorded": False}),
     ("other name", {"verdict": "gross_error", "found": [BUMPED]}),
     ("other name", {"verdict": "named", "found": ["warm_up"], "true": []}),
@@ -187,12 +189,6 @@ def said(
 ])  # fmt: skip
 def test_what_an_answer_says(campaigns, expected, given):
     assert said(campaigns[0], **given) == expected
-
-
-def test_what_a_log_has_by_itself_is_neither_right_nor_wrong(campaigns):
-    found = {"found": ["quadratic_scale"], "true": ["bias_drift"]}
-    assert said(campaigns[0], "named", **found) == "other name"
-    assert said(campaigns[0], "named", own=["quadratic_scale"], **found) == "nothing"
 
 
 def test_of_a_function_learned_in_a_log_no_share_is_explained(campaigns):

@@ -232,10 +232,7 @@ def test_no_replicate_converges(tmp_path):
     assert tables["correlations"][["adjustment", "empirical"]].isna().all().all()
 
 
-# --- wrong gravity, missing effects --------------------------------------------------------------
-
-
-# A bias of the scales of 3 060 ppm would tilt by far more, were it not common to them.
+# --- the tilt ------------------------------------------------------------------------------------
 
 
 def test_an_effect_that_the_model_lacks_shows_in_the_tilt(tmp_path):
