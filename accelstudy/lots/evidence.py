@@ -1,8 +1,8 @@
-"""The evidence of one campaign for everything that its model may lack, as a lot gathers it."""
+"""A sensor of a lot: the evidence of its campaign for everything that its model may lack."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,23 +10,20 @@ from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.wording import words
-from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.posterior import Case
-from accelstudy.diagnosis.decision.problem import Problem, fit_base, pose
+from accelstudy.diagnosis.decision.problem import BaseFit, Problem, fit_base, pose
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.noise import SensorNoise, with_noise
+from accelstudy.lots.noise import SensorNoise
 from accelstudy.lots.sizes import ShapeEquations
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
-TestOdds = Mapping[str, NDArray[np.float32]]
-"""Log odds of what is tested in a campaign and, behind that, in noise alone, (1 + s,) each."""
 
 DRAWS = 1000
 """Sets of residuals without any effect, of each campaign."""
@@ -51,6 +48,7 @@ class SensorEvidence:
     specs : dict of effect to its best setting
     pair_specs : dict of two names to their best settings beside each other
     shown : dict of effect to what its shapes would show in the residuals
+    tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
     residuals : (m,) array, m/s², of the means of the positions, equally uncertain
     redundancy : int, of these
     square : float, ‖z‖² of them in units of the noise: of the type where it is known
@@ -65,41 +63,66 @@ class SensorEvidence:
     specs: dict[str, str] = field(default_factory=dict)
     pair_specs: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     shown: dict[str, ShapeEquations] = field(default_factory=dict)
+    tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     residuals: Array = field(default_factory=lambda: np.zeros(0))
     redundancy: int = 0
     square: float = 0.0
     variance: float = 1.0
 
+    @property
+    def kept(self) -> SensorEvidence:
+        """The same without what a lot only gathers, so that memory hardly follows their number."""
+        return replace(self, pair_specs={}, shown={}, tested={})
 
-def sensor_evidence(
-    campaign: Campaign,
-    model: SensorModel | None,
-    approach: Approach | None = None,
-    seed: int = 1,
-    noise: SensorNoise | None = None,
-) -> tuple[SensorEvidence, TestOdds]:
-    """Weigh everything that a model may lack to explain a campaign.
 
-    Parameters
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A sensor of a lot, and what its campaign is weighed with.
+
+    Attributes
     ----------
     campaign : Campaign
     model : SensorModel; None for one that the campaign does not determine: then it says nothing
-    approach : Approach; by default robot-aided if the campaign has the robot's angles
+    approach : Approach
     seed : int, of the draws
     noise : SensorNoise, in place of what the campaign says of its noise
-
-    Raises
-    ------
-    InputError
-        If the positions do not determine the model, or leave no redundancy.
     """
-    if model is None:
-        return SensorEvidence(campaign.name), {}
-    campaign = with_noise(campaign, noise)
-    base = fit_base(campaign, model, approach or usual_approach(campaign))
-    problem = pose(base if noise is None else replace(base, level=noise.level))
-    chance = Chance(np.random.SeedSequence(seed), len(problem.base.solution.design), DRAWS)
-    case = Case(problem, campaign, chance)
+
+    campaign: Campaign
+    model: SensorModel | None
+    approach: Approach
+    seed: int = 1
+    noise: SensorNoise | None = None
+
+    @property
+    def measured(self) -> Campaign:
+        """The campaign, with the sigma that counts."""
+        if self.noise is None:
+            return self.campaign
+        return replace(self.campaign, sigma_force=self.noise.sigma, sigma_dof=None)
+
+    def fit(self) -> BaseFit:
+        """Fit the model to the campaign.
+
+        Raises
+        ------
+        InputError
+            If the positions do not determine the model, or leave no redundancy.
+        """
+        assert self.model is not None
+        base = fit_base(self.measured, self.model, self.approach)
+        return base if self.noise is None else replace(base, level=self.noise.level)
+
+    def evidence(self) -> SensorEvidence:
+        """Weigh everything that the model may lack to explain the campaign; raises as `fit`."""
+        return SensorEvidence(self.campaign.name) if self.model is None else _weighed(self)
+
+
+def _weighed(sensor: Sensor) -> SensorEvidence:
+    noise = sensor.noise
+    problem = pose(sensor.fit())
+    chance = Chance(np.random.SeedSequence(sensor.seed), len(problem.base.solution.design), DRAWS)
+    case = Case(problem, sensor.measured, chance)
     detection, singles = case.detection, case.singles
     residuals, evidence, unknown = problem.residuals, problem.evidence, problem.unknown
     z, square = residuals.z, float(residuals.z @ residuals.z)
@@ -125,8 +148,10 @@ def sensor_evidence(
             pair_specs[one.name, other.name] = one.spec, other.spec
     of_unit_weight = max(evidence.variance(square), MIN_VARIANCE)
     variance = of_unit_weight if noise is None else 1.0
-    said = SensorEvidence(
-        campaign=campaign.name,
+    observed = [detection.densities[name] - nothing for name in problem.field.names]
+    odds = np.vstack([observed, _by_chance(problem, chance, noise)]).astype(np.float32)
+    return SensorEvidence(
+        campaign=sensor.campaign.name,
         p_value=detection.p_value,
         odds={name: log - nothing for name, log in logs.items()},
         pairs=pairs,
@@ -141,14 +166,12 @@ def sensor_evidence(
             if (effects := [h.effect for h in shapes if h.effect is not None])
             and not effects[0].sudden
         },
-        residuals=z * base.sigma,
+        tested=dict(zip(problem.field.names, odds.T, strict=True)),
+        residuals=z * problem.base.sigma,
         redundancy=residuals.redundancy,
         square=square / variance,
-        variance=base.sigma**2 * of_unit_weight,
+        variance=problem.base.sigma**2 * of_unit_weight,
     )
-    observed = [detection.densities[name] - nothing for name in problem.field.names]
-    odds = np.vstack([observed, _by_chance(problem, chance, noise)]).astype(np.float32)
-    return said, dict(zip(problem.field.names, odds.T, strict=True))
 
 
 def _by_chance(problem: Problem, chance: Chance, noise: SensorNoise | None) -> Array:

@@ -6,35 +6,27 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 from threading import Thread
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.progress import track
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.problem import BaseFit, fit_base
+from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
-from accelstudy.lots.evidence import SensorEvidence, TestOdds, sensor_evidence
-from accelstudy.lots.mean import mean_sensor
-from accelstudy.lots.mixture import LotTest
+from accelstudy.diagnosis.rules import RULES
+from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import SensorNoise, noises_of_lot
-from accelstudy.lots.passes import LEVEL, ODD, LotEffect, Pass, SensorState
-from accelstudy.lots.sizes import Names, TypeSizes, sensor_equations, weigh_pooled
+from accelstudy.lots.passes import LEVEL, ODD, LotEffect, Mapped, Pass, SensorState
+from accelstudy.lots.sizes import Names
 from accelstudy.sensors.models import compose, composition_name
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
@@ -63,14 +55,14 @@ class LotDiagnosis:
     explained: bool = True
 
     @property
-    def sensors(self) -> tuple[SensorEvidence, ...]:
-        """Evidence of each campaign by itself."""
-        return self.passes[0].sensors
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Sensors with all that was found in their models, and their noise by that of the lot."""
+        return self.passes[-1].sensors
 
     @property
-    def noises(self) -> Sequence[SensorNoise | None]:
-        """Noise of each campaign by that of the lot; None where it speaks for itself."""
-        return self.passes[-1].noises or [None] * len(self.sensors)
+    def evidence(self) -> tuple[SensorEvidence, ...]:
+        """Evidence of each campaign by itself."""
+        return self.passes[0].evidence
 
     def model_of(self, i: int) -> SensorModel:
         """Model of the type for a sensor, with its own times of what is sudden."""
@@ -143,9 +135,12 @@ def weigh_lot(
     InputError
         If a campaign does not determine the model, or leaves no redundancy.
     """
-    with _processes(cores, len(campaigns)) as mapped:
-        sensors, n = _Sensors(campaigns, approach, seed, mapped), len(campaigns)
-        passes, whole = [sensors.weighed([model] * n, model, [None] * n)], model
+    sensors = [
+        Sensor(campaign, model, approach or usual_approach(campaign), seed + i)
+        for i, campaign in enumerate(campaigns)
+    ]
+    with _processes(cores, len(sensors)) as mapped:
+        passes, whole = [Pass.of(sensors, model, mapped)], model
         effects: list[LotEffect] = []
         for _ in range(MAX_PASSES):
             known = {effect.name for effect in whole.effects}
@@ -155,123 +150,59 @@ def weigh_lot(
                 break
             effects += new
             whole = extended(whole, (found.spec for found in new if found.spec))
-            if (after := sensors.again(whole, passes)) is None:
+            if (after := _again(passes, whole, mapped)) is None:
                 break
             passes.append(after)
         nameless = any(f.spec is None and f.names[0] not in NOISES for f in effects)
-        if not nameless and _explained(sensors, passes, whole, len(effects)):
+        if not nameless and _explained(passes, whole, len(effects), mapped):
             return LotDiagnosis(tuple(passes), whole, tuple(effects))
     close = tuple(found.names for found in effects if found.spec is not None)
     return LotDiagnosis(tuple(passes), model, close=close, explained=False)
 
 
-@dataclass(frozen=True, eq=False)
-class _Sensors:
-    """The campaigns of a lot, and how they are weighed: an approach, the draws, the processes."""
+def _again(passes: Sequence[Pass], whole: SensorModel, mapped: Mapped) -> Pass | None:
+    """Weigh all sensors with what was found, and with the noise that they tell together.
 
-    campaigns: Sequence[Campaign]
-    approach: Approach | None
-    seed: int
-    mapped: Callable[..., Iterator[Any]]
+    None if no campaign determines the model.
 
-    def again(self, whole: SensorModel, passes: Sequence[Pass]) -> Pass | None:
-        """Weigh all sensors with what was found, and with the noise that they tell together.
+    Parameters
+    ----------
+    passes : that found it, of which each sensor has its own times of what is sudden
+    whole : SensorModel, with what was found
+    mapped : maps a function over the sensors
+    """
+    own = [
+        replace(sensor, model=_own(whole, passes, i), noise=None)
+        for i, sensor in enumerate(passes[0].sensors)
+    ]
 
-        None if no campaign determines the model.
-
-        Parameters
-        ----------
-        whole : SensorModel, with what was found
-        passes : that found it, of which each sensor has its own times of what is sudden
-        """
-        own = [_own(whole, passes, i) for i in range(len(self.campaigns))]
-
-        def fitted(i: int, sigma: float | None = None) -> BaseFit | None:
-            campaign = self.campaigns[i]
-            if sigma is not None:
-                campaign = replace(campaign, sigma_force=sigma, sigma_dof=None)
-            with suppress(InputError):
-                return fit_base(campaign, own[i], self.approach or usual_approach(campaign))
-            return None
-
-        fits = [fitted(i) for i in range(len(own))]
-        # A campaign that does not determine the model says nothing of what else is missing.
-        models = [None if fit is None else fit.solution.model for fit in fits]
-        return self.weighed(models, whole, noises_of_lot(fits, fitted)) if any(models) else None
-
-    def weighed(
-        self,
-        models: Sequence[SensorModel | None],
-        whole: SensorModel,
-        noises: Sequence[SensorNoise | None],
-    ) -> Pass:
-        """Weigh everything that the models of all sensors may lack.
-
-        Parameters
-        ----------
-        models : of the sensors; None for one that its campaign does not determine
-        whole : SensorModel, of their mean
-        noises : of the sensors; None for one that speaks for itself
-        """
-        n = len(self.campaigns)
-        approaches, seeds = [self.approach] * n, range(self.seed, self.seed + n)
-        each = self.mapped(sensor_evidence, self.campaigns, models, approaches, seeds, noises)
-        sensors, anything = [], LotTest({})
-        # What noise alone would say is most of what a sensor gives, and is not kept.
-        for sensor, of_test in track(each, "evidence of the sensors", n):
-            sensors.append(replace(sensor, pair_specs={}))
-            anything.add(of_test)
-
-        def retested(i: int) -> TestOdds:
-            return sensor_evidence(
-                self.campaigns[i], models[i], self.approach, seeds[i], noises[i]
-            )[1]
-
-        now = Pass(tuple(sensors), anything, retested, tuple(noises))
-        usual = [k for k in now.usual if models[k]]
-        # What is gathered now is not kept of each sensor, so that memory hardly follows the lot.
-        now = replace(
-            now,
-            sensors=tuple(replace(sensor, shown={}) for sensor in sensors),
-            mean=self._mean([(self.campaigns[k], sensors[k], noises[k]) for k in usual], whole),
-            pooled=weigh_pooled([sensors[k] for k in usual]),
-        )
-        if len(usual) < 2 or not (shapes := now.strongest()):
-            return now
-        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
-        told = self.mapped(
-            sensor_equations, self.campaigns, models, approaches, noises, [specs] * n
-        )
-        return replace(now, sizes=TypeSizes.of([*told], specs, shapes, usual))
-
-    def _mean(
-        self,
-        usual: Sequence[tuple[Campaign, SensorEvidence, SensorNoise | None]],
-        whole: SensorModel,
-    ) -> SensorEvidence | None:
-        """Evidence of the mean of usual sensors; None if there is none of their model."""
-        # What happens to each sensor at a time of its own has no mean.
-        if not usual or any(effect.sudden for effect in whole.effects):
-            return None
-        if (measured := mean_sensor(*zip(*usual, strict=True))) is None:
-            return None
-        campaign, noise = measured
-        seed = self.seed - 1 if self.seed else len(self.campaigns)
-        with suppress(InputError):  # the positions do not determine the model
-            return sensor_evidence(campaign, whole, self.approach, seed, noise)[0]
+    def fitted(i: int, sigma: float | None = None) -> BaseFit | None:
+        noise = None if sigma is None else SensorNoise(sigma, RULES.freedom_given)
+        with suppress(InputError):
+            return replace(own[i], noise=noise).fit()
         return None
+
+    fits = [fitted(i) for i in range(len(own))]
+    if not any(fits):
+        return None
+    # A campaign that does not determine the model says nothing of what else is missing.
+    sensors = [
+        replace(sensor, model=None if fit is None else fit.solution.model, noise=noise)
+        for sensor, fit, noise in zip(own, fits, noises_of_lot(fits, fitted), strict=True)
+    ]
+    return Pass.of(sensors, whole, mapped)
 
 
 def _own(whole: SensorModel, passes: Sequence[Pass], i: int) -> SensorModel:
     """Model of a sensor: what is sudden happened when the last pass that looked for it says."""
     specs: dict[str, str] = {}
     for one in passes:
-        specs |= one.sensors[i].specs
+        specs |= one.evidence[i].specs
     effects = [specs.get(e.name, e.spec) if e.sudden else e.spec for e in whole.effects]
     return compose(whole.name, tuple(effects))
 
 
-def _explained(sensors: _Sensors, passes: Sequence[Pass], whole: SensorModel, known: int) -> bool:
+def _explained(passes: Sequence[Pass], whole: SensorModel, known: int, mapped: Mapped) -> bool:
     """Whether what was found explains the lot, with the most probable of what is not sure."""
     now = passes[-1]
     while (rest := now.without_odd()).p_value < LEVEL_OF_REST:
@@ -282,7 +213,7 @@ def _explained(sensors: _Sensors, passes: Sequence[Pass], whole: SensorModel, kn
         if spec is None or known >= MAX_PASSES:
             return False
         whole, known = extended(whole, [spec]), known + 1
-        if (after := sensors.again(whole, passes)) is None:
+        if (after := _again(passes, whole, mapped)) is None:
             return False
         now = after
     return True
@@ -295,7 +226,7 @@ def extended(model: SensorModel, specs: Iterable[str]) -> SensorModel:
 
 
 @contextmanager
-def _processes(cores: int, n: int) -> Iterator[Callable[..., Iterator[Any]]]:
+def _processes(cores: int, n: int) -> Iterator[Mapped]:
     """What maps a function over n campaigns, in as many processes as there are cores.
 
     Elsewhere than on Linux processes start anew, with all imports; there is one.

@@ -10,7 +10,7 @@ import numpy as np
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.noise import LEAST_SIGMA, SensorNoise
 
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
@@ -21,30 +21,26 @@ MAX_DIRECTION_DIFFERENCE = 0.15
 """Largest difference of the directions of forces in positions that are the same."""
 
 
-def mean_sensor(
-    campaigns: Sequence[Campaign],
-    sensors: Sequence[SensorEvidence],
-    noises: Sequence[SensorNoise | None],
-) -> tuple[Campaign, SensorNoise] | None:
+def mean_sensor(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Sensor | None:
     """Average sensors that were in the same positions and conditions, in one order.
 
     What all of them have is as large in their mean, and the noise is smaller by the root of their
     number. Sensors whose noise is known by that of the lot have weights by it, and the others equal
     ones. The noise of the mean is told by their scatter about it. None if the positions differ.
     """
-    n = len(campaigns)
-    if n < 2 or len({each.residuals.shape for each in sensors}) > 1:
+    n, campaigns = len(sensors), [sensor.campaign for sensor in sensors]
+    if n < 2 or len({each.residuals.shape for each in said}) > 1:
         return None
     first = campaigns[0]
     if not all(_alike(first, other) for other in campaigns[1:]):
         return None
-    table = np.array([each.residuals for each in sensors])
-    variances = np.array([each.variance for each in sensors])
-    alone = np.array([noise is None for noise in noises])
+    table = np.array([each.residuals for each in said])
+    variances = np.array([each.variance for each in said])
+    alone = np.array([sensor.noise is None for sensor in sensors])
     if alone.any():  # an estimate of its own is no weight: one that is small by chance would count
         variances[alone] = variances[alone].mean()
     weights = variances.mean() / variances
-    freedom = (n - 1) * min(each.redundancy for each in sensors)
+    freedom = (n - 1) * min(each.redundancy for each in said)
     apart = table - np.average(table, axis=0, weights=weights)
     within = float(np.sum(weights @ apart**2)) / freedom
     sigma = max(float(np.sqrt(within / weights.sum())), LEAST_SIGMA)
@@ -58,7 +54,8 @@ def mean_sensor(
     mean = replace(
         first, name="mean of the lot", sd=None, n_samples=None, sigma_force=sigma, **columns
     )
-    return mean, SensorNoise(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
+    noise = SensorNoise(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
+    return replace(sensors[0], campaign=mean, noise=noise)
 
 
 def _alike(one: Campaign, other: Campaign) -> bool:

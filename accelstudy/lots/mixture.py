@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from accelstudy.lots.evidence import TestOdds
 from accelstudy.lots.sizes import Names, TypicalSet
 
 Array = NDArray[np.float64]
@@ -278,7 +277,7 @@ class LotTest:
     def __init__(self, logs: Mapping[str, Array]) -> None:
         self.logs = dict(logs)
 
-    def add(self, sensor: TestOdds, sign: float = 1.0) -> None:
+    def add(self, sensor: Mapping[str, NDArray[np.float32]], sign: float = 1.0) -> None:
         """Add what a sensor says; or take it away."""
         nodes, _ = _nodes(2)
         for name, odds in sensor.items():

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
@@ -70,11 +69,6 @@ class SensorNoise:
             return Level((1.0,), (self.freedom,), known=True)
         weights = 1 - self.doubt, self.doubt
         return Level(weights, (self.freedom, RULES.freedom_doubted), known=True)
-
-
-def with_noise(campaign: Campaign, noise: SensorNoise | None) -> Campaign:
-    """Return a campaign with the noise that the lot tells, if it does, in place of its own."""
-    return campaign if noise is None else replace(campaign, sigma_force=noise.sigma, sigma_dof=None)
 
 
 def stated_sigma(fit: BaseFit) -> tuple[str, float]:

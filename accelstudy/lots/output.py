@@ -201,7 +201,7 @@ class Lot(Result):
         Its own estimate has few degrees of freedom: taken as it is, what is not known of the noise
         would look like scatter of the parameters.
         """
-        own, noise = fit.sigma**2, self.diagnosis.noises[i]
+        own, noise = fit.sigma**2, self.diagnosis.sensors[i].noise
         if fit.trusts_sigma or noise is None:
             return own
         r, ratio = fit.adjustment.redundancy, (noise.sigma / fit.sigma_position_posteriori) ** 2
@@ -242,8 +242,8 @@ class Lot(Result):
             alternatives=[
                 f"{_either(names[:3])} ({probability(p)})" for names, p in d.alternatives
             ],
-            alone=sum(one.p_value < LEVEL for one in d.sensors),
-            single=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.sensors),
+            alone=sum(one.p_value < LEVEL for one in d.evidence),
+            single=sum(max(one.odds, key=one.odds.__getitem__) in first for one in d.evidence),
             max_tilt=MAX_TILT_GON * GON,
         )
 

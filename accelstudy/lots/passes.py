@@ -3,25 +3,39 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import NamedTuple
+from functools import cached_property, partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.lots.evidence import COMMON, SensorEvidence, TestOdds, lot_classes
+from accelstudy.lots.evidence import COMMON, Sensor, SensorEvidence, lot_classes
+from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.mixture import LotTest, Mixture
-from accelstudy.lots.noise import SensorNoise
-from accelstudy.lots.sizes import Names, PooledEffect, Shapes, TypeSizes, TypicalSet
+from accelstudy.lots.sizes import (
+    Names,
+    PooledEffect,
+    Shapes,
+    TypeSizes,
+    TypicalSet,
+    sensor_equations,
+    weigh_pooled,
+)
+from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
+Mapped: TypeAlias = Callable[..., Iterator[Any]]
+"""Maps a function over sensors, in one process or in several."""
 
 LEVEL = 0.05
 """Level of the test whether anything is missing in a lot: half of it by what each campaign says of
@@ -90,28 +104,52 @@ class Pass:
 
     Attributes
     ----------
-    sensors : tuple of SensorEvidence
+    sensors : tuple of Sensor
+    evidence : tuple of SensorEvidence, theirs
     anything : LotTest, the test of them
-    retested : function of a sensor's place that gives what it added to the test
-    noises : tuple of SensorNoise, by all sensors; None where a campaign says its own
     mean : SensorEvidence, of their mean; None if they were in different positions
     pooled : mapping of effects to what all campaigns say of them together
     sizes : TypeSizes, of the most probable effects; None where there are none
     """
 
-    sensors: tuple[SensorEvidence, ...]
+    sensors: tuple[Sensor, ...]
+    evidence: tuple[SensorEvidence, ...]
     anything: LotTest
-    retested: Callable[[int], TestOdds]
-    noises: tuple[SensorNoise | None, ...] = ()
     mean: SensorEvidence | None = None
     pooled: Mapping[str, PooledEffect] = field(default_factory=dict)
     sizes: TypeSizes | None = None
+
+    @classmethod
+    def of(cls, sensors: Sequence[Sensor], whole: SensorModel, mapped: Mapped) -> Pass:
+        """Weigh everything that the models of all sensors may lack.
+
+        Parameters
+        ----------
+        sensors : with their models
+        whole : SensorModel, of their mean
+        mapped : maps a function over the sensors
+        """
+        n, said, anything = len(sensors), list[SensorEvidence](), LotTest({})
+        # What noise alone would say is most of what a sensor gives, and is not kept.
+        for one in track(mapped(Sensor.evidence, sensors), "evidence of the sensors", n):
+            anything.add(one.tested)
+            said.append(replace(one, tested={}))
+        now = cls(tuple(sensors), tuple(one.kept for one in said), anything)
+        usual = [i for i in now.usual if sensors[i].model]
+        those, their = [sensors[i] for i in usual], [said[i] for i in usual]
+        mean = _evidence_of_mean(those, their, whole, sensors[0].seed - 1 if sensors[0].seed else n)
+        now = replace(now, mean=mean, pooled=weigh_pooled(their))
+        if len(usual) < 2 or not (shapes := now.strongest()):
+            return now
+        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
+        told = mapped(partial(sensor_equations, specs=specs), sensors)
+        return replace(now, sizes=TypeSizes.of([*told], specs, shapes, usual))
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
         """Names that mean the same in this lot, by the one that stands for them."""
         of_mean = {} if self.mean is None else {COMMON: (COMMON,)}
-        return lot_classes(self.sensors) | of_mean
+        return lot_classes(self.evidence) | of_mean
 
     @cached_property
     def _stands(self) -> dict[str, str]:
@@ -124,12 +162,12 @@ class Pass:
         odds = {
             # One sensor alone never shows what has neither a name nor a shape.
             name: np.array([
-                one.odds.get(name, IMPOSSIBLE if name == COMMON else 0.0) for one in self.sensors
+                one.odds.get(name, IMPOSSIBLE if name == COMMON else 0.0) for one in self.evidence
             ])
             for name in self.classes
         }  # fmt: skip
         pairs: dict[Names, Array] = {}
-        for i, one in enumerate(self.sensors):
+        for i, one in enumerate(self.evidence):
             for names, log in self._pairs(one).items():
                 pairs.setdefault(names, np.full(len(self.sensors), np.nan))[i] = log
         kinds = {name: _kind(name) for name in self.classes}
@@ -300,14 +338,14 @@ class Pass:
         told = []
         for i in order[: int(np.sum(wrong <= FALSE_ODD))]:
             name = max(own, key=lambda name: own[name][i])
-            told.append(SensorState(self.sensors[i].campaign, self.classes[name], float(alone[i])))
+            told.append(SensorState(self.evidence[i].campaign, self.classes[name], float(alone[i])))
         return told
 
     @property
     def usual(self) -> list[int]:
         """Numbers of the sensors that are not odd."""
         odd = {one.campaign for one in self.odd}
-        return [i for i, each in enumerate(self.sensors) if each.campaign not in odd]
+        return [i for i, each in enumerate(self.evidence) if each.campaign not in odd]
 
     def without_odd(self) -> Pass:
         """The same without the sensors that are odd."""
@@ -315,12 +353,12 @@ class Pass:
             return self
         usual, anything = self.usual, LotTest(self.anything.logs)
         for i in {*range(len(self.sensors))} - {*usual}:
-            anything.add(self.retested(i), -1.0)
+            anything.add(self.sensors[i].evidence().tested, -1.0)
         return replace(
             self,
             sensors=tuple(self.sensors[i] for i in usual),
+            evidence=tuple(self.evidence[i] for i in usual),
             anything=anything,
-            retested=lambda i: self.retested(usual[i]),
             sizes=None if self.sizes is None else self.sizes.only(usual),
         )
 
@@ -334,8 +372,8 @@ class Pass:
         sets, table = [*of_names, (ODD,)], np.array([*of_names.values(), odd])
         best = table.argmax(axis=0)
         return [
-            SensorState(sensor.campaign, sets[k], float(table[k, i]))
-            for i, (sensor, k) in enumerate(zip(self.sensors, best, strict=True))
+            SensorState(one.campaign, sets[k], float(table[k, i]))
+            for i, (one, k) in enumerate(zip(self.evidence, best, strict=True))
         ]
 
     def spec(self, name: str) -> str | None:
@@ -343,10 +381,22 @@ class Pass:
         if self.sizes is not None and (names := self._looked_at(name)) is not None:
             return self.sizes.shapes[names][name]
         counted: dict[str, float] = {}
-        for one, weight in zip(self.sensors, self.mixture.having(name).tolist(), strict=True):
+        for one, weight in zip(self.evidence, self.mixture.having(name).tolist(), strict=True):
             if (spec := one.specs.get(name)) is not None:
                 counted[spec] = counted.get(spec, 0.0) + weight
         return max(counted, key=lambda spec: counted[spec], default=None)
+
+
+def _evidence_of_mean(
+    sensors: Sequence[Sensor], said: Sequence[SensorEvidence], whole: SensorModel, seed: int
+) -> SensorEvidence | None:
+    """Weigh the mean of sensors; None if there is none of their model."""
+    # What happens to each sensor at a time of its own has no mean.
+    if any(effect.sudden for effect in whole.effects) or not (mean := mean_sensor(sensors, said)):
+        return None
+    with suppress(InputError):  # the positions do not determine the model
+        return replace(mean, model=whole, seed=seed).evidence()
+    return None
 
 
 def _is_sudden(name: str) -> bool:

@@ -20,20 +20,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.approaches import Approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.fit import usual_approach
-from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.effects import Effect, get_effect
-from accelstudy.lots.noise import SensorNoise, with_noise
-from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
-    from accelstudy.lots.evidence import SensorEvidence
+    from accelstudy.lots.evidence import Sensor, SensorEvidence
 
 Array = NDArray[np.float64]
 Names = tuple[str, ...]
@@ -155,26 +149,13 @@ class SensorEquations(NamedTuple):
     redundancy: int = 0
 
 
-def sensor_equations(
-    campaign: Campaign,
-    model: SensorModel | None,
-    approach: Approach | None,
-    noise: SensorNoise | None,
-    specs: Sequence[str],
-) -> SensorEquations:
-    """Say what a campaign tells of effects; nothing of those that it cannot show.
-
-    Parameters
-    ----------
-    campaign, model, approach, noise : as in `evidence.sensor_evidence`
-    specs : effects with their settings
-    """
+def sensor_equations(sensor: Sensor, specs: Sequence[str]) -> SensorEquations:
+    """Say what a sensor tells of effects with their settings; nothing of what it cannot show."""
     effects = [get_effect(spec) for spec in specs]
-    if model is None:
+    if sensor.model is None:
         k = sum(len(effect.parameters) for effect in effects)
         return SensorEquations(Equations(np.zeros((k, k)), np.zeros(k), np.zeros(k)))
-    campaign = with_noise(campaign, noise)
-    frame = Frame.of(fit_base(campaign, model, approach or usual_approach(campaign)).solution)
+    frame = Frame.of(sensor.fit().solution)
     residuals, columns = frame.residuals, []
     for effect in effects:
         try:

@@ -97,9 +97,9 @@ def _typical(parameter: TypeParameter, sensors: int, stays: bool) -> TypicalPara
 def _sheet(lot: Lot, parameters: dict[str, TypicalParameter]) -> DataSheet:
     """Noise of a position mean, which is that of the median sensor, and errors when it is new."""
     title = f"{len(lot.usual)} sensors of a type"
-    noises = lot.diagnosis.noises
+    sensors = lot.diagnosis.sensors
     sigmas = [
-        fit.sigma_position if (noise := noises[i]) is None else noise.sigma
+        fit.sigma_position if (noise := sensors[i].noise) is None else noise.sigma
         for i, fit in lot.usual.items()
     ]
     values: dict[str, Any] = {"position_sigma": float(np.median(sigmas))}

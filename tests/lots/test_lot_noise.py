@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from accelstudy.approaches import get_approach
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.evidence import SensorEvidence
+from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
 
@@ -112,10 +113,17 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
     campaigns = [
         replace(base, forces=base.forces + s * e) for s, e in zip(sigmas, signs, strict=True)
     ]
-    sensors = [
+    said = [
         SensorEvidence("c", residuals=np.full(30, s * e), redundancy=30, variance=s**2)
         for s, e in zip(sigmas, signs, strict=True)
     ]
+
+    def sensors_of(campaigns, noises):
+        approach = get_approach("robot")
+        return [
+            Sensor(campaign, None, approach, noise=noise)
+            for campaign, noise in zip(campaigns, noises, strict=True)
+        ]
 
     def expected(variances):
         weights = (1 / variances) / np.sum(1 / variances)
@@ -127,10 +135,11 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
     alone = np.append(sigmas[:2] ** 2, np.full(2, np.mean(sigmas[2:] ** 2)))
     for noises, variances in ((known, sigmas**2), ([*known[:2], None, None], alone)):
         shift, sigma, weights = expected(variances)
-        mean, noise = mean_sensor(campaigns, sensors, noises)
+        of_mean = mean_sensor(sensors_of(campaigns, noises), said)
+        mean, noise = of_mean.campaign, of_mean.noise
         np.testing.assert_allclose(mean.forces - base.forces, shift, rtol=1e-6)
         assert noise.sigma == pytest.approx(sigma)
         assert mean.sigma_angle == pytest.approx(base.sigma_angle * np.sqrt(np.sum(weights**2)))
     turned = replace(base, forces=base.forces[::-1])
     for other in (turned, replace(base, time=None)):
-        assert mean_sensor([other, *campaigns[1:]], sensors, known) is None
+        assert mean_sensor(sensors_of([other, *campaigns[1:]], known), said) is None

@@ -8,9 +8,10 @@ import pytest
 from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 
+from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.evidence import sensor_evidence
+from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.output import own_names
 from accelstudy.lots.parameters import TypeParameter
 from accelstudy.lots.sizes import sensor_equations
@@ -25,9 +26,10 @@ def test_names_of_campaigns_are_their_own():
 
 def test_a_campaign_that_does_not_determine_the_model_says_nothing():
     campaign, _ = simulate_campaign(CampaignSettings(name="few", scheme="faces-6"))
-    silent, tested = sensor_evidence(campaign, None)
-    assert (silent.odds, tested) == ({}, {})
-    none = sensor_equations(campaign, None, None, None, ("thermal_bias",)).equations
+    sensor = Sensor(campaign, None, get_approach("gravity"))
+    silent = sensor.evidence()
+    assert (silent.odds, silent.tested) == ({}, {})
+    none = sensor_equations(sensor, ("thermal_bias",)).equations
     assert none.normal.shape == (3, 3)
     assert not none.normal.any()
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,15 +66,17 @@ def mixture_of(odds, **known):
 
 def weighed(odds, rng):
     """A pass over sensors with these odds (n, 3), whose chances are those of their numbers."""
-    sensors, tested, anything = [], [], LotTest({})
+    said, anything = [], LotTest({})
     for i, each in enumerate(odds):
         known = dict(zip(NAMES, each.tolist(), strict=True))
         pairs = {(a, b): known[a] + known[b] for a, b in combinations(NAMES, 2)}
-        sensors.append(SensorEvidence(f"sensor {i}", 0.5, known, pairs, [(n,) for n in NAMES]))
         chance = odds_of(rng.standard_normal((CHANCES, len(NAMES))))
-        tested.append(dict(zip(NAMES, np.vstack([each, chance]).T, strict=True)))
-        anything.add(tested[-1])
-    return Pass(tuple(sensors), anything, tested.__getitem__)
+        tested = dict(zip(NAMES, np.vstack([each, chance]).T, strict=True))
+        one = SensorEvidence(f"sensor {i}", 0.5, known, pairs, [(n,) for n in NAMES], tested=tested)
+        said.append(one)
+        anything.add(tested)
+    sensors = [SimpleNamespace(evidence=partial(lambda one: one, one)) for one in said]
+    return Pass(tuple(sensors), tuple(said), anything)
 
 
 def lot_of(lacks, rng):

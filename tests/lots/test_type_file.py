@@ -47,10 +47,9 @@ def fitted(campaign):
 def type_of(sensors, folder):
     """The file of a type of which nothing is missing and no sensor is odd."""
     fits = [fitted(one) for one in sensors]
-    named = [SimpleNamespace(campaign=one.name) for one in sensors]
+    named = [SimpleNamespace(noise=SensorNoise(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
         usual=range(len(sensors)), sensors=named, each=(), effects=(), model=MODEL,
-        noises=[SensorNoise(0.002, 200.0)] * len(sensors),
     )  # fmt: skip
     assert write_type(Lot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
     return folder / "type.yaml"

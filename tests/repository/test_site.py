@@ -8,6 +8,7 @@ import json
 import re
 from datetime import datetime
 from importlib import import_module
+from types import SimpleNamespace
 from unittest.mock import ANY
 
 import griffe
@@ -147,7 +148,8 @@ def _lot():
     each = [SensorEvidence(c, 0.5, {name: 20.0}, classes=((name,),)) for c in "abc"]
     for _ in each:
         anything.add({name: np.array([20.0, *[0.0] * 1000])})
-    one, model = Pass(tuple(each), anything, {}.get), get_model("bias-scale")
+    sensors = (SimpleNamespace(noise=None),) * len(each)
+    one, model = Pass(sensors, tuple(each), anything), get_model("bias-scale")
     lot = LotDiagnosis((one, one), model, tuple(one.found))
     return Lot(lot, model, [None] * 3, get_approach("robot"), {}).content
 
