@@ -295,11 +295,6 @@ def test_the_tilt_error_is_that_of_the_report(calibrations):
     assert in_degrees.tolist() == pytest.approx(in_rad.tolist())
 
 
-def test_sigmas_are_checked_as_by_the_command(folder):
-    table = acs.check_sigmas(folder / "sensor-0", replicates=200)
-    assert table["ratio"].between(0.8, 1.25).all()
-
-
 def test_what_reading_refuses_is_diagnosed(tmp_path):
     given = acs.simulate_campaign(scheme="fibonacci-24", gross_errors="unit_error(force=0.102)")
     acs.write_campaign(given, tmp_path, plausible=False)

@@ -1,12 +1,9 @@
 """Names that become folders stay within them."""
 
-import shlex
-
 import pytest
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import check_path_name
-from accelstudy.basics.suggested import diagnose
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.diagnosis.round_trip import parse_round_trip
 
@@ -39,23 +36,3 @@ def test_names_of_sources(tmp_path):
     assert [task.name for task in tasks] == ["a-x-", "b-c", "d-"]
     (task,) = parse_batch({"batch": "x", "campaigns": [{"log": "x" * 300}]}).tasks()
     assert task.name == "x" * 100
-
-
-@pytest.mark.parametrize(("path", "name"), [
-    ("adxl355", "adxl355"),
-    ("../../etc", "etc"),
-    ("a/b c", "a-b c"),
-    ("\x1b[31mred", "-[31mred"),
-    ("Prüfling 7", "Prüfling 7"),
-])  # fmt: skip
-def test_a_folder_is_suggested_in_the_folder_where_one_is(path, name):
-    assert shlex.split(diagnose(path, "m", "gravity"))[-1] in (
-        f"{name}-diagnosis",
-        f"./{name}-diagnosis",
-    )
-
-
-def test_a_suggested_folder_is_short_enough_for_any_disk():
-    name = shlex.split(diagnose("ü" * 300, "m", "gravity"))[-1]
-    assert name.endswith("ü-diagnosis")
-    assert len(name.encode()) <= 200

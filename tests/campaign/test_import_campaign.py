@@ -24,20 +24,6 @@ def log(tmp_path):
     return write(tmp_path, forces)
 
 
-def test_a_white_log(log):
-    campaign, holds = import_log(log, ImportSettings(rate_hz=100))
-    assert campaign.n_positions == len(holds.table) == 8
-    assert campaign.positions.tolist() == list(range(1, 9))
-    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
-    np.testing.assert_array_equal(campaign.n_samples, holds.table["n"])
-    np.testing.assert_allclose(campaign.sd, 0.02, rtol=0.2)
-    assert np.all(np.diff(campaign.time) == pytest.approx(6, abs=0.1))
-    accuracy = holds.noise.accuracy
-    assert campaign.sigma_force == accuracy.allan
-    assert accuracy.white == pytest.approx(0.02 / np.sqrt(260), rel=0.05)
-    assert accuracy.ratio == pytest.approx(1, abs=0.35)
-
-
 def test_turning_is_not_noise(tmp_path):
     """A sensor that turns a little within its holds changes the direction of gravity only."""
     forces, edges = session(sigma=0.005)

@@ -5,8 +5,6 @@ import pandas as pd
 import pytest
 from log_helpers import RATE, G, find_holds, opened, session
 
-from accelstudy.campaign.importing import windows
-
 
 def spans(holds):
     """First samples of holds, and those after the last."""
@@ -37,16 +35,6 @@ def test_known_holds(tmp_path, seed, sigma):
         np.testing.assert_allclose(holds.means[i], own.mean(axis=0), rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(sds[i], own.std(axis=0, ddof=1), rtol=1e-9)
     assert holds.threshold.floor == pytest.approx(sigma * 3**0.25, rel=0.1)
-
-
-def test_windows_are_those_of_numpy(tmp_path):
-    forces, _ = session(holds=2)
-    found = windows.Windows(opened(tmp_path, forces), 101)
-    sliding = np.lib.stride_tricks.sliding_window_view(forces, 101, axis=0)
-    expected = np.linalg.norm(sliding.var(axis=2), axis=1)
-    np.testing.assert_allclose(found.variance[50:-50], expected, rtol=1e-9)
-    assert not found.centred[:50].any()
-    assert not found.centred[-50:].any()
 
 
 def test_no_hold_spans_a_gap(tmp_path):

@@ -1,6 +1,8 @@
 """Readers of raw logs: every layout gives the same numbers, and bad input one clear line."""
 
 import gzip
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -10,8 +12,8 @@ from hypothesis import strategies as st
 from log_helpers import FORCES, TABLE, TIME, N, changed, lines, open_log
 from scipy.io import loadmat, savemat
 
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.importing import text as texts
 from accelstudy.campaign.importing.detection import find_holds
 from accelstudy.campaign.importing.settings import ImportSettings
@@ -26,29 +28,57 @@ def written(folder, text, name="log.csv"):
 BY_PLACE = {"columns": {"fx": 1, "fy": "2", "fz": 3}, "time": 0}
 
 
-@pytest.mark.parametrize(("text", "options"), [
-    (lines(before=["t,fx,fy,fz"]), {}),
-    (lines(before=["Fs,100", "Waiting time,3", '"Time_s","Acc X","Acc Y","Acc Z"']), {}),
-    (lines(before=["# made by hand", "# time,ax,ay,az"]), {}),
-    (lines(before=["% a comment", "", "%another"]), BY_PLACE),
-    (lines("\t", before=["time\tfx\tfy\tfz"]), {}),
-    (lines(";", ",", ["time;fx;fy;fz"]), {}),
-    (lines("   "), BY_PLACE),
-    (lines("   ", ","), BY_PLACE),
-    (lines(" , "), BY_PLACE),
-    (lines().replace("\n", ",x_a\n"), BY_PLACE),
-    (lines().replace("\n", "\r\n"), BY_PLACE),
-    (lines().rstrip("\n"), BY_PLACE),
-    ("\ufeff" + lines(before=["t,fx,fy,fz"]), {}),
-    (lines().replace("\n", "\n\n"), BY_PLACE),
-    (lines().replace("\n", "\n# why not\n", 3), BY_PLACE),
-    ('"' + lines().replace(",", '","').replace("\n", '"\n"')[:-1], BY_PLACE),
-])  # fmt: skip
-def test_text(tmp_path, text, options):
-    path = written(tmp_path, text)
-    log = open_log(path, **options)
-    np.testing.assert_array_equal(log.time, TIME)
-    np.testing.assert_array_equal(log.forces, FORCES)
+HEADS = {
+    "": ((), BY_PLACE),
+    "names": (("time", "fx", "fy", "fz"), {}),
+    "units": (("Time_s", "Acc X [m/s²]", "Acc Y [m/s²]", "Acc Z [m/s²]"), {}),
+    "comment": (("# time", "ax", "ay", "az"), {}),
+}
+"""Names of columns in the first row, and what a reader needs besides."""
+GIVEN = {"\t": "tab", "   ": "blank", " , ": "comma"}
+CALIBRATION = acs.calibrate(acs.simulate_campaign(scheme="fibonacci-24"))
+CALIBRATED = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
+EXPECTED = CALIBRATION.apply(pd.DataFrame(FORCES, columns=["fx", "fy", "fz"]))[CALIBRATED]
+
+
+@st.composite
+def layouts(draw):
+    """Content of a log that has TABLE, its suffix, and what a reader needs to know."""
+
+    def one(*values):
+        return draw(st.sampled_from(values))
+
+    delimiter = one(",", ";", "\t", "|", "   ", " , ")
+    names, options = HEADS[one("", "names", "comment", *(["units"] if delimiter.strip() else []))]
+    if one(delimiter == "|", True):
+        options = {**options, "delimiter": GIVEN.get(delimiter, delimiter)}
+    decimal = one(".", "." if "," in delimiter else ",")
+    mark = one("", '"' if delimiter in ",;\t" else "")
+    behind = one("", delimiter, f"{delimiter}x_a") if delimiter.strip() == "," else ""
+    rows = [[f"{value:.3f}".replace(".", decimal) for value in row] for row in TABLE]
+    lines = [delimiter.join(f"{mark}{cell}{mark}" for cell in row) + behind for row in rows]
+    if names:
+        lines.insert(0, delimiter.join(names) + behind.replace("x_a", "note"))
+    for place in draw(st.lists(st.integers(0, N), max_size=3)):
+        lines.insert(place, one("# why not", "% a comment", "// 2 axes, 3 g", ""))
+    end = one("\n", "\r\n", "\n\n")
+    text = end.join(lines) + one("", end)
+    content = text.encode(one("utf-8", "utf-8-sig", "utf-16", "utf-16-be"))
+    return (gzip.compress(content), ".csv.gz", options) if one(0, 1) else (content, ".csv", options)
+
+
+@settings(max_examples=120)
+@given(layouts())
+def test_text_in_any_layout_gives_the_same_numbers(layout):
+    content, suffix, options = layout
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"log{suffix}")
+        path.write_bytes(content)
+        log = open_log(path, **options)
+        np.testing.assert_array_equal(log.time, TIME)
+        np.testing.assert_array_equal(log.forces, FORCES)
+        leveled = CALIBRATION.apply(acs.read_log(path, **options))
+    pd.testing.assert_frame_equal(leveled[CALIBRATED], EXPECTED)
 
 
 @pytest.mark.parametrize(("name", "variable"), [("log", None), ("log.T", None), ("other", "log")])
@@ -86,17 +116,6 @@ def test_parquet_and_gzip(tmp_path):
     np.testing.assert_array_equal(open_log(tmp_path / "log.csv.gz").forces, FORCES)
 
 
-def test_units(tmp_path):
-    path = written(tmp_path, lines())
-    log = open_log(path, unit="g", **BY_PLACE)
-    np.testing.assert_allclose(log.forces, FORCES * STANDARD_GRAVITY)
-    log = open_log(path, unit="counts", scale=(0.1, 0.2, -0.3), offset=7, **BY_PLACE)
-    np.testing.assert_allclose(log.forces, (FORCES - 7) * (0.1, 0.2, -0.3))
-    np.testing.assert_allclose(open_log(path, time_unit="ms", **BY_PLACE).time, TIME * 1e-3)
-    log = open_log(path, columns=BY_PLACE["columns"], rate_hz=50)
-    np.testing.assert_allclose(log.time, np.arange(N) / 50)
-
-
 def test_three_columns_need_no_names(tmp_path):
     np.savetxt(tmp_path / "log.txt", FORCES, "%.3f")
     np.testing.assert_array_equal(open_log(tmp_path / "log.txt", rate_hz=1).forces, FORCES)
@@ -104,16 +123,12 @@ def test_three_columns_need_no_names(tmp_path):
 
 @pytest.mark.parametrize(("text", "row", "says"), [
     (changed(20, 2, "nan"), 20, "line 21, column 2 (fy): 'nan'"),
-    (changed(20, 3, "-inf"), 20, "line 21, column 3 (fz): '-inf'"),
     (changed(20, 1, "1.2.3"), 20, "line 21, column 1 (fx): '1.2.3'"),
     (changed(20, 1, ""), 20, "line 21, column 1 (fx): nothing"),
-    (changed(20, 0, ""), 20, "line 21, column 0 (time): nothing"),
     (changed(0, 0, ""), 0, "line 1, column 0 (time): nothing"),
     (changed(20, 1, "True"), 20, "line 21, column 1 (fx): 'True'"),
-    (changed(20, 1, "1e300"), 20, "line 21, column 1 (fx): '1e300'"),
     (changed(20, 1, "1e8"), 20, "line 21, column 1 (fx): '1e8'"),
     (changed(20, 1, "2147483647"), 20, "line 21, column 1 (fx): '2147483647'"),
-    (changed(20, 3, "1,5"), 20, "line 21, column 1 (fx): 5 columns instead of 4"),
     (changed(20, 3, "1,5,6"), 20, "line 21, column 1 (fx): 6 columns instead of 4"),
     (lines()[:-12], 49, "line 50, column 3 (fz): the line ends before it"),
     (changed(20, 2, "x").replace("\n", "\n\n"), 20, "line 41, column 2 (fy): 'x'"),

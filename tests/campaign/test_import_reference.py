@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calling import call, refusal, succeed
 
-from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.format import read_campaign
 
 G, RATE, HOLD = 9.80665, 25.0, 4.0
 QUARTER = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # x of the reference points right
@@ -100,15 +100,6 @@ def test_from_two_logs_to_the_sensor(plate, tmp_path):
     levels = -G * np.array([[0.3, 0.2, 0.93], [-0.4, 0.1, 0.91]])
     read = levels @ SMALL.T @ OF_SENSOR.T + [0.3, -0.2, 0.1]
     np.testing.assert_allclose((read - bias) @ matrix.T, levels, atol=0.02)
-
-
-def test_the_campaign_is_read_as_it_was_written(plate, tmp_path):
-    succeed(*given(plate, tmp_path / "c"))
-    campaign = read_campaign(tmp_path / "c")
-    write_campaign(campaign, tmp_path / "again", "parquet")
-    again = read_campaign(tmp_path / "again")
-    assert again.reference == campaign.reference
-    np.testing.assert_array_equal(again.angles, campaign.angles)
 
 
 def test_other_columns_and_times(plate, tmp_path):

@@ -64,13 +64,6 @@ def test_what_rounding_leaves_in_a_mean(ratio):
     assert noise_before_rounding(step, sd) == pytest.approx(ratio, rel=0.05, abs=0.005)
 
 
-def test_limits_of_rounding():
-    assert rounding_of_mean(0.1, 0.0) == pytest.approx(0.1 / np.sqrt(12), rel=1e-3)
-    assert rounding_of_mean(0.1, 0.2) == pytest.approx(0.0, abs=1e-9)
-    assert rounding_of_mean(0.0, 0.2) == 0.0
-    assert noise_before_rounding(0.0, 0.2) == pytest.approx(0.2)
-
-
 @pytest.mark.parametrize(("readings", "step"), [
     (np.arange(-5, 9) * 0.1, 0.1),
     (np.unique(np.round(np.arange(-64, 99) * G / 64, 2)), G / 64),  # the file rounds as well

@@ -327,6 +327,7 @@ class _Rows:
     def _read_header(self, before: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Names from the last line before the data, which may be a comment, and units below."""
         units: list[str] = []
+        unfit: list[str] = []
         for number, line in reversed([*enumerate(before, 1)]):
             text = line.strip(self._around).lstrip("".join(self._comments))
             if not text.strip(f" \t-=+|_{self.delimiter or ''}"):  # a rule, or nothing
@@ -337,19 +338,21 @@ class _Rows:
                 units, self.header = cells, (line.strip(),)
                 continue
             self._take_names(cells, rows)
-            if self.names is None:
-                if len(cells) > 2:
-                    self.notes.append(
-                        f"line {number} has {len(cells)} names for {self.width} columns, so these "
-                        "have numbers, from 0"
-                    )
+            if self.names is not None:
+                self.header += (line.strip(),)
+                if units:
+                    units += [""] * (self.width - len(units))
+                    self.names = [with_unit(*each) for each in zip(self.names, units, strict=False)]
+                    self.notes.append(f"units: in line {number + 1}, below the names")
+                return
+            if len(cells) > 2:
+                unfit.append(
+                    f"line {number} has {len(cells)} names for {self.width} columns, so these "
+                    "have numbers, from 0"
+                )
+            if not line.lstrip().startswith(self._comments):
                 break
-            self.header += (line.strip(),)
-            if units:
-                units += [""] * (self.width - len(units))
-                self.names = [with_unit(*each) for each in zip(self.names, units, strict=False)]
-                self.notes.append(f"units: in line {number + 1}, below the names")
-            return
+        self.notes += unfit[:1]
         if units:
             self._take_names(units, rows)
 
