@@ -1,8 +1,12 @@
-"""Numbers that pages quote from the score of the hidden effects, put in while the site is built.
+"""What pages quote of computed numbers, put in while the site is built.
 
-A page says ``{score: figure; campaigns}`` for what was measured in the row with this figure and
-these campaigns, ``{score: figure; campaigns; %}`` for the same in percent, and n or oracle % for
-their number and what the oracle reaches; ``{score: found; λ = 25; %}`` is of an effect by its size.
+A page says ``<!-- quotes.kept("logs", "xsens-mti") -->`` for a text of the golden set, and
+``{real-data: rms after}`` for a number of its part on public measurements.
+
+Of the score of the hidden effects it says ``{score: figure; campaigns}`` for what was measured in
+the row with this figure and these campaigns, ``{score: figure; campaigns; %}`` for the same in
+percent, and n or oracle % for their number and what the oracle reaches;
+``{score: found; λ = 25; %}`` is of an effect by its size.
 """
 
 import re
@@ -10,7 +14,7 @@ from decimal import Decimal
 from pathlib import Path
 
 SCORE = Path(__file__).parents[1] / "guides" / "hidden-effects-score.md"
-CLAIMS = Path(__file__).parents[2] / "tests/golden/paper/claims-command.txt"
+GOLDEN = Path(__file__).parents[2] / "tests/golden"
 QUOTE = re.compile(r"\{score:\s([^;}]+);\s([^;}]+)(?:;\s([^;}]+))?\}")
 
 
@@ -39,12 +43,23 @@ def quoted(figure, campaigns, what="", score=None):
     raise ValueError(f"{SCORE.name} has no {figure!r} of {campaigns!r}")
 
 
+def kept(part, name):
+    """A text of the golden set."""
+    return (GOLDEN / part / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def number(name):
+    """A number that was computed of public measurements, or a list of words."""
+    return dict(line.split(": ", 1) for line in kept("real-data", "numbers").splitlines())[name]
+
+
 def claims():
     """The claims of the paper, as the golden set has them."""
-    table = CLAIMS.read_text(encoding="utf-8").partition("> |")[2].partition("\n>\n")[0]
+    table = kept("paper", "claims-command").partition("> |")[2].partition("\n>\n")[0]
     return "|" + table.replace("\n> ", "\n")
 
 
 def fill(markdown):
     """Put the numbers into a page."""
+    markdown = re.sub(r"\{real-data: ([^}]+)\}", lambda quote: number(quote[1]), markdown)
     return QUOTE.sub(lambda quote: quoted(*(part for part in quote.groups() if part)), markdown)

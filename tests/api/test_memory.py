@@ -158,14 +158,3 @@ def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     (tmp_path / "simulated/simulation.json").unlink()
     with pytest.raises(acs.InputError, match="is not empty"):
         result.save(tmp_path / "simulated")
-
-
-def test_a_truth_is_in_si_or_with_its_unit():
-    given = {"model": "bias-scale", "scheme": "faces-6", "approach": "robot"}
-    given |= {"sigma": 1e-3, "replicates": 2}
-    numbers, texts = (
-        acs.simulate(**given, truth=truth).parameters
-        for truth in ({"s_x": 2e-4, "b_y": -0.05}, {"s_x": "200 ppm", "b_y": "-50 mm/s^2"})
-    )
-    pd.testing.assert_frame_equal(numbers, texts)
-    assert numbers.loc[["s_x", "b_y"], "truth"].tolist() == [2e-4, -0.05]

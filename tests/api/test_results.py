@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 from calling import call, refusal, succeed
+from log_helpers import session
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 from places import ROOT
@@ -29,13 +30,8 @@ VERBS = ("calibrate", "diagnose", "compare", "history", "lot")
 
 def logged():
     """A log of 24 holds with a turn before each, of a sensor with a known bias."""
-    rng = np.random.default_rng(1)
-    forces = -9.80795 * get_scheme("fibonacci-24").directions
-    rows = []
-    for before, after in zip(np.roll(forces, 1, axis=0), forces, strict=True):
-        rows += [np.linspace(before, after, 100), np.tile(after, (400, 1))]
-    readings = np.concatenate(rows) + BIAS
-    readings += 0.005 * rng.standard_normal(readings.shape)
+    held = -9.80795 * get_scheme("fibonacci-24").directions + BIAS
+    readings, _ = session(sigma=0.005, moving=100, forces=held)
     return pd.DataFrame(readings, columns=["ax", "ay", "az"])
 
 
@@ -329,28 +325,18 @@ def test_the_front_door_is_light_and_complete():
 WRONG = {
     "acs.read_log(3)": "log: expected a path or a DataFrame, not 3",
     "acs.read_log('none.csv')": "none.csv: no such file",
-    r"acs.read_log('\0')": "no name of a file",
-    r"acs.read_log('a\ud800')": "no name of a file",
-    "acs.read_log('x' * 5000)": "too long for the name of a file",
-    "acs.read_log(table, rate='fast')": "rate: expected a number, as 2Hz",
     "acs.read_log(table, columns=['ax'])": "columns: expected a mapping",
-    "acs.find_holds({'fx': 1})": "log: expected a path",
     "acs.find_holds(acs.read_log(table, columns={'fx': 'a', 'fy': 'b', 'fz': 'c'}))": "'a'",
     "acs.read_campaign(None)": "folder: expected a path, not None",
-    "acs.read_log(table.assign(note=[1, 'x'] * 6000))": "log: the DataFrame cannot be a log",
+    "acs.read_log(table.assign(note=[1, 'x'] * 6050))": "log: the DataFrame cannot be a log",
     "acs.find_holds(table / 9.8)": "DataFrame: which column is time?",
     "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g, not m/s^2; give `unit` g",
-    "acs.apply(one, acs.read_log(table, **HOW), sigma='loud')": "sigma: expected a number, as 2mm",
     "acs.simulate_campaign(effects=3)": "effects: expected the name of an effect",
     "acs.calibrate(3)": "campaign: expected a Campaign",
-    "acs.calibrate(folder / 'none')": "none",
-    "acs.diagnose({})": "campaign: expected a Campaign",
     "acs.diagnose(folder / 'sensor-0', replicates=3)": "replicates: must be from 100",
     "acs.read_calibration(folder)": "no such file",
     "acs.compare(one, 3)": "second: expected what `calibrate` or",
-    "acs.compare(one, one, tilt_range='5 s')": "tilt_range:",
     "acs.history(calibrations[:2])": "date",
-    "acs.history(calibrations[:3])": "date: missing",
     "acs.history(calibrations[:3], dates=['2025-01-01'])": "1 date for 3 calibrations",
     "acs.lot([folder / 'sensor-0'])": "two sensors or more",
     "acs.export(one, form='x')": "unknown form 'x'",
@@ -361,11 +347,9 @@ WRONG = {
     "acs.plan(tilt_accuracy=1e-4, sigma=1, max_positions=3)": "max_positions: must be from 4",
     "acs.plan(tilt_accuracy=1e-4, sigma=1, schemes=3)": "schemes: expected the name of a scheme",
     "acs.simulate('m', 'mclaren-24', 'robot', sigma=1e-3)": "unknown",
-    "acs.simulate('bias', 'mclaren-24', 'robot', sigma=None)": "sigma: expected a number",
     "acs.simulate('bias', [], 'robot', sigma=1e-3)": "scheme: none is given",
     "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'s_x': 1})": "parameter of the truth",
     "acs.simulate('bias', 'faces-6', 'robot', sigma=1, truth={'b_x': ''})": "truth: b_x: expected",
-    "acs.simulate('bias', 'faces-6', 'robot', sigma=1, replicates=1)": "replicates: must be from 2",
 }
 
 

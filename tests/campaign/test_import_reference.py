@@ -178,8 +178,6 @@ def test_calibrations_that_tell_no_angles(plate, tmp_path):
     ("BOTH --block 100", "--block"),
     ("BOTH --robot-sigma 3mgon", "--robot-sigma"),
     ("BOTH --reference-columns fx=ax,fw=az", "--reference-columns: fw"),
-    ("BOTH --reference-columns ax,ay", "--reference-columns: expected"),
-    ("BOTH --reference-offset nan", "--reference-offset"),
 ])  # fmt: skip
 def test_options_that_do_not_go_together(plate, tmp_path, words, part):
     words = words.replace("BOTH", "--reference-log LOG --reference FILE")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from calling import succeed
-from log_helpers import find_holds, opened, write
+from log_helpers import find_holds, opened, session, write
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY as G
@@ -15,39 +15,30 @@ from accelstudy.campaign.importing.noise import (
     step_of,
 )
 from accelstudy.campaign.importing.settings import ImportSettings
+from accelstudy.schemes import get_scheme
 
 BIAS, SCALE = np.array([0.12, -0.08, 0.2]), 1 + 1e-6 * np.array([4000, -3000, 6000])
 
 
-def log_in_steps(step, noise=0.02, seed=1, still=500, moving=200):
-    """A log in 26 attitudes, read in steps; the faces, edges and corners of a cube, by hand."""
-    rng = np.random.default_rng(seed)
-    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
-    pieces = []
-    for direction in grid[np.any(grid != 0, axis=1)] + 0.02 * rng.standard_normal((26, 3)):
-        force = SCALE * G * direction / np.linalg.norm(direction) + BIAS
-        shake = 4 * np.sin(np.arange(moving)[:, None] * rng.uniform(0.05, 0.2, 3))
-        pieces += [force + shake, np.tile(force, (still, 1))]
-    forces = np.concatenate([*pieces, pieces[0]])
-    forces = forces + noise * rng.standard_normal(forces.shape)
-    return np.round(forces / step) * step if step else forces
-
-
-def truth(still=500, moving=200):
-    """Rows of the log within the holds, (26, still)."""
-    return moving + np.arange(26)[:, None] * (still + moving) + np.arange(still)
+def log_in_steps(step, noise=0.02):
+    """A log in 26 attitudes, read in steps, and its true forces; the cube is turned by hand."""
+    rng = np.random.default_rng(7)
+    held = get_scheme("faces-edges-corners-26").directions + 0.02 * rng.standard_normal((26, 3))
+    held = SCALE * G * held / np.linalg.norm(held, axis=1, keepdims=True) + BIAS
+    forces, _ = session(sigma=noise, still=500, forces=held)
+    return np.round(forces / step) * step if step else forces, held
 
 
 @pytest.mark.parametrize("step", [0.1, G / 64])
 @pytest.mark.parametrize("noise", [0.001, 0.02, 0.05])
 def test_all_holds_of_coarse_readings_are_found_and_their_sigma_is_right(tmp_path, step, noise):
     """The error of the means, known here, is within what their sigma says."""
-    exact, read = log_in_steps(0.0, noise=0.0), log_in_steps(step, noise)
+    read, exact = log_in_steps(step, noise)
     holds = find_holds(opened(tmp_path, read))
     assert len(holds.table) == 26
     assert not holds.warnings or "does not change" not in "".join(holds.warnings)
     np.testing.assert_allclose(holds.windows.steps, step, rtol=1e-5)
-    error = holds.means - exact[truth()].mean(axis=1)
+    error = holds.means - exact
     # 78 errors: their rms is known to 8 %, the noise before rounding not much better.
     assert np.sqrt(np.mean(error**2)) == pytest.approx(holds.noise.sigma, rel=0.4)
 
@@ -76,25 +67,24 @@ def test_the_step_of_readings(readings, step):
     assert step_of(readings) == pytest.approx(step, rel=1e-3)
 
 
-def test_the_step_is_said_kept_and_counts_in_the_verdict(tmp_path):
-    path = write(tmp_path, log_in_steps(0.1))
+@pytest.mark.parametrize("step", [0.1, 0.001])
+def test_the_step_is_said_kept_and_counts_in_the_verdict(tmp_path, step):
+    """Of a fine log nothing is said."""
+    path = write(tmp_path, log_in_steps(step)[0])
     result = succeed("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure")
-    assert "quantisation: readings in steps of 0.1 m/s²" in result.output
+    said = "quantisation: readings in steps of 0.1 m/s²" if step == 0.1 else "quantisation"
+    assert (said in result.output) == (step == 0.1)
     assert "does not change" not in result.output
     campaign = read_campaign(tmp_path / "c")
+    if step < 0.1:
+        assert campaign.resolution is None
+        return
     np.testing.assert_allclose(campaign.resolution, 0.1)
     # Noise of 20 mm/s² lets some 10 of the 29 mm/s² of plain rounding through.
     assert 0.007 < campaign.sigma_force < 0.014
     calibrated = succeed("calibrate", tmp_path / "c", "--out", tmp_path / "r").output
     assert "ACCEPTED" in calibrated
     assert "quantisation" in calibrated
-
-
-def test_a_fine_log_says_nothing_of_its_steps(tmp_path):
-    path = write(tmp_path, log_in_steps(0.001))
-    result = succeed("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure")
-    assert "quantisation" not in result.output
-    assert read_campaign(tmp_path / "c").resolution is None
 
 
 # --- Saturation ----------------------------------------------------------------------------------
@@ -130,15 +120,8 @@ def test_with_a_range_only_the_range_counts(tmp_path):
 
 
 def test_short_rests_are_counted_with_the_option_that_takes_them(tmp_path):
-    rng = np.random.default_rng(2)
-    pieces = []
-    for i in range(12):
-        force = rng.standard_normal(3)
-        force *= G / np.linalg.norm(force)
-        shake = 4 * np.sin(np.arange(150)[:, None] * rng.uniform(0.05, 0.2, 3))
-        pieces += [force + shake, np.tile(force, (400 if i % 4 == 0 else 200, 1))]
-    forces = np.concatenate([*pieces, pieces[0]])
-    path = write(tmp_path, forces + 0.02 * rng.standard_normal(forces.shape))
+    forces, _ = session(2, holds=12, still=[400, 200, 200, 200], moving=150)
+    path = write(tmp_path, forces)
     words = ("import", path, "--rate", 100, "--out", tmp_path / "c", "--no-figure", "--force")
     result = succeed(*words)
     assert "(3 positions)" in result.stdout

@@ -220,11 +220,9 @@ def test_claims(tmp_path):
 @pytest.mark.parametrize(("arguments", "expected"), [
     (["scheme", "mclaren-42"], "unknown scheme 'mclaren-42'"),
     (["scheme", "../etc"], "../etc: no such file"),
-    (["schemes", "faces-6", "nothing"], "unknown scheme 'nothing'"),
     (["schemes", "--model", "bias-scales"], "did you mean 'bias-scale'?"),
     (["schemes", "--approach", "robots"], "did you mean 'robot'?"),
     (["cells", "/nowhere/study.yaml"], "/nowhere/study.yaml: no such file"),
-    (["claims", "/nowhere"], "/nowhere/claims.parquet: no such file"),
 ])  # fmt: skip
 def test_unknown_names_and_files(arguments, expected):
     assert expected in refusal(*arguments)

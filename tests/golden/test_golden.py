@@ -7,15 +7,17 @@ import re
 
 import pytest
 from golden import compare, kept_of, report, same_number
-from golden_parts import PAGES, PARTS, QUICK
-from places import ROOT
+from golden_parts import OF_DATA, PAGES, PARTS, QUICK
+from places import ROOT, needs_data
 from transcript import commands_of_page, masked
 
 from accelstudy.commands.main import main
 
 
 @pytest.mark.usefixtures("drawn")
-@pytest.mark.parametrize("part", QUICK)
+@pytest.mark.parametrize(
+    "part", [pytest.param(part, marks=[needs_data] * (part in OF_DATA)) for part in QUICK]
+)
 def test_what_is_kept_still_comes_out(part, capsys):
     same = report(part)
     said = capsys.readouterr().out

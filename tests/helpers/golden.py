@@ -23,7 +23,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from golden_parts import PARTS
+from golden_parts import OF_DATA, PARTS
 from places import DATA, ROOT
 from transcript import FORK, import_all
 
@@ -143,9 +143,9 @@ def main(*arguments):
     parts = [name for name in arguments if name != "--renew"] or ([] if renew else [*PARTS])
     if not parts or not {*parts} <= PARTS.keys():
         sys.exit(f"name parts of {', '.join(PARTS)}")
-    if "logs" in parts and not DATA.is_dir():
-        print(f"logs: not compared, as there is no {DATA}; set ACCELSTUDY_SHARED")
-        parts.remove("logs")
+    if not DATA.is_dir():
+        print(f"{', '.join(OF_DATA)}: not compared; there is no {DATA}: set ACCELSTUDY_SHARED")
+        parts = [part for part in parts if part not in OF_DATA]
     import_all()
     with ProcessPoolExecutor(int(os.environ.get("CORES", 2)), FORK) as pool:
         same = [*pool.map(partial(report, renew=renew), parts)]

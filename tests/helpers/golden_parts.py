@@ -220,10 +220,9 @@ def logs(folder) -> Texts:
 
     And what the page about them says of the one whose diagnosis takes longest.
     """
-    from real_data import LONGEST
-    from real_data import told as told_of
+    from real_data import of_the_longest
 
-    yield f"{LONGEST}-diagnosed", "".join(f"{line}\n" for line in told_of(LONGEST))
+    yield from of_the_longest()
     shell = Shell(folder)
     (folder / "resources").mkdir()
     (folder / "resources/public").symlink_to(DATA)
@@ -235,6 +234,13 @@ def logs(folder) -> Texts:
             ends = {"first_sample": first, "last_sample": first + table["n_samples"] - 1}
             told += rows_text(table[["position"]].assign(**ends))
         yield name, told
+
+
+def real_data(folder) -> Texts:
+    """What the page about public measurements quotes of the others."""
+    from real_data import texts
+
+    yield from texts(folder)
 
 
 # --- studies -------------------------------------------------------------------------------------
@@ -304,8 +310,11 @@ PARTS: dict[str, Callable[[Path], Texts]] = {
     "advise": advise,
     "lots": lots,
     "logs": logs,
+    "real-data": real_data,
     "help": helps,
 }
 """Those that take longest first."""
-QUICK = ("readme", "help")
+OF_DATA = ("logs", "real-data")
+"""Parts that need the public measurements."""
+QUICK = ("readme", "help", "real-data")
 """Parts that `make test` compares, too."""
