@@ -1,13 +1,10 @@
 """Logs of equal blocks: each is a position, unless the sensor moves within it."""
 
 import numpy as np
-import pandas as pd
 import pytest
-from calling import succeed
+from log_helpers import table
 
-from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.logs import import_log
-from accelstudy.campaign.importing.settings import ImportSettings
+import accelstudy as acs
 
 G, SIZE, COUNT, SIGMA = 9.80665, 40, 14, 0.03
 
@@ -21,21 +18,13 @@ def samples():
     return np.repeat(forces, SIZE, axis=0) + SIGMA * rng.standard_normal((COUNT * SIZE, 3))
 
 
-def write(folder, samples, unit=1.0, **columns):
-    path = folder / "log.csv"
-    table = pd.DataFrame(samples / unit, columns=["u", "v", "w"]).assign(**columns)
-    table.to_csv(path, index=False)
-    return path
+def imported(samples, unit="m/s^2", **columns):
+    log = table(samples / (G if unit == "g" else 1), **columns)
+    return acs.find_holds(log, block=SIZE, unit=unit)
 
 
-SETTINGS = {"columns": {"fx": "u", "fy": "v", "fz": "w"}, "block": SIZE}
-WORDS = ("--columns", "fx=u,fy=v,fz=w", "--block", SIZE)
-
-
-def test_each_block_is_a_position_without_a_time(tmp_path, samples):
-    path = write(tmp_path, samples, unit=G, temperature=np.linspace(20, 30, len(samples)))
-    succeed("import", path, *WORDS, "--unit", "g", "--out", tmp_path / "out")
-    campaign = read_campaign(tmp_path / "out")
+def test_each_block_is_a_position_without_a_time(samples):
+    campaign = imported(samples, "g", temperature=np.linspace(20, 30, len(samples)))
     blocks = samples.reshape(COUNT, SIZE, 3)
     np.testing.assert_allclose(campaign.forces, blocks.mean(axis=1), atol=1e-6)
     np.testing.assert_allclose(campaign.sd, blocks.std(axis=1, ddof=1), rtol=1e-6)
@@ -44,20 +33,17 @@ def test_each_block_is_a_position_without_a_time(tmp_path, samples):
     assert np.diff(campaign.temperature) == pytest.approx(10 / COUNT, rel=0.01)
     # White noise: one mean has σ/√40, by the Allan deviation to some 20 %.
     assert campaign.sigma_force == pytest.approx(SIGMA / np.sqrt(SIZE), rel=0.3)
-    assert (tmp_path / "out/segmentation.png").exists()
 
 
-def test_a_column_of_time_tells_that_of_the_blocks(tmp_path, samples):
+def test_a_column_of_time_tells_that_of_the_blocks(samples):
     time = np.repeat(60.0 * np.arange(COUNT), SIZE) + np.tile(np.arange(SIZE) / 100, COUNT)
-    path = write(tmp_path, samples, time=time)
-    campaign, _ = import_log(path, ImportSettings(**SETTINGS))
-    assert np.diff(campaign.time) == pytest.approx(60.0)
+    assert np.diff(imported(samples, time=time).time) == pytest.approx(60.0)
 
 
-def test_a_block_in_which_the_sensor_moves_is_left_out(tmp_path, samples):
+def test_a_block_in_which_the_sensor_moves_is_left_out(samples):
     moved = samples.copy()
     moved[5 * SIZE + 20 : 6 * SIZE] += [0.3, 0.0, 0.0]
-    campaign, _ = import_log(write(tmp_path, moved), ImportSettings(**SETTINGS))
+    campaign = imported(moved)
     assert [*campaign.reasons] == [6]
     assert campaign.reasons[6].startswith("the sensor moves: its parts scatter by 0.1")
     assert campaign.positions.tolist() == [n for n in range(1, COUNT + 1) if n != 6]

@@ -3,19 +3,20 @@
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call, refusal, succeed
-from log_helpers import RATE, G, open_log, session, write
+from calling import refused, succeed
+from log_helpers import RATE, G, open_log, session, table, write
 from places import DATA, needs_data
 from stand_ins import drawn
 
+import accelstudy as acs
 from accelstudy.api.campaigns import files_of
 from accelstudy.basics.units import GON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
-from accelstudy.campaign.importing.logs import import_log, import_sensors, write_imported
+from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.importing.public import import_settings, public_file
-from accelstudy.campaign.importing.settings import ImportSettings, parse_settings
+from accelstudy.campaign.importing.settings import parse_settings
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 
@@ -37,26 +38,18 @@ def turned():
 def test_times_since_1970(tmp_path, turned, unit, kind):
     forces, _ = turned
     ticks = np.arange(len(forces)) / RATE * PER_SECOND[unit]
-    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
-    whole = unit in ("us", "ns")
-    table["time"] = ticks.astype(np.int64) + SINCE_1970[unit] if whole else ticks + SINCE_1970[unit]
-    path = tmp_path / f"log.{kind}"
-    (table.to_parquet if kind == "parquet" else table.to_csv)(path, index=False)
+    whole = ticks.astype(np.int64) if unit in ("us", "ns") else ticks
+    log, path = table(forces, time=whole + SINCE_1970[unit]), tmp_path / f"log.{kind}"
+    (log.to_parquet if kind == "parquet" else log.to_csv)(path, index=False)
     log = open_log(path, time_unit=unit)
-    time = log.time
-    np.testing.assert_allclose(time, ticks / PER_SECOND[unit], atol=1e-6)
+    np.testing.assert_allclose(log.time, ticks / PER_SECOND[unit], atol=1e-6)
     assert 1 / log.step == pytest.approx(RATE, rel=1e-4)
 
 
-def test_the_unit_of_time_is_suggested(tmp_path, turned):
-    forces, _ = turned
-    time = SINCE_1970["us"] + 10_000 * np.arange(len(forces))
-    path = write(tmp_path, forces, time)
-    line = refusal("import", path, "--out", tmp_path / "out")
-    assert "if its times are in us, there are 100 samples per second" in line
-    assert "give --time-unit us" in line
-    succeed("import", path, "--out", tmp_path / "out", "--time-unit", "us", "--no-figure")
-    assert read_campaign(tmp_path / "out").log.time_unit == "us"
+def test_the_unit_of_time_is_suggested(turned):
+    time = SINCE_1970["us"] + 10_000 * np.arange(len(turned[0]))
+    with refused("if its times are in us, there are 100 samples per second", "give `time_unit` us"):
+        acs.find_holds(table(turned[0], time=time))
 
 
 def test_the_rate_is_that_of_the_samples(tmp_path, turned):
@@ -66,36 +59,27 @@ def test_the_rate_is_that_of_the_samples(tmp_path, turned):
     steps = np.where(rng.random(len(forces)) < 0.8, 0.0112, 0.0052)
     time = np.cumsum(steps)
     time[len(time) // 2 :] += 500
-    log = open_log(write(tmp_path, forces, time))
-    assert log.step == pytest.approx(np.mean(steps), rel=1e-3)
-    campaign, holds = import_log(tmp_path / "log.parquet", ImportSettings())
+    path = write(tmp_path, forces, time)
+    assert open_log(path).step == pytest.approx(np.mean(steps), rel=1e-3)
+    campaign = acs.find_holds(path)
     assert any("1 gap in time" in text for text in campaign.warnings)
-    assert len(holds.table) in (8, 9)
+    assert campaign.n_positions in (8, 9)
 
 
 # --- Axes, units, conditions ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("unit", ["m/s^2", "counts"])
-def test_frames(tmp_path, turned, unit):
+def test_frames(turned, unit):
     """A log in other axes makes the same campaign; counts stay counts, whatever their sign."""
     forces, _ = turned
-    frame = parse_frame("flu")
-    raw = frame.from_frd(forces)
-    scale, offset = np.array([0.001, 0.002, 0.003]), np.array([100.0, 200.0, 300.0])
-    options = []
+    raw, how = parse_frame("flu").from_frd(forces), {"rate": RATE, "frame": "FLU"}
     if unit == "counts":
-        raw = raw / scale + offset
-        options = ["--scale", "0.001,0.002,0.003", "--offset", "100,200,300"]
-    result = succeed(
-        "import",
-        *(write(tmp_path, raw), "--out", tmp_path / "out", "--rate", 100, "--frame", "FLU"),
-        *("--unit", unit, "--no-figure", *options),
-    )
-    assert "axes: flu in the log" in result.stdout
-    found = read_campaign(tmp_path / "out")
-    (tmp_path / "plain").mkdir()
-    expected, _ = import_log(write(tmp_path / "plain", forces), ImportSettings(rate_hz=100))
+        raw = raw / [0.001, 0.002, 0.003] + [100.0, 200.0, 300.0]
+        how |= {"unit": unit, "scale": "0.001,0.002,0.003", "offset": "100,200,300"}
+    found = acs.find_holds(table(raw), **how)
+    assert any("axes: flu in the log" in note for note in found.notes)
+    expected = acs.find_holds(table(forces), rate=RATE)
     np.testing.assert_allclose(found.forces, expected.forces, rtol=1e-9)
     np.testing.assert_allclose(found.sd, expected.sd, rtol=1e-9)
     assert found.log.frame == "flu"
@@ -103,30 +87,22 @@ def test_frames(tmp_path, turned, unit):
         np.testing.assert_array_equal(found.nominal.scale, [0.001, -0.002, -0.003])
 
 
-def test_temperature_vibration_and_range(tmp_path, turned):
+def test_temperature_vibration_and_range(turned):
     forces, edges = turned
     n = len(forces)
-    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
     # The thermometer is slower than the accelerometer.
-    table["temp"] = np.where(np.arange(n) % 10 == 0, np.linspace(10, 20, n), np.nan)
-    table["shake"] = 0.3
-    table.to_parquet(tmp_path / "log.parquet")
+    warm = np.where(np.arange(n) % 10 == 0, np.linspace(10, 20, n), np.nan)
     limit = 0.97 * np.abs(forces[edges[0, 0] : edges[0, 1]].mean(axis=0)).max()
-    result = succeed(
-        "import",
-        *(tmp_path / "log.parquet", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
-        *("--columns", "vibration=shake", "--range", f"{limit / 9.80665:.6f}g"),
-    )
-    assert "left out: the sensor is saturated there" in result.stderr
-    campaign = read_campaign(tmp_path / "out")
+    how = {"rate": RATE, "columns": "vibration=shake", "range": f"{limit / 9.80665:.6f}g"}
+    campaign = acs.find_holds(table(forces, temp=warm, shake=0.3), **how)
+    assert any("left out: the sensor is saturated there" in text for text in campaign.warnings)
     assert campaign.full_range == pytest.approx(limit, rel=1e-5)
     assert campaign.n_positions < len(edges)
     expected = 10 + 10 * campaign.time * RATE / (n - 1)
     np.testing.assert_allclose(campaign.temperature, expected, atol=0.05)
     np.testing.assert_allclose(campaign.vibration, 0.3)
-    table.loc[edges[1, 0] : edges[1, 1], "temp"] = np.nan
-    table.to_parquet(tmp_path / "log.parquet")
-    campaign, _ = import_log(tmp_path / "log.parquet", ImportSettings(rate_hz=100))
+    warm[edges[1, 0] : edges[1, 1]] = np.nan
+    campaign = acs.find_holds(table(forces, temp=warm), rate=RATE)
     assert campaign.temperature is None
     assert any("hold 2 has no temperature" in text for text in campaign.warnings)
 
@@ -166,12 +142,11 @@ def test_sigma_does_not_depend_on_the_offset():
 # --- What was never still ------------------------------------------------------------------------
 
 
-def test_a_machine_that_hums_is_still(tmp_path):
+def test_a_machine_that_hums_is_still():
     rng = np.random.default_rng(1)
     hum = 2 * np.sin(2 * np.pi * 29.3 * np.arange(9000) / RATE)[:, None] * [1, 0.3, 0.5]
-    path = write(tmp_path, [0, 0, -G] + hum + 0.02 * rng.standard_normal((9000, 3)))
-    _, holds = import_log(path, ImportSettings(rate_hz=RATE))
-    assert len(holds.table) == 1
+    forces = [0, 0, -G] + hum + 0.02 * rng.standard_normal((9000, 3))
+    assert acs.find_holds(table(forces), rate=RATE).n_positions == 1
 
 
 # --- Holds by hand -------------------------------------------------------------------------------
@@ -227,15 +202,12 @@ def test_one_file_per_position(tmp_path, turned, clock):
     for i, (start, end) in enumerate(edges[:5]):
         piece = slice(start - 100, end + 100) if i != 2 else slice(start - 100, start + 60)
         time = np.arange(len(forces))[piece] / RATE
-        table = pd.DataFrame(forces[piece], columns=["fx", "fy", "fz"])
-        if clock != "rate":
-            table.insert(0, "t", time if clock == "one" else time - time[0])
-        table.to_csv(folder / f"pos{9 + i}.csv", index=False)
-    options = {"rate_hz": 100} if clock == "rate" else {}
+        clocks = {"one": {"t": time}, "each": {"t": time - time[0]}, "rate": {}}
+        table(forces[piece], **clocks[clock]).to_csv(folder / f"pos{9 + i}.csv", index=False)
     files = files_of([folder])
     assert [path.name for path in files] == [f"pos{9 + i}.csv" for i in range(5)]
     assert files_of(sorted(folder.iterdir())) == files == files_of([folder / "pos*.csv"])
-    ((campaign, _),) = import_sensors(files, ImportSettings(**options)).values()
+    campaign = acs.find_holds(folder, rate=100 if clock == "rate" else None)
     assert campaign.positions.tolist() == [1, 2, 4, 5]
     assert "5, with the longest hold of each as one position" in campaign.notes[2]
     assert (campaign.time is not None) == (clock == "one")
@@ -253,34 +225,22 @@ def test_one_file_per_position(tmp_path, turned, clock):
 
 
 @pytest.mark.parametrize(("frame", "unit"), [("frd", "gon"), ("flu", "deg"), ("flu", "rad")])
-def test_means_with_a_robot(tmp_path, frame, unit):
+def test_means_with_a_robot(frame, unit):
     roll, pitch, yaw = np.random.default_rng(1).uniform(-60, 60, (3, 12)) * GON
     forces = np.column_stack(specific_force(roll, pitch, G))
     axes = parse_frame(frame)
     size = {"gon": GON, "deg": np.pi / 180, "rad": 1.0}[unit]
-    table = pd.DataFrame(axes.from_frd(forces), columns=["fx", "fy", "fz"])
-    for name, angle, sign in zip(
-        ("roll", "pitch", "yaw"), (roll, pitch, yaw), axes.signs, strict=True
-    ):
-        table[name] = sign * angle / size
-    table.to_csv(tmp_path / "means.csv", index=False)
-    arguments = (tmp_path / "means.csv", "--means", "--frame", frame)
-    succeed(
-        "import",
-        *(*arguments, "--out", tmp_path / "out", "--robot-sigma", "3.2mgon", "--robot-unit", unit),
-    )
-    campaign = read_campaign(tmp_path / "out")
+    names = zip(("roll", "pitch", "yaw"), (roll, pitch, yaw), axes.signs, strict=True)
+    angles = {name: sign * angle / size for name, angle, sign in names}
+    log, how = table(axes.from_frd(forces), **angles), {"means": True, "frame": frame}
+    campaign = acs.find_holds(log, robot_sigma="3.2mgon", robot_unit=unit, **how)
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
     np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
     # Of a log it tells the axes, and not the columns.
     assert campaign.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
-    wrong = "rad" if unit != "rad" else "gon"
-    unit = {"gon": "gon", "deg": "degrees", "rad": "radians"}[unit]
-    line = refusal(
-        "import",
-        *(*arguments, "--out", tmp_path / "new", "--robot-sigma", "3.2mgon", "--robot-unit", wrong),
-    )
-    assert f"the robot's angles are in {unit}, not in {wrong}" in line
-    result = call("import", *arguments, "--out", tmp_path / "new")
-    assert "--robot-sigma takes them for the robot's" in result.stderr
+    wrong, right = "rad" if unit != "rad" else "gon", {"deg": "degrees", "rad": "radians"}
+    with refused(f"the robot's angles are in {right.get(unit, unit)}, not in {wrong}"):
+        acs.find_holds(log, robot_sigma="3.2mgon", robot_unit=wrong, **how)
+    said = " ".join(acs.find_holds(log, **how).warnings)
+    assert "`robot_sigma` takes them for the robot's" in said

@@ -39,13 +39,14 @@ def session(seed=1, holds=8, sigma=0.02, still=400, moving=200, forces=None):
     return forces + sigma * rng.standard_normal(forces.shape), np.array(edges)
 
 
+def table(forces, **more):
+    return pd.DataFrame(forces, columns=["fx", "fy", "fz"]).assign(**more)
+
+
 def write(folder, forces, time=None):
     """Parquet, as it is fast and keeps every digit."""
     path = folder / "log.parquet"
-    table = pd.DataFrame(forces, columns=["fx", "fy", "fz"])
-    if time is not None:
-        table["time"] = time
-    table.to_parquet(path)
+    table(forces, **({} if time is None else {"time": time})).to_parquet(path)
     return path
 
 
