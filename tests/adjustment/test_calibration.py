@@ -13,18 +13,10 @@ import pytest
 from function_conditions import FunctionConditions
 from hypothesis import given
 from hypothesis import strategies as st
-from quality_helpers import (
-    BOTH,
-    GRAVITY,
-    NINE,
-    ROBOT,
-    STANDARD_ERRORS,
-    TRUTH,
-    draw,
-    ideal_session,
-)
+from quality_helpers import TRUTH, draw, ideal_session
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
+from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 
 from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.basics.errors import InputError

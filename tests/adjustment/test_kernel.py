@@ -4,8 +4,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from quality_helpers import GRAVITY, NINE, ROBOT
 from study_helpers import grid, make_cells, simulated
+from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy import adjustment
 from accelstudy.adjustment.calibration import Block, CalibrationProblem

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usual import GRAVITY, NINE
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.linear_theory import LinearTheory
@@ -13,7 +14,6 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Errors, Noise, session
 
-NINE = get_model("bias-scale-nonorthogonality")
 TRUTH = np.array([0.05, 0.01, -0.03, 2e-4, -1e-4, 3e-4, 2e-4, -4e-4, 7e-4])
 SCHEME = get_scheme("mclaren-24")
 CASES = [
@@ -110,6 +110,4 @@ def test_what_has_no_calibration_has_no_linear_theory():
     hopeless = observed.forces.copy()
     hopeless[0, 3] = np.nan
 
-    assert (
-        LinearTheory.of(NINE, get_approach("gravity"), replace(observed, forces=hopeless)) is None
-    )
+    assert LinearTheory.of(NINE, GRAVITY, replace(observed, forces=hopeless)) is None

@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 import pytest
-from quality_helpers import BOTH, GRAVITY, NINE, ROBOT, SIGMA, draw
+from quality_helpers import SIGMA, draw
 from stand_ins import composed
+from usual import BOTH, GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment import calibrate, calibration
 from accelstudy.adjustment.quality import (

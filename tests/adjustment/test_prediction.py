@@ -5,17 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from quality_helpers import (
-    BOTH,
-    GRAVITY,
-    NINE,
-    ROBOT,
-    SIGMA,
-    STANDARD_ERRORS,
-    draw,
-    ideal_session,
-    one,
-)
+from quality_helpers import SIGMA, draw, ideal_session, one
+from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import (

@@ -11,19 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
-from quality_helpers import (
-    BOTH,
-    GRAVITY,
-    NINE,
-    ROBOT,
-    SIGMA,
-    STANDARD_ERRORS,
-    draw,
-    ideal_session,
-    solutions,
-    with_error,
-)
+from quality_helpers import SIGMA, draw, ideal_session, solutions, with_error
 from scipy.stats import chi2, f, kstest, ncf, ncx2
+from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import (

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 import yaml
 from calling import succeed
-from matplotlib.figure import Figure
 from study_helpers import grid, run_study
 
 import accelstudy as acs
@@ -142,9 +141,6 @@ def test_every_calibration_of_a_study_is_in_a_dataset():
 
 def test_a_simulation_is_a_result_with_the_tables_of_a_study(tmp_path):
     result = acs.simulate("bias", "faces-6", ["gravity", "robot"], sigma="2mm/s^2", replicates=20)
-    assert (result.state, result.name) == ("converged", "2 cells")
-    assert [*result.to_frame()] == [*result.tilt]
-    assert result.plot(Figure().subplots()).has_data()
     result.save(tmp_path / "simulated")
     written = {path.stem: read_table(path) for path in (tmp_path / "simulated").glob("*.parquet")}
     assert set(written) == set(result.tables)

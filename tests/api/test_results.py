@@ -172,10 +172,8 @@ def test_campaigns_and_advice_are_those_of_the_commands(tmp_path):
     )
     np.testing.assert_allclose(acs.read_campaign(tmp_path / "six").forces, six.forces, rtol=1e-13)
     assert yaml.safe_load((tmp_path / "truth").read_text(encoding="utf-8")) == six.truth
-    acs.write_campaign(six, tmp_path / "copy")
     with pytest.raises(acs.InputError, match="is not empty"):
-        acs.write_campaign(six, tmp_path / "copy")
-    assert acs.read_campaign(tmp_path / "copy").forces.tolist() == six.forces.tolist()
+        acs.write_campaign(six, tmp_path / "six")
 
     said = call("advise", tmp_path / "six", "--tilt-accuracy", "1gon", "--model", "bias").stdout
     advice = acs.advise(tmp_path / "six", tilt_accuracy="1gon", model="bias")

@@ -82,11 +82,6 @@ def test_angles_in_degrees_are_for_people_only():
     assert "100 gon = 90°" in angle_note()
 
 
-def test_an_unknown_angle_unit_is_named():
-    with pytest.raises(UnknownNameError, match="unknown angle unit 'grad'"), angles_in("grad"):
-        pass
-
-
 @pytest.mark.parametrize(("unit", "said"), [("mgn", "; did you mean 'mgon'?"), ("ppm", "")])
 def test_an_unknown_unit_is_named_with_what_is_known(unit, said):
     with pytest.raises(UnknownNameError) as error:

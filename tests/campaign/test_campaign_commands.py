@@ -5,18 +5,14 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from calling import call, succeed
-from campaign_helpers import GRAVITY, NINE, simulated_campaign
+from calling import succeed
+from campaign_helpers import NINE, simulated_campaign
+from log_helpers import table
 from page_helpers import assert_sound, text_of
 
 import accelstudy as acs
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.words import verdict_lines as diagnosis_lines
 
 TRUTH = {"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 2e-4, "alpha_zx": 7e-4}
 
@@ -32,8 +28,7 @@ def test_pages_say_in_which_axes_and_without_which_positions(tmp_path, command, 
     """The same sensor, logged in the axes of others, has the same parameters."""
     out, forces = tmp_path / "out", simulated_campaign(TRUTH).forces
     logged = [(-1 if "−" in way else 1) * forces[:, "xyz".index(way[-1])] for way in LAID[frame]]
-    table = pd.DataFrame(dict(zip(("fx", "fy", "fz"), logged, strict=True)))
-    table.to_csv(tmp_path / "means.csv", index=False)
+    table(np.transpose(logged)).to_csv(tmp_path / "means.csv", index=False)
     succeed("import", tmp_path / "means.csv", "--means", "--frame", frame, "--out", tmp_path / "c")
     write_campaign(read_campaign(tmp_path / "c").without({5: "moved"}), tmp_path / "c")
     result = succeed(command, tmp_path / "c", "--out", out)
@@ -81,8 +76,8 @@ def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold():
     up, level = 9.80665 * np.cos(beside), 9.80665 * np.sin(beside)
     f_b = np.column_stack([up, -level * np.sin(roll), -level * np.cos(roll)])
     readings = NINE.sense(f_b, NINE.vector(TRUTH)) + sigma * rng.standard_normal(f_b.shape)
-    log = pd.DataFrame(readings, columns=["fx", "fy", "fz"])
-    level = acs.calibrate(simulated_campaign(TRUTH), approach="robot").apply(log, sigma=sigma)
+    calibration = acs.calibrate(simulated_campaign(TRUTH), approach="robot")
+    level = calibration.apply(table(readings), sigma=sigma)
     said = " ".join(level.attrs["warnings"])
     assert "use the calibrated force" in said
     near = level["near_pole"].to_numpy()
@@ -99,7 +94,7 @@ def test_near_the_pole_the_rows_say_that_their_sigmas_do_not_hold():
     assert all(abs(ok[n:].mean() - 0.954) < 0.02 for ok in inside.values())
 
 
-def test_what_cannot_be_a_sensor_is_said(tmp_path):
+def test_what_cannot_be_a_sensor_is_said():
     """Counts with about half of their scale, and a bias of 0.48 g, fit perfectly.
 
     So no residual tells; import, calibrate and diagnose say it. A sensor of any data sheet passes
@@ -110,21 +105,18 @@ def test_what_cannot_be_a_sensor_is_said(tmp_path):
     level = np.sqrt(1 - z**2)
     f_b = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
     noise = 3e-4 * np.random.default_rng(2).standard_normal(f_b.shape)
-    scale, names = 9.80665 / 16384, ("fx", "fy", "fz")
     for offset, factor, said in ((0.0, 0.51, "s_x"), (0.48, 1.0, "b_x"), (0.2, 1.1, None)):
-        read = np.round(16384 * (f_b + noise + [offset, 0, 0]))
-        table, campaign = tmp_path / "means.csv", tmp_path / "c"
-        pd.DataFrame(read, columns=names).to_csv(table, index=False)
-        options = "--unit", "counts", "--scale", factor * scale, "--offset", 0, "--force"
-        imported = call("import", table, "--means", "--out", campaign, *options).output
+        log = table(np.round(16384 * (f_b + noise + [offset, 0, 0])))
+        how = {"unit": "counts", "scale": factor * 9.80665 / 16384, "offset": 0}
+        campaign = acs.find_holds(log, means=True, **how)
+        imported = " ".join(campaign.warnings)
         assert ("49 % less than gravity" in imported) == (said == "s_x")
-        assert ("check --scale and --offset" in imported) == (said == "s_x")
-        measured = read_campaign(campaign)
-        assessment = assess(fit_campaign(measured, NINE, GRAVITY))
-        assert assessment.state == ("cannot tell" if said is None else "implausible")
-        found = [verdict_lines(assessment)]
+        assert ("check `scale` and `offset`" in imported) == (said == "s_x")
+        calibration = acs.calibrate(campaign)
+        assert calibration.state == ("cannot tell" if said is None else "implausible")
+        found = [calibration.summary()]
         if said == "b_x":
-            found.append(diagnosis_lines(diagnose(measured, NINE)))
-        for lines in found:
-            assert (f"No sensor is like this: {said}" in " ".join(lines)) == (said is not None)
-            assert ("a wrong scale" in " ".join(lines)) == (said is not None)
+            found.append(acs.diagnose(campaign).summary())
+        for text in found:
+            assert (f"No sensor is like this: {said}" in text) == (said is not None)
+            assert ("a wrong scale" in text) == (said is not None)

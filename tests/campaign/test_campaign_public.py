@@ -131,14 +131,11 @@ def test_download_of_a_whole_file(tmp_path, server, fetch):
     ("missing", CONTENT, "cannot be downloaded: 404"),
     ("broken", CONTENT, "cannot be downloaded"),
     ("whole", b"other", "has another sha256"),
+    ("closed", CONTENT, "put the file file.log below"),
 ])  # fmt: skip
 def test_of_what_is_not_the_file_nothing_is_left(tmp_path, server, fetch, where, content, message):
+    if where == "closed":
+        server.server_close()
     with refused(message, "try again"):
         fetch(data(f"{server.url}/{where}/file.log", content))
     assert left(tmp_path) == []
-
-
-def test_a_source_that_does_not_answer(server, fetch):
-    server.server_close()
-    with refused("cannot be downloaded", "put the file file.log below"):
-        fetch(data(f"{server.url}/file.log"))

@@ -91,19 +91,6 @@ def rows_of(text, names):
     return {row[0]: row for row in map(str.split, text.splitlines()) if row and row[0] in names}
 
 
-@pytest.mark.parametrize(("model", "approach"), [("bias-scale", "gravity"), (NINE, "robot")])
-def test_schemes_with_a_model_and_an_approach(model, approach):
-    wanted, per_position = ("faces-6", "mclaren-24", "random-20-7"), 1 + 2 * (approach == "robot")
-    text = output("schemes", "--model", model, "--approach", approach, *wanted)
-    assert f"model {model}, approach {approach}" in text
-    rows, u = rows_of(text, wanted), get_model(model).n_parameters
-    assert [*rows] == [*wanted]
-    for name, row in rows.items():
-        n = get_scheme(name).n_positions
-        assert (int(row[1]), int(row[5])) == (n, per_position * n - u)
-        assert row[3].endswith(f"/{u}")
-
-
 def test_all_schemes_by_default():
     text, table = output("schemes"), output("schemes", "--quiet").strip("\n")
     rows = rows_of(text, scheme_names())

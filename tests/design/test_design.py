@@ -5,9 +5,9 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 from scheme_helpers import KNOWN, gravity_scale_correlation
+from usual import BOTH, GRAVITY, NINE, PAPER, ROBOT, TWELVE
 
 from accelstudy.adjustment import calibrate
-from accelstudy.approaches import get_approach
 from accelstudy.basics.units import MGON
 from accelstudy.design.closed_forms import (
     gravity_sigma,
@@ -23,21 +23,11 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
-NINE = get_model("bias-scale-nonorthogonality")
-TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
 QUADRATIC = get_model("bias-scale-nonorthogonality-quadratic")
 CUBIC = get_model("bias-scale-nonorthogonality-cubic")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 ANGLES = ("alpha_yz", "alpha_zy", "alpha_zx")
-BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 # bias (m/s²), scale, non-orthogonality (rad) in the order of the parameters
 KINDS = {"bias": slice(0, 3), "scale": slice(3, 6), "nonorthogonality": slice(6, 9)}
-TRUTH = NINE.vector(
-    {
-        **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
-        **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
-    }
-)
 
 
 def design(scheme, model=NINE, approach=GRAVITY, **more):
@@ -152,9 +142,9 @@ def test_observed_gravity_is_a_further_parameter():
 @pytest.mark.parametrize("scheme", ["mclaren-24", "faces-edges-18", "rings-24"])
 @pytest.mark.parametrize("noise", [Noise(), Noise(sigma_gravity=1e-3)], ids=["fixed g", "sigma g"])
 def test_sigma_is_that_of_the_adjustment_at_the_truth(scheme, approach, noise):
-    ideal = session(NINE, TRUTH, get_scheme(scheme).directions)
+    ideal = session(NINE, PAPER, get_scheme(scheme).directions)
     result = calibrate(NINE, approach, ideal.observations(noise))
-    found = design(scheme, approach=approach, noise=noise, parameters=TRUTH)
+    found = design(scheme, approach=approach, noise=noise, parameters=PAPER)
     np.testing.assert_allclose(found.sigma, result.sigma_priori[0], rtol=1e-7)
     np.testing.assert_allclose(found.cofactors, result.cofactors[0], rtol=0, atol=1e-14)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 from calling import refusal, succeed
+from usual import NINE, ROBOT
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.estimability import estimability
@@ -17,10 +17,7 @@ from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.proposal.order import _drift_shown, field_order
 from accelstudy.proposal.request import Request
 from accelstudy.schemes import files, get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
-
-NINE = get_model("bias-scale-nonorthogonality")
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +38,12 @@ def test_a_design_says_what_it_brings(made):
         scheme: "these 8 positions",
         get_scheme("mclaren-24"): "the 24 of",
     }.items():
-        roll, pitch = error.rms_of_all(
-            estimability(directions, NINE, get_approach("robot")).cofactors
-        )
+        roll, pitch = error.rms_of_all(estimability(directions, NINE, ROBOT).cofactors)
         expected = f": roll {roll / MGON:.2f} mgon, pitch {pitch / MGON:.2f} mgon"
         assert any(line in row and expected in row for row in said.splitlines())
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert content["design"]["rms_roll_mgon"] == pytest.approx(
-        error.rms_of_all(estimability(scheme, NINE, get_approach("robot")).cofactors)[0] / MGON,
+        error.rms_of_all(estimability(scheme, NINE, ROBOT).cofactors)[0] / MGON,
         rel=1e-5,
     )
     assert content["design"]["constraints"] == [
@@ -216,7 +211,7 @@ def test_two_effects_are_told_apart_by_what_neither_can_imitate():
 
 
 def test_the_order_is_a_round_trip_of_small_turns():
-    task, directions = Task(NINE, get_approach("robot")), get_scheme("random-16-3").directions
+    task, directions = Task(NINE, ROBOT), get_scheme("random-16-3").directions
     order = field_order(task, directions)
     assert sorted(order) == list(range(16))
 

@@ -6,6 +6,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from optimal_schemes import TASK as STORED
+from usual import GRAVITY, NINE
 
 from accelstudy.adjustment import calibrate, whitened_jacobian
 from accelstudy.approaches import get_approach
@@ -34,7 +35,6 @@ from accelstudy.schemes.optimal import stored_designs
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
-NINE, GRAVITY = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
 BY_GRAVITY, BY_ROBOT = (Task(NINE, get_approach(name)) for name in ("gravity", "robot"))
 MCLAREN = get_scheme("mclaren-24").directions
 SEARCHED = 1e-3

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from places import ROOT
+from usual import NINE
 
 from accelstudy.adjustment import calibrate
 from accelstudy.approaches import get_approach
@@ -17,10 +18,8 @@ from accelstudy.design.search import Search
 from accelstudy.design.task import Task
 from accelstudy.positions.choice import first_best, in_order
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
-NINE = get_model("bias-scale-nonorthogonality")
 OTHER = {
     "OPENBLAS_CORETYPE": "Nehalem",
     "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G, explanation
+from diagnosis_helpers import explanation
+from usual import GRAVITY, NINE, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.errors import InputError

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROTATIONS, campaign
+from diagnosis_helpers import ROTATIONS, campaign
+from usual import NINE
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, explanation, posed, shuffled
+from diagnosis_helpers import design, explanation, posed, shuffled
 from scipy import stats
+from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.diagnosis.decision.noise import misfit
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, credible_set

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, design, posed, shuffled, some_holds
+from diagnosis_helpers import design, posed, shuffled, some_holds
+from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.basics.wording import words
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign

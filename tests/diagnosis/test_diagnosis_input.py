@@ -7,9 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import refusal, succeed
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign
+from diagnosis_helpers import campaign
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign

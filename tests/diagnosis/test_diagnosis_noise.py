@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, least, most
-from quality_helpers import BOTH, SIGMA, STANDARD_ERRORS, draw, one, solutions
+from diagnosis_helpers import least, most
+from quality_helpers import SIGMA, draw, one, solutions
 from scipy import stats
+from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.evidence.detection import Chance

@@ -14,11 +14,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from diagnosis_helpers import NINE, ROBOT, explanation, otherwise
+from diagnosis_helpers import explanation, otherwise
 from jsonschema import Draft202012Validator
 from page_helpers import assert_sound, text_of
 from places import ROOT
 from stand_ins import composed
+from usual import NINE, ROBOT
 
 import accelstudy
 from accelstudy.basics.errors import InputError

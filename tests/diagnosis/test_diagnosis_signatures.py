@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, campaign, design, shuffled, some_holds
+from diagnosis_helpers import campaign, design, shuffled, some_holds
+from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.space.frame import signature

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, ROBOT, G, least, most, otherwise
+from diagnosis_helpers import least, most, otherwise
+from usual import NINE, ROBOT, G
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.session import Campaign

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import ROBOT, G, least, some_holds
+from diagnosis_helpers import least, some_holds
+from usual import ROBOT, G
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError

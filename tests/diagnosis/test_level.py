@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, campaign, design, shuffled
+from diagnosis_helpers import campaign, design, shuffled
+from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.campaign.calibration.assessment import assess

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, ROBOT, G, shuffled
+from diagnosis_helpers import shuffled
 from norm_model import SHOWN, nine
+from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach

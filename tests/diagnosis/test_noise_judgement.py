@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G, explanation, posed, shuffled
+from diagnosis_helpers import explanation, posed, shuffled
 from scipy import stats
+from usual import GRAVITY, NINE, G
 
 from accelstudy.diagnosis.decision import verdict
 from accelstudy.diagnosis.decision.noise import (

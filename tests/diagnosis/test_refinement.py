@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
+from diagnosis_helpers import design, shuffled, some_holds
+from usual import GRAVITY, ROBOT
 
 from accelstudy.diagnosis.evidence.candidates import refined, shaped
 from accelstudy.diagnosis.space.hypotheses import OUTLIER

@@ -5,7 +5,8 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
+from diagnosis_helpers import design, shuffled, some_holds
+from usual import GRAVITY, ROBOT
 
 from accelstudy.diagnosis.evidence import sets
 from accelstudy.diagnosis.evidence.sets import set_prior, weigh_sets

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, ROBOT, design, shuffled, some_holds
+from diagnosis_helpers import design, shuffled, some_holds
+from usual import GRAVITY, ROBOT
 
 from accelstudy.diagnosis.space.shapes import MIN_TRACE_SHARE, LearnedShapes
 from accelstudy.effects import get_effect

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_helpers import NINE, G
+from usual import NINE, G
 
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.pipeline import diagnose

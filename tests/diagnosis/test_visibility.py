@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import GRAVITY, NINE, G
 from norm_model import SHOWN, left_of, nine
 from scipy import stats
+from usual import GRAVITY, NINE, G
 
 from accelstudy.diagnosis.visibility import examine_scheme, visibilities, visibility_table
 from accelstudy.effects import effect_names, effects_without

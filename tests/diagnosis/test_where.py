@@ -1,8 +1,9 @@
 """Coordinates of functions without a name, and what repeats of attitudes tell."""
 
 import numpy as np
-from diagnosis_helpers import GRAVITY, NINE, campaign
+from diagnosis_helpers import campaign
 from scipy import stats
+from usual import GRAVITY, NINE
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.units import GON

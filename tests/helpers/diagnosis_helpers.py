@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.stats import binom
+from usual import NINE, ROBOT, G
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.problem import BaseFit, pose
@@ -16,12 +15,7 @@ from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
-
-G = STANDARD_GRAVITY
-NINE = get_model("bias-scale-nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 
 FULL = {
     **{"scheme": "fibonacci-30", "repeat_first": 6, "order": "random", "interval": 60.0},

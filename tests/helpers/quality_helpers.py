@@ -3,22 +3,15 @@
 from dataclasses import fields, replace
 
 import numpy as np
-import pytest
-from study_helpers import PAPER_TRUTH
+from usual import NINE, PAPER_TRUTH, G
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import MGON
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
-NINE = get_model("bias-scale-nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
-BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
 SIGMA = Noise().sigma_force
-STANDARD_ERRORS = 4.5
 TRUTH = {
     **PAPER_TRUTH,
     **{"alpha_xz": 20 * MGON, "alpha_xy": -15 * MGON, "alpha_yx": 30 * MGON},
@@ -30,7 +23,7 @@ TRUTH = {
 
 def ideal_session(scheme="mclaren-24", model=NINE, hold=None):
     directions = get_scheme(scheme).directions
-    return session(model, model.vector(TRUTH), directions, STANDARD_GRAVITY, hold)
+    return session(model, model.vector(TRUTH), directions, G, hold)
 
 
 def draw(seed, scheme="mclaren-24", model=NINE, noise=None, replicates=1):

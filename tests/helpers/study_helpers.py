@@ -1,6 +1,5 @@
 """A small study without Snakemake: configured and simulated as the workflow does it."""
 
-from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.study import tables as of_cells
 from accelstudy.study.cell import fanned_out
@@ -17,10 +16,6 @@ PAPER_SENSOR = {
     "bias": {"value": [0.05, 0.01, 0.03], "unit": "m/s^2"},
     "scale": {"value": 3 * [200], "unit": "ppm"},
     "nonorthogonality": {"value": [12, 12, 44], "unit": "mgon"},
-}
-PAPER_TRUTH = {
-    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
-    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
 }
 
 

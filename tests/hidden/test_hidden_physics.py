@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -13,7 +14,6 @@ from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.frame import signature
 from accelstudy.effects import effect_names, get_effect
-from accelstudy.sensors.models import get_model
 from studies.hidden import physics
 from studies.hidden.physics.designs import APPROACHES, Course, session
 from studies.hidden.physics.generate import Case, generate
@@ -30,8 +30,6 @@ from studies.hidden.physics.kinds import (
 )
 from studies.hidden.physics.measuring import NOISES, Noise, Sensor, observe
 from studies.hidden.physics.oracle import oracle, visible_outside
-
-NINE = get_model("bias-scale-nonorthogonality")
 
 
 def seeded(*key):

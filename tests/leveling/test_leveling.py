@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from usual import G
 
-from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON
 from accelstudy.leveling.angles import (
     jacobian,
     near_pole,
@@ -17,7 +18,6 @@ from accelstudy.leveling.angles import (
     wrapped,
 )
 
-G = STANDARD_GRAVITY
 SIGMA = 0.002
 ROLLS = st.floats(-199 * GON, 199 * GON)
 PITCHES = st.floats(-95 * GON, 95 * GON)

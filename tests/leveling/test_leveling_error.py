@@ -2,16 +2,13 @@
 
 import numpy as np
 import pytest
-from study_helpers import NINE, PAPER_TRUTH
+from usual import NINE, PAPER, PAPER_TRUTH, G
 
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.leveling.error import ATTITUDES, cap_forces, leveling_error, tilt_error
-from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.models import compose
 
-G = STANDARD_GRAVITY
-MODEL = get_model(NINE)
-TRUTH = MODEL.vector(PAPER_TRUTH)
 # What the gravity-based calibration of 24 positions leaves.
 SIGMA = np.repeat([0.707e-3, 102e-6, 10.26 * MGON], 3)
 BIAS, SCALE = compose("bias", ("bias",)), compose("scale", ("scale",))
@@ -75,9 +72,9 @@ def test_the_mean_over_attitudes_is_that_over_the_cap(tilt, digits):
 
 def test_scatter_of_calibrations():
     f_b = cap_forces(50 * GON, 60)
-    estimates = estimates_about(TRUTH, SIGMA)
-    error = leveling_error(MODEL, TRUTH, MODEL, estimates, f_b)
-    expected = brute_force(MODEL, TRUTH, MODEL, estimates, f_b)
+    estimates = estimates_about(PAPER, SIGMA)
+    error = leveling_error(NINE, PAPER, NINE, estimates, f_b)
+    expected = brute_force(NINE, PAPER, NINE, estimates, f_b)
     np.testing.assert_allclose(error.per_replicate, expected, rtol=2e-3)
     np.testing.assert_allclose(error.rms, np.sqrt(np.mean(expected**2, axis=0)), rtol=1e-3)
 
@@ -87,11 +84,11 @@ def test_an_effect_that_the_model_lacks(g):
     """Bias of the model and scatter of the calibration together."""
     f_b = cap_forces(40 * GON, 50, g)
     truth = CUBIC.vector({**PAPER_TRUTH, "k3_x": 100e-6, "k3_y": 60e-6, "k3_z": -900e-6})
-    estimates = estimates_about(TRUTH, SIGMA)
-    error = leveling_error(CUBIC, truth, MODEL, estimates, f_b, g)
-    expected = brute_force(CUBIC, truth, MODEL, estimates, f_b, g)
+    estimates = estimates_about(PAPER, SIGMA)
+    error = leveling_error(CUBIC, truth, NINE, estimates, f_b, g)
+    expected = brute_force(CUBIC, truth, NINE, estimates, f_b, g)
     np.testing.assert_allclose(error.per_replicate, expected, rtol=5e-3)
-    without = leveling_error(MODEL, TRUTH, MODEL, estimates, f_b, g)
+    without = leveling_error(NINE, PAPER, NINE, estimates, f_b, g)
     assert (error.rms > 1.2 * without.rms).all()
 
 
@@ -127,12 +124,12 @@ def test_roll_wraps():
 def test_rms_of_all_follows_from_the_covariance_alone():
     """That is how it is known of calibrations that nobody kept."""
     truth = CUBIC.vector(PAPER_TRUTH) + np.array([0] * 9 + [1e-4, 2e-4, -1e-4])
-    estimates = estimates_about(TRUTH, SIGMA)
+    estimates = estimates_about(PAPER, SIGMA)
     f_b = cap_forces(0.8, 40)
-    error = tilt_error(CUBIC, truth, MODEL, estimates.mean(axis=0), f_b)
+    error = tilt_error(CUBIC, truth, NINE, estimates.mean(axis=0), f_b)
     found = error.rms_of_all(np.cov(estimates.T, bias=True))
-    expected = leveling_error(CUBIC, truth, MODEL, estimates, f_b).rms
+    expected = leveling_error(CUBIC, truth, NINE, estimates, f_b).rms
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     # About another reference, a few standard deviations away, it is the same in the fourth digit.
-    elsewhere = tilt_error(CUBIC, truth, MODEL, estimates[0], f_b).rms(estimates)
+    elsewhere = tilt_error(CUBIC, truth, NINE, estimates[0], f_b).rms(estimates)
     np.testing.assert_allclose(elsewhere, error.rms(estimates), rtol=1e-3)

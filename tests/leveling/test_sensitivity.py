@@ -5,7 +5,8 @@ import pytest
 from SALib.analyze.sobol import analyze
 from SALib.sample.sobol import sample
 from scipy.stats import norm
-from study_helpers import NINE, PAPER_TRUTH, grid, make_study, run_study
+from study_helpers import grid, make_study, run_study
+from usual import NINE, PAPER
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
@@ -111,15 +112,13 @@ def test_a_force_without_noise_gives_no_variance():
 
 # --- with the parameters of a calibration (figures 5 and 6) --------------------------------------
 
-MODEL = get_model(NINE)
-TRUTH = MODEL.vector(PAPER_TRUTH)
 SIGMA = np.repeat([0.70711e-3, 101.97e-6, 10.264 * MGON], 3)
 
 
 def test_shares_at_level_are_those_of_the_paper():
     """f_y 57 %, α_zx 36 %, b_y 7 % of the variance of roll, with sds from gravity."""
     table = leveling_sensitivity(
-        [0], [0], 0.002, **SETTINGS, model=MODEL, parameters=TRUTH, sigma_parameters=SIGMA
+        [0], [0], 0.002, **SETTINGS, model=NINE, parameters=PAPER, sigma_parameters=SIGMA
     )
     roll = table[table["output"] == "roll"].set_index("input")
     for name, share in {"f_y": 0.571, "alpha_zx": 0.357, "b_y": 0.071}.items():
@@ -127,7 +126,7 @@ def test_shares_at_level_are_those_of_the_paper():
         assert roll.loc[name, "total_effect"] == pytest.approx(share, abs=0.01)
     others = roll.drop(index=["f_y", "alpha_zx", "b_y"])["total_effect"]
     assert others.max() < 1e-3
-    assert list(roll.index) == [*FORCES, *MODEL.parameter_names]
+    assert list(roll.index) == [*FORCES, *NINE.parameter_names]
 
 
 def test_the_study_takes_the_sds_from_the_simulation(tmp_path):
@@ -150,5 +149,7 @@ def test_a_cell_without_estimates_is_an_input_error(tmp_path):
     sensitivity = {"base_samples": 16, "resamples": 5, "roll_gon": [0], "pitch_gon": [0]}
     summary = run_study(tmp_path, grids=[grid(schemes="rings-24", replicates=5)])["summary"]
     study = make_study(sensitivity=sensitivity)
-    with pytest.raises(InputError, match=f"no estimates of the cell {NINE}/mclaren-24/gravity"):
+    with pytest.raises(
+        InputError, match=f"no estimates of the cell {NINE.name}/mclaren-24/gravity"
+    ):
         sensitivity_table(study, summary)

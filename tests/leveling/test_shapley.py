@@ -4,17 +4,15 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from study_helpers import NINE, PAPER_TRUTH
+from usual import GRAVITY, NINE, PAPER, G
 
-from accelstudy.approaches import get_approach
-from accelstudy.basics.units import GON, STANDARD_GRAVITY
+from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force
 from accelstudy.leveling.sensitivity import leveled, leveling_sensitivity
 from accelstudy.leveling.shapley import linear_shapley
 from accelstudy.leveling.shares import leveling_shares, leveling_slope, overtaken
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
 # Confidence intervals are of 95 %: 2.5 half widths are 4.9 standard deviations.
@@ -100,33 +98,29 @@ def test_shares_do_not_depend_on_units():
 
 # --- leveling ------------------------------------------------------------------------------------
 
-MODEL = get_model(NINE)
-TRUTH = MODEL.vector(PAPER_TRUTH)
-NAMES = ["f_x", "f_y", "f_z", *MODEL.parameter_names]
+NAMES = ["f_x", "f_y", "f_z", *NINE.parameter_names]
 SIGMA_FORCE = 0.002
 
 
 def shares_of(scheme, roll, pitch):
-    found = estimability(get_scheme(scheme), MODEL, get_approach("gravity"), Noise(), TRUTH)
-    return leveling_shares(roll, pitch, SIGMA_FORCE, MODEL, TRUTH, found.cofactors)
+    found = estimability(get_scheme(scheme), NINE, GRAVITY, Noise(), PAPER)
+    return leveling_shares(roll, pitch, SIGMA_FORCE, NINE, PAPER, found.cofactors)
 
 
 def test_the_slope_is_the_derivative():
     attitude = np.array([30.0, -20.0]) * GON
-    f_s = MODEL.sense(np.array(specific_force(*attitude, STANDARD_GRAVITY))[None], TRUTH)
-    mean, function = np.concatenate([f_s[0], TRUTH]), leveled(attitude, MODEL)
+    f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
+    mean, function = np.concatenate([f_s[0], PAPER]), leveled(attitude, NINE)
     step = 1e-5 * np.eye(len(NAMES))
     numeric = (function(mean + step) - function(mean - step)).T / 2e-5
-    slope = leveling_slope(MODEL, TRUTH, f_s, STANDARD_GRAVITY)[0]
+    slope = leveling_slope(NINE, PAPER, f_s, G)[0]
     np.testing.assert_allclose(slope, numeric, rtol=1e-6, atol=1e-8)
 
 
 def test_total_effects_are_those_of_the_paper():
     """The linear ones beside the Shapley effects, against Sobol's method."""
-    found = estimability(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
-    sampled = leveling_sensitivity(
-        [0, 50], [25], SIGMA_FORCE, 256, 20, 1, MODEL, TRUTH, found.sigma
-    )
+    found = estimability(get_scheme("mclaren-24"), NINE, GRAVITY, Noise(), PAPER)
+    sampled = leveling_sensitivity([0, 50], [25], SIGMA_FORCE, 256, 20, 1, NINE, PAPER, found.sigma)
     table = shares_of("mclaren-24", [0, 50], [25])
     keys = ["output", "roll_gon", "pitch_gon", "input"]
     both = table.merge(sampled, on=keys, suffixes=("", "_sampled"), validate="one_to_one")
@@ -160,15 +154,15 @@ def test_near_the_pole_shares_are_not_defined():
     table = shares_of("mclaren-24", [10], [90, 99.99])
     assert (table["defined"] == (table["pitch_gon"] == 90)).all()
     assert (table["shapley_effect"].notna() == table["defined"]).all()
-    found = estimability(get_scheme("mclaren-24"), MODEL, get_approach("gravity"), Noise(), TRUTH)
+    found = estimability(get_scheme("mclaren-24"), NINE, GRAVITY, Noise(), PAPER)
     sigma = np.concatenate([np.full(3, SIGMA_FORCE), found.sigma])
     rng = np.random.default_rng(2)
     for pitch, near_linear in ((90.0, True), (99.99, False)):
         attitude = np.array([10.0, pitch]) * GON
-        f_s = MODEL.sense(np.array(specific_force(*attitude, STANDARD_GRAVITY))[None], TRUTH)
-        mean = np.concatenate([f_s[0], TRUTH])
-        slope = leveling_slope(MODEL, TRUTH, f_s, STANDARD_GRAVITY)[0]
-        offsets = leveled(attitude, MODEL)(mean + sigma * rng.standard_normal((20_000, len(mean))))
+        f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
+        mean = np.concatenate([f_s[0], PAPER])
+        slope = leveling_slope(NINE, PAPER, f_s, G)[0]
+        offsets = leveled(attitude, NINE)(mean + sigma * rng.standard_normal((20_000, len(mean))))
         linear = np.sqrt((slope**2) @ sigma**2)
         # An sd of 20 000 draws is right to 0.5 %.
         fits = np.abs(offsets.std(axis=0) / linear - 1) < 0.025

@@ -15,9 +15,10 @@ from calling import call, refusal, succeed
 from page_helpers import assert_told_alike
 from places import ROOT
 from study_helpers import simulated as simulated_of
+from usual import NINE, G
 
 from accelstudy.approaches import get_approach
-from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, angles_in
+from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.estimability import estimability
@@ -27,7 +28,7 @@ from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
 from accelstudy.pages import lines
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
-from accelstudy.planning.candidates import NINE, candidates, information_of, tilt_of
+from accelstudy.planning.candidates import candidates, information_of, tilt_of
 from accelstudy.planning.optimised import Kind
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
@@ -42,13 +43,11 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study, read_study
 
-MODEL = get_model(NINE)
 MCLAREN = get_scheme("mclaren-24")
 HAS = ("bias", "scale", "nonorthogonality", "quadratic_scale")
 SIZES = (9, 12, 20, 30, 40, 80, 120)
-MODELS = ("bias-scale", NINE, f"{NINE}-quadratic-cubic")
+MODELS = ("bias-scale", NINE.name, f"{NINE.name}-quadratic-cubic")
 QUESTION = "plan --tilt-accuracy 10mgon --tilt-range 30gon --sigma 2mm/s2"
-G = STANDARD_GRAVITY
 SIGMA = 0.002
 REPLICATES = 5000
 
@@ -95,7 +94,7 @@ def left(model, sizes, approach="gravity", sigma=SIGMA):
 
 
 @pytest.mark.parametrize(("model", "approach"), [
-    (NINE, "gravity"), (f"{NINE}-quadratic-cubic", "robot"), ("bias-scale", "robot"),
+    (NINE.name, "gravity"), (f"{NINE.name}-quadratic-cubic", "robot"), ("bias-scale", "robot"),
 ])  # fmt: skip
 def test_columns_of_one_model_are_the_designs_of_all(model, approach):
     model = get_model(model)
@@ -109,7 +108,7 @@ def test_columns_of_one_model_are_the_designs_of_all(model, approach):
 def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
     # Ten sensors of quadratic scales drawn with the size that is expected, without noise.
     size = 300e-6
-    expected = left(MODEL, {"quadratic_scale": size}, sigma=1e-9)
+    expected = left(NINE, {"quadratic_scale": size}, sigma=1e-9)
     draws = size * np.random.default_rng(3).standard_normal((10, 3))
     whitened = np.cov(draws.T, bias=True) + np.outer(draws.mean(0), draws.mean(0))
     draws = draws @ np.linalg.inv(np.linalg.cholesky(whitened)).T * size  # of just that size
@@ -125,7 +124,7 @@ def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
     np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected.rms, rtol=0.02)
 
 
-def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE):
+def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE.name):
     return next(
         c
         for c in candidates(question)
@@ -134,7 +133,7 @@ def _candidate(question, scheme="mclaren-24", equipment="gravity", model=NINE):
 
 
 def test_the_quantile_is_that_of_draws():
-    expected = left(MODEL, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6}, "robot")
+    expected = left(NINE, {"quadratic_scale": 200e-6, "cubic_scale": 200e-6}, "robot")
     rng = np.random.default_rng(1)
     draws = rng.standard_normal((200_000, len(expected.causes)))
     squares = np.stack([np.einsum("ru,uw,rw->r", draws, q, draws) for q in expected.form], 1)
@@ -147,7 +146,7 @@ def test_the_quantile_is_that_of_draws():
 
 
 def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
-    turned = get_model(f"{NINE}-crossaxis")
+    turned = get_model(f"{NINE.name}-crossaxis")
     assert left(turned, {}, "gravity") is None
     assert left(turned, {}, "robot") is not None
 
@@ -158,7 +157,7 @@ def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
 def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
     first = plan.first
     assert first.equipment == BY_HAND
-    assert first.model.name == NINE
+    assert first.model.name == NINE.name
     assert first.simulated.rms.max() <= 10 * MGON
     cheaper = [
         c for c in plan.compared
@@ -242,7 +241,7 @@ def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
     assert sizes["base_tilt"].size < 20 * MGON
     for name, spoiler in sizes.items():
         if math.isfinite(spoiler.size):
-            alone = left(MODEL, {name: spoiler.size}, "robot").squares[name]
+            alone = left(NINE, {name: spoiler.size}, "robot").squares[name]
             assert np.sqrt(alone.max()) == pytest.approx(question.target, rel=1e-9)
 
 
@@ -404,7 +403,7 @@ def test_one_position_less_does_not_suffice(plan):
 def test_the_fewest_positions_suffice_although_their_refinement_neglects_effects(target):
     bent = DataSheet("s", position_sigma=SIGMA, nonlinearity=0.001, full_scale=19.6133)
     question = Question(target, 50 * GON, bent, (BY_HAND,), holds=(10.0,))
-    found = Kind(question, BY_HAND, MODEL, 10.0).fewest(20)
+    found = Kind(question, BY_HAND, NINE, 10.0).fewest(20)
     assert found.tilt.of("quadratic_scale").rms.max() > 0.2 * target
     assert found.tilt.rms.max() <= target
     assert found.scheme.n_positions < 30

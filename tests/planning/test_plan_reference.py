@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 from calling import refusal, succeed
+from usual import NINE, TWELVE, G
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
-from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.data_sheets import of_sigma
 from accelstudy.leveling.angles import angles_of
 from accelstudy.leveling.error import cap_forces
@@ -17,11 +17,8 @@ from accelstudy.planning.answer import _beside
 from accelstudy.planning.candidates import information_of, tilt_of
 from accelstudy.planning.question import ROBOT, Equipment, Question, planned_reference
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 
 SIGMA, RANGE, SESSIONS = 2e-3, 30 * GON, 2000
-NINE = get_model("bias-scale-nonorthogonality")
-TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """The ways that the benchmarks compare solve the same problem."""
 
+import re
+
 import numpy as np
 import pytest
 from page_helpers import assert_told_alike
@@ -48,16 +50,6 @@ def test_a_way_that_is_not_installed_says_what_it_needs(monkeypatch):
     assert row.count("not measured: uv pip install numba") == 2
 
 
-def test_tables_of_a_page_are_replaced_and_the_rest_is_kept():
-    from page import put
-
-    page = "Before\n\n<!-- speeds -->\n\nold\n\n<!-- end of speeds -->\nafter\n"
-    new = put(page, "speeds", r"| \1 |")
-    assert new == "Before\n\n<!-- speeds -->\n\n| \\1 |\n\n<!-- end of speeds -->\nafter\n"
-    with pytest.raises(ValueError, match="around"):
-        put(page, "around", "x")
-
-
 @needs_data
 def test_the_comparison_with_authors_is_what_its_page_shows():
     import comparison
@@ -67,7 +59,7 @@ def test_the_comparison_with_authors_is_what_its_page_shows():
     assert_told_alike(comparison.authors(DATA), shown)
 
 
-def test_the_page_of_speed_has_a_place_for_each_table(monkeypatch):
+def test_each_table_of_the_page_of_speed_is_replaced_and_the_rest_is_kept(monkeypatch):
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         monkeypatch.setenv(variable, "1")  # as `run` sets them, until this test ends
     from page import put
@@ -76,4 +68,9 @@ def test_the_page_of_speed_has_a_place_for_each_table(monkeypatch):
     page = (BENCHMARKS.parent / "docs/guides/speed.md").read_text()
     assert page.count("<!-- end of ") == len(NAMES)
     for name in NAMES:
-        put(page, name, "")
+        before, _, after = re.split(rf"<!-- (?:end of )?{name} -->", page)
+        marks = f"<!-- {name} -->", f"<!-- end of {name} -->"
+        new = put(page, name, r"| \1 |")
+        assert new == f"{before}{marks[0]}\n\n| \\1 |\n\n{marks[1]}{after}"
+    with pytest.raises(ValueError, match="nothing"):
+        put(page, "nothing", "x")

@@ -7,7 +7,6 @@ import pytest
 from pictures import (
     DRAWN,
     PICTURES,
-    code_of,
     difference,
     fingerprint,
     kept,
@@ -52,13 +51,6 @@ def test_a_point_that_moved_is_seen(tmp_path, x, same):
         texts.append(seen(tmp_path / "one.svg"))
     assert (difference(fingerprint(texts[0]), texts[1]) == "") == same
     assert "error / mgon" in texts[0]
-
-
-def test_comments_and_layout_do_not_make_a_picture_old(tmp_path):
-    files = [tmp_path / name for name in ("a.py", "b.py", "c.py")]
-    for path, text in zip(files, ('"""A."""\nx = 1\n', "x  =  1  # one\n", "x = 2\n"), strict=True):
-        path.write_text(text, encoding="utf-8")
-    assert code_of(files[0]) == code_of(files[1]) != code_of(files[2])
 
 
 def test_pictures_that_differ_in_a_word_differ():

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from calling import refused
 from scipy.spatial.transform import Rotation
+from usual import GRAVITY, ROBOT, G
 
 from accelstudy.adjustment import calibrate
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
@@ -24,9 +23,7 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
-G = STANDARD_GRAVITY
 NINE = ("bias", "scale", "nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 SCHEME = get_scheme("mclaren-24")
 
 RIG = {

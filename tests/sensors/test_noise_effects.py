@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 from scipy import stats
 from study_helpers import grid, make_cells, simulated
+from usual import NINE
 
 from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
-MODEL = get_model("bias-scale-nonorthogonality")
 SIGMA, R = 0.003, 4000
 TIME = np.cumsum(np.linspace(30, 90, 24))
 DIRECTIONS = get_scheme("mclaren-24").directions
-IDEAL = session(MODEL, np.zeros(9), DIRECTIONS, hold=HoldConditions(time=TIME))
+IDEAL = session(NINE, np.zeros(9), DIRECTIONS, hold=HoldConditions(time=TIME))
 
 
 def errors(*effects, seed=1, ideal=IDEAL, sigma=SIGMA):
@@ -75,9 +74,7 @@ def test_axis_noise():
 @pytest.mark.parametrize("known_time", [True, False], ids=["time", "number"])
 def test_coloured_noise_is_a_stationary_gauss_markov_process(known_time):
     share, tau = 0.7, 300.0 if known_time else 3.0
-    ideal = (
-        IDEAL if known_time else session(MODEL, np.zeros(9), get_scheme("mclaren-24").directions)
-    )
+    ideal = IDEAL if known_time else session(NINE, np.zeros(9), get_scheme("mclaren-24").directions)
     time = TIME if known_time else np.arange(24.0)
     v = errors(f"coloured_noise(share={share}, tau={tau})", ideal=ideal)
     total = 1 / (1 - share)

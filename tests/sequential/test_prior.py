@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
+from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment import calibrate, gauss_helmert
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.prior import Prior
 from accelstudy.simulation.sessions import Noise, session
 
-NINE, GRAVITY = get_model("bias-scale-nonorthogonality"), get_approach("gravity")
 VALUES = {"b_x": 0.05, "b_y": -0.02, "s_x": 2e-4, "s_z": 1e-3, "alpha_yz": 1e-3, "alpha_zx": -2e-3}
 N, SESSIONS = 24, 6
 
@@ -63,7 +62,7 @@ def test_a_factory_calibration_is_observations_of_the_parameters(n):
 
 
 def test_a_covariance_matrix_says_more_than_its_sigmas():
-    model, approach = get_model("bias-scale"), get_approach("robot")
+    model, approach = get_model("bias-scale"), ROBOT
     alone = observed(model, sessions=1)
     first = calibrate(model, approach, alone.take(np.arange(12)))
     earlier = Prior.of_covariance(first.parameters[0], first.cofactors[0])

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from scipy import stats
+from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.information import Information, position_rows
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.sequential.choice import Chooser, Knowledge, candidates, typical_sizes
 from accelstudy.sequential.promise import (
     LEAST_REDUNDANCY,
@@ -19,9 +19,6 @@ from accelstudy.sequential.promise import (
     known_variance,
 )
 from accelstudy.simulation.sessions import Noise
-
-NINE = get_model("bias-scale-nonorthogonality")
-
 
 # --- the choice of a position --------------------------------------------------------------------
 

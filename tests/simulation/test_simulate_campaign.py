@@ -7,6 +7,7 @@ import pytest
 import yaml
 from calling import refusal, succeed
 from scipy import stats
+from usual import NINE, ROBOT
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import MGON
@@ -15,10 +16,7 @@ from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import get_effect
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-
-NINE = get_model("bias-scale-nonorthogonality")
 
 
 def simulate(**settings):
@@ -59,7 +57,7 @@ def test_hidden_effects_are_found_where_they_were_put():
            for name, value in values(truth["effects"]).items() if name.startswith("w_")},
     }  # fmt: skip
     full = SensorModel.of("full", [*NINE_EFFECTS, "thermal_bias", "warm_up(tau=400)"])
-    fit = fit_campaign(campaign, full, get_approach("robot"))
+    fit = fit_campaign(campaign, full, ROBOT)
     known = full.vector({**values(truth["sensor"]), **values(truth["effects"])})
     assert np.abs((fit.parameters - known) / fit.adjustment.sigma_priori[0]).max() < 4.5
     assert truth["effects"][1]["settings"] == {"tau": {"value": 400.0, "unit": "s"}}

@@ -4,19 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from usual import NINE, G
 
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import MGON
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session, sigma_of_mean
 
-G = STANDARD_GRAVITY
-MODEL = get_model("bias-scale-nonorthogonality")
-TRUTH = MODEL.vector({"b_x": 0.05, "s_y": 200e-6, "alpha_zx": 44 * MGON})
+TRUTH = NINE.vector({"b_x": 0.05, "s_y": 200e-6, "alpha_zx": 44 * MGON})
 DIRECTIONS = get_scheme("mclaren-24").directions
-IDEAL = session(MODEL, TRUTH, DIRECTIONS)
+IDEAL = session(NINE, TRUTH, DIRECTIONS)
 
 
 def draw(replicates, seed=1, **noise):
@@ -25,7 +23,7 @@ def draw(replicates, seed=1, **noise):
 
 def test_a_session_without_noise():
     np.testing.assert_allclose(IDEAL.f_b, -G * DIRECTIONS, rtol=1e-14)
-    np.testing.assert_allclose(IDEAL.forces, MODEL.sense(-G * DIRECTIONS, TRUTH), rtol=1e-14)
+    np.testing.assert_allclose(IDEAL.forces, NINE.sense(-G * DIRECTIONS, TRUTH), rtol=1e-14)
     np.testing.assert_allclose(IDEAL.angles.T, roll_pitch(tuple(IDEAL.f_b.T)), rtol=1e-14)
     observed = IDEAL.observations(Noise())
     np.testing.assert_array_equal(observed.forces, IDEAL.forces[None])
@@ -90,7 +88,7 @@ def test_the_first_position_makes_no_step():
 def test_columns_of_the_caller_are_kept():
     temperature, time = np.linspace(-5, 20, 24), 30.0 * np.arange(24)
     known = session(
-        MODEL, TRUTH, DIRECTIONS, hold=HoldConditions(temperature=temperature, time=time)
+        NINE, TRUTH, DIRECTIONS, hold=HoldConditions(temperature=temperature, time=time)
     ).hold
     np.testing.assert_array_equal(known.temperature, temperature)
     np.testing.assert_array_equal(known.time, time)

@@ -9,15 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from page_helpers import text_of
-from study_helpers import (
-    NINE,
-    PAPER_TRUTH,
-    PROVENANCE,
-    estimates_in,
-    grid,
-    make_study,
-    run_study,
-)
+from study_helpers import NINE, PROVENANCE, estimates_in, grid, make_study, run_study
+from usual import PAPER_TRUTH
 
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from study_helpers import NINE, PAPER_TRUTH, grid, make_cells, make_study, run_study, simulated
+from study_helpers import NINE, grid, make_cells, make_study, run_study, simulated
+from usual import PAPER_TRUTH
 
 from accelstudy.approaches import approach_names
 from accelstudy.basics.units import MGON

@@ -8,16 +8,8 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import scipy
-from study_helpers import (
-    NINE,
-    PAPER_TRUTH,
-    PROVENANCE,
-    grid,
-    make_cells,
-    run_study,
-    simulate_cells,
-    simulated,
-)
+from study_helpers import NINE, PROVENANCE, grid, make_cells, run_study, simulate_cells, simulated
+from usual import PAPER_TRUTH
 
 import accelstudy
 from accelstudy.basics.errors import InputError

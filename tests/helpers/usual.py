@@ -1,0 +1,21 @@
+"""What most tests calculate with: models, approaches and the sensor of the paper, and gravity."""
+
+import pytest
+
+from accelstudy.approaches import get_approach
+from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.sensors.models import get_model
+
+G = STANDARD_GRAVITY
+NINE = get_model("bias-scale-nonorthogonality")
+TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
+# Thalmann & Neuner (2018), section 4.
+PAPER_TRUTH = {
+    **{"b_x": 0.05, "b_y": 0.01, "b_z": 0.03, "s_x": 200e-6, "s_y": 200e-6, "s_z": 200e-6},
+    **{"alpha_yz": 12 * MGON, "alpha_zy": 12 * MGON, "alpha_zx": 44 * MGON},
+}
+PAPER = NINE.vector(PAPER_TRUTH)
+GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
+BOTH = pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda approach: approach.name)
+STANDARD_ERRORS = 4.5
+"""Within which simulated numbers are to lie."""
