@@ -78,28 +78,21 @@ def test_the_claimed_sigmas_hold_in_simulation(approach):
     assert (table["n_converged"] == 2000).all()
 
 
-CONFLICTS = {
-    (): None,
-    (15,): r"position 16 \(p [=<].*, adjusted",
-    (
-        3,
-        20,
-        11,
-    ): r"positions 4, 12 and 21 \(the largest p.*may have been bumped there, or the model l",
-}
-
-
-@pytest.mark.parametrize("bumped", CONFLICTS)
-def test_positions_in_conflict_are_not_blamed_alone(bumped):
+@pytest.mark.parametrize(("bumped", "said"), [
+    ([], None),
+    ([15], r"position 16 \(p [=<].*, adjusted"),
+    ([3, 20, 11], r"positions 4, 12 and 21 \(the largest p.*bumped there, or the model lacks an"),
+])  # fmt: skip
+def test_positions_in_conflict_are_not_blamed_alone(bumped, said):
     """A bumped hold stands out, and so do those after a knock of the mounting."""
     measured = simulated_campaign({"b_x": 0.1}, seed=2)
-    measured.forces[[*bumped]] *= np.array([[1.005], [0.994], [1.003]])[: len(bumped)]
+    measured.forces[bumped] *= np.array([[1.01], [0.994], [1.003]])[: len(bumped)]
     lines = verdict_lines(assess(fit_campaign(measured, NINE, GRAVITY)))
     found = [line for line in lines if line.startswith("In conflict")]
     assert len(found) == bool(bumped)
     assert ("“accelstudy diagnose” looks for what is wrong or missing." in lines) == bool(bumped)
     for line in found:
-        assert re.match(f"In conflict with the others: {CONFLICTS[bumped]}", line)
+        assert re.match(f"In conflict with the others: {said}", line)
 
 
 @pytest.mark.parametrize("stated", [True, False])
