@@ -14,8 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from diagnosis_helpers import explanation, otherwise
-from jsonschema import Draft202012Validator
+from diagnosis_helpers import SCHEMA, explanation, otherwise
 from page_helpers import assert_sound, text_of
 from places import ROOT
 from stand_ins import composed
@@ -69,11 +68,6 @@ HEADLINES = {
     "noise_model": "its noise is not",
     "gross_error": "The data have a gross error",
 }  # fmt: skip
-
-
-SCHEMA = Draft202012Validator(
-    yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
-)
 
 
 def simulated(case, folder):

@@ -3,6 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import yaml
+from jsonschema import Draft202012Validator
+from places import ROOT
 from scipy.stats import binom
 from usual import NINE, ROBOT, G
 
@@ -31,6 +34,11 @@ ROTATIONS = {
     "mounting_slip",
 }
 """Effects that only turn the sensor or misread its attitude."""
+
+
+SCHEMA = Draft202012Validator(
+    yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
+)
 
 
 def campaign(seed=1, **keys):
