@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from calling import refusal, succeed
+from study_helpers import make_study
 from usual import NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
@@ -137,11 +138,7 @@ def test_a_job_needs_no_file(tmp_path, monkeypatch):
     plain["schemes"][cell.scheme]["directions"][0] = [0, 1, 1]
     with pytest.raises(InputError, match=r"schemes.*is the name of other positions"):
         parse_study(plain)
-    usual = parse_study(
-        {"study": "s", "seed": 1, "grids": [{"models": "bias-scale", "schemes": "faces-6",
-                                            "approaches": "robot", "replicates": 2}]}
-    )  # fmt: skip
-    assert usual.cells[0].directions is None
+    assert make_study().cells[0].directions is None  # of schemes that come along
 
 
 @pytest.mark.parametrize(

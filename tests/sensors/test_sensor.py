@@ -133,12 +133,10 @@ def test_batches_broadcast(forces_batch, parameters_batch, gravity_batch, batch)
     np.testing.assert_allclose(
         model.correct(f_s, p, g), np.broadcast_to(f_b, f_s.shape), rtol=0, atol=1e-12 * G
     )
+    u = model.n_parameters
+    every = [np.broadcast_to(*each) for each in ((f_b, f_s.shape), (p, (*batch, u)), (g, batch))]
     for index in np.ndindex(*batch):
-        one = model.sense(
-            np.broadcast_to(f_b, (*batch, 24, 3))[index],
-            np.broadcast_to(p, (*batch, model.n_parameters))[index],
-            np.broadcast_to(g, batch)[index],
-        )
+        one = model.sense(*(part[index] for part in every))
         np.testing.assert_allclose(f_s[index], one, rtol=1e-14)
 
 

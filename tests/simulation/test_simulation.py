@@ -73,11 +73,6 @@ def test_sigma_of_the_mean_of_a_position(rate, duration, n):
 # --- what is known of the holds ------------------------------------------------------------------
 
 
-def test_attitude_of_the_holds():
-    np.testing.assert_array_equal(IDEAL.hold.roll, IDEAL.angles[:, 0])
-    np.testing.assert_array_equal(IDEAL.hold.pitch, IDEAL.angles[:, 1])
-
-
 def test_the_first_position_makes_no_step():
     hold = IDEAL.hold
     step = np.stack([hold.step_x, hold.step_y, hold.step_z], axis=1)
@@ -85,7 +80,7 @@ def test_the_first_position_makes_no_step():
     np.testing.assert_array_equal(step[0], 0)
 
 
-def test_columns_of_the_caller_are_kept():
+def test_columns_of_the_caller_are_kept_beside_the_attitudes():
     temperature, time = np.linspace(-5, 20, 24), 30.0 * np.arange(24)
     known = session(
         NINE, TRUTH, DIRECTIONS, hold=HoldConditions(temperature=temperature, time=time)
@@ -93,5 +88,5 @@ def test_columns_of_the_caller_are_kept():
     np.testing.assert_array_equal(known.temperature, temperature)
     np.testing.assert_array_equal(known.time, time)
     assert known.vibration is None
-    np.testing.assert_array_equal(known.roll, IDEAL.hold.roll)
+    np.testing.assert_array_equal([known.roll, known.pitch], IDEAL.angles.T)
     assert draw(1).hold is IDEAL.hold
