@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from diagnosis_helpers import design, shuffled, some_holds
-from usual import GRAVITY, ROBOT
+from diagnosis_helpers import campaign, design, shuffled, some_holds
+from usual import GRAVITY, NINE, ROBOT
 
-from accelstudy.diagnosis.space.shapes import MIN_TRACE_SHARE, LearnedShapes
+from accelstudy.basics.units import GON
+from accelstudy.diagnosis.space.shapes import MIN_TRACE_SHARE, LearnedShapes, coordinate_in_holds
+from accelstudy.diagnosis.visibility import examine_campaign
 from accelstudy.effects import get_effect
 from accelstudy.effects.smooth import LENGTHS
 
@@ -105,3 +107,22 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
         # Directions with a share of less than MIN_TRACE_SHARE are dropped.
         off = np.linalg.norm(after - expected / np.trace(expected))
         assert off < 20 * MIN_TRACE_SHARE
+
+
+def test_coordinates_are_those_of_the_campaign():
+    measured, _ = campaign()
+    frame = examine_campaign(measured, NINE).frame
+    for name, expected in {
+        "time": measured.time,
+        "temperature": measured.temperature,
+        "vibration": measured.vibration,
+        "yaw": measured.yaw,
+        "angle": measured.angles,
+        "move": np.diff(measured.angles, axis=0, prepend=measured.angles[:1]),
+    }.items():
+        off = coordinate_in_holds(name, frame) - np.reshape(expected, (measured.n_positions, -1))
+        # An angle may be a whole turn away.
+        assert np.abs((off / (400 * GON) + 0.5) % 1 - 0.5).max() < 1e-12 or not off.any(), name
+    force = coordinate_in_holds("force", frame)
+    np.testing.assert_array_equal(coordinate_in_holds("previous", frame)[1:], force[:-1])
+    np.testing.assert_allclose(coordinate_in_holds("next", frame)[:-1], np.diff(force, axis=0))

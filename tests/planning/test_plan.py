@@ -33,12 +33,7 @@ from accelstudy.planning.optimised import Kind
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
 from accelstudy.planning.reasons import in_use, limits, spoilers
 from accelstudy.planning.simulated import simulate, study_of
-from accelstudy.planning.wording import (
-    SENTENCES,
-    part_lines,
-    positions_command,
-    table_lines,
-)
+from accelstudy.planning.wording import SENTENCES, part_lines, positions_command, table_lines
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study, read_study

@@ -11,13 +11,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.design.information import Information, position_rows
 from accelstudy.schemes import get_scheme
 from accelstudy.sequential.choice import Chooser, Knowledge, candidates, typical_sizes
-from accelstudy.sequential.promise import (
-    LEAST_REDUNDANCY,
-    LEVEL,
-    Promise,
-    bound,
-    known_variance,
-)
+from accelstudy.sequential.promise import LEAST_REDUNDANCY, LEVEL, Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
 # --- the choice of a position --------------------------------------------------------------------

@@ -40,10 +40,7 @@ def test_nothing_is_overwritten(folder):
     config = folder / "config" / "config.yaml"
     before = config.read_text(encoding="utf-8")
     config.write_text(before.replace("seed: 1", "seed: 2"), encoding="utf-8")
-    result = init(folder)
-    assert result.exit_code == 2
-    (line,) = result.stderr.splitlines()
-    assert line.startswith(f"error: {folder}: is not empty")
+    assert refusal("init", folder).startswith(f"error: {folder}: is not empty")
     assert "seed: 2" in config.read_text(encoding="utf-8")
     assert init(folder, "--force").exit_code == 0
     assert config.read_text(encoding="utf-8") == before

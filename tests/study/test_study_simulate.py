@@ -15,12 +15,7 @@ import accelstudy
 from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
 from accelstudy.files import tables
-from accelstudy.files.tables import (
-    git_commit,
-    read_origin,
-    read_table,
-    write_table,
-)
+from accelstudy.files.tables import git_commit, read_origin, read_table, write_table
 from accelstudy.study import tables as module
 from accelstudy.study.cell import memory
 from accelstudy.study.replicates import ESTIMATES
