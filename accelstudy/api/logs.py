@@ -41,7 +41,7 @@ class Log:
         return Path(str(self.file)).name
 
     def __repr__(self) -> str:
-        return f"Log({self.name!r}, {', '.join(self.layout) or 'nothing given'})"
+        return f"Log({', '.join([repr(self.name), *self.layout])})"
 
     def _repr_html_(self) -> str:
         given = pd.DataFrame(self.layout.items(), columns=["setting", "value"], dtype=object)

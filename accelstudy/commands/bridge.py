@@ -141,7 +141,7 @@ class Command(click.Command):
     def _option(self, keyword: kinds.Keyword) -> click.Option:
         """Option of a keyword."""
         needed = keyword.default is inspect.Parameter.empty
-        default = None if needed else keyword.default
+        default = keyword.default
         name, meaning = keyword.option, kinds.meanings(self.verb)[keyword.name]
         flag = keyword.kind is kinds.FLAG
         return click.Option(
@@ -151,9 +151,9 @@ class Command(click.Command):
             nargs=2 if keyword.ends else 1,
             multiple=keyword.many,
             required=needed,
-            default=default,
-            show_default=default is not False and default not in (None, ()),
+            show_default=not needed and default is not False and default not in (None, ()),
             help=self._spelled(meaning).replace(" [default", "  [default"),
+            **({} if needed else {"default": default}),  # None would be a default as well
         )
 
     def _spelled(self, text: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -153,10 +154,19 @@ SIMULATE_CAMPAIGN = Command(
 )
 
 
+@contextmanager
+def new_table(path: Path, inputs: Iterable[str | Path] = (), force: bool = False) -> Iterator[Path]:
+    """Yield the file of a table, which is no spreadsheet; see `new_file`."""
+    if path.suffix.lower() in (".xlsx", ".xls", ".ods"):
+        raise InputError(f"{path}: a spreadsheet is not written; let it end in .csv or .parquet")
+    with new_file(path, inputs, force) as temporary:
+        yield temporary
+
+
 APPLY = Command(
     calibrations.apply,
     make=calibrations.leveled,
-    writes=new_file,
+    writes=new_table,
     out="CSV or Parquet file to write.",
 )
 

@@ -214,7 +214,8 @@ def _first_error(
     error: ValidationError, content: object, root: type[BaseModel], section: str
 ) -> str:
     """Say in one line which key of a `root` is wrong, and what would be right."""
-    errors = error.errors()
+    # Beside a missing key there is often its name with a typo, which says more.
+    errors = sorted(error.errors(), key=lambda each: each["type"] == "missing")
     places = [_place(each, content) for each in errors]
     first, place = errors[0], places[0]
     key = ".".join(str(part)[:100] for part in (section, *place) if part != "")

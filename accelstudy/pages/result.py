@@ -117,4 +117,4 @@ class Result(ABC):
         return f"{type(self).__name__}({self.name!r}, {self.state})"
 
     def _repr_html_(self) -> str:
-        return notebook_html(type(self).__name__, self.verdict, self.to_frame())
+        return notebook_html(f"{type(self).__name__}, {self.state}", self.verdict, self.to_frame())

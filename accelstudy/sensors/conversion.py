@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.units import SENSOR_UNITS, UNITS
+from accelstudy.basics.units import SENSOR_UNITS, STANDARD_GRAVITY, UNITS
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,10 @@ def conversion_of(
     """
     if unit == "counts":
         if scale is None:
-            raise InputError("unit counts needs a nominal scale, in m/s² per count")
+            raise InputError(
+                "unit counts needs a nominal scale (`scale`), in m/s² per count: "
+                f"{STANDARD_GRAVITY / 16384:.6g} where 1 g is 16384 counts"
+            )
         factor = _triple(scale, "scale")
         if not np.all((np.abs(factor) > 0) & (np.abs(factor) <= MAX_VALUE)):
             raise InputError("scale: must not be 0, and must be finite")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.given import check_once
+from accelstudy.basics.given import check_once, each
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
@@ -108,6 +108,7 @@ def history(
     from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.epochs.history import History, dated
 
+    calibrations = each(calibrations)
     check_once(calibrations, "calibration")
     sensors = [sensor_of(one) for one in calibrations]
     names = [
@@ -159,7 +160,7 @@ def lot(
     from accelstudy.api.calibrations import as_campaign, chosen
     from accelstudy.lots.output import Lot
 
-    given = [one for each in campaigns for one in folders_of(each)]
+    given = [folder for one in each(campaigns) for folder in folders_of(one)]
     check_once(given, "sensor")
     measured = [as_campaign(one) for one in given]
     return Lot.of(measured, *chosen(model, approach), seed, cores)

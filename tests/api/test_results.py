@@ -113,6 +113,7 @@ def test_a_result_says_shows_and_draws_itself_and_is_equal_to_itself_alone(every
     if name in ("log", "campaign"):
         return
     assert one.state in repr(one)
+    assert f", {one.state}</b>" in one._repr_html_()
     assert one.verdict in one.summary()
     assert len(one.to_frame()) > 0
     for row in one.to_frame().index[:3] if name in VERBS else ():
@@ -337,6 +338,9 @@ WRONG = {
     "acs.history(calibrations[:2])": "date",
     "acs.history(calibrations[:3], dates=['2025-01-01'])": "1 date for 3 calibrations",
     "acs.lot([folder / 'sensor-0'])": "two sensors or more",
+    "acs.lot(folder / 'sensor-0')": "two sensors or more",
+    "acs.lot(str(folder / 'sensor-0'))": "two sensors or more",
+    "acs.history(str(folder / 'none'))": "none: no such file",
     "acs.export(one, form='x')": "unknown form 'x'",
     "one.intervals(2.0)": "level: expected a probability",
     "one.save(3)": "folder: expected a path",

@@ -26,6 +26,7 @@ class Plan(Block):
     ({"grid": {"size": 0}}, "grid.size", "must be at least 1, not 0"),
     ({"grid": {"sise": 1, "size": 1}}, "grid.sise", "unknown key; did you mean 'size'? (known:"),
     ({}, "grid", "must be given"),
+    ({"gird": {"size": 1}}, "gird", "unknown key; did you mean 'grid'? (known:"),
     ({"grid": [1]}, "grid", "expected keys and values, not [1]"),
     ({"grid": {"size": 0}, "names": 3}, "grid.size", "(and 1 more)"),
     (3, "", "expected keys and values, not 3"),

@@ -109,7 +109,7 @@ REFUSED = [
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--variable othr", "did you mean 'other'"),
     (("log.mat", matlab(log=1j * TABLE)), BY_PLACE, "array log has complex numbers"),
     # Columns, clock and units.
-    (ABAC, "", "which column is fx? The columns are a, b, a, c, counted from 0"),
+    (ABAC, "", "which column is fx? The columns are a, b, a, c, counted from 0; give --colum"),
     (ABAC, "--columns fx=q", "fx: no column 'q'; there are a, b, a, c"),
     (ABAC, "--columns fx=4", "fx: no column 4; there are 4, counted from 0"),
     (ABAC, "--columns fx=a", "fx: there are several columns 'a'"),
@@ -119,7 +119,7 @@ REFUSED = [
     (ABAC, f"{BY_PLACE} --rate 9", "give the rate or the column of time, not both"),
     (ABAC, "--rate -5", "--rate: '-5': must be at least 1e-06 and at most 1e+09 Hz"),
     (ABAC, "--unit ft", "--unit: must be 'm/s^2', 'g', 'mg' or 'counts', not 'ft'"),
-    (ABAC, f"{BY_PLACE} --unit counts", "unit counts needs a nominal scale"),
+    (ABAC, f"{BY_PLACE} --unit counts", "0.00059855 where 1 g is 16384 counts"),
     (ABAC, "--frame fru", "is left-handed"),
     (ABAC, "--range '8 feet'", "--range: expected a number in m/s², g or counts"),
     (ABAC, "--delimiter ab", "--delimiter: must be one mark, as ; or |, or tab or blank"),

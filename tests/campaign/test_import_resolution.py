@@ -58,6 +58,8 @@ def test_what_rounding_leaves_in_a_mean(ratio):
 @pytest.mark.parametrize(("readings", "step"), [
     (np.arange(-5, 9) * 0.1, 0.1),
     (np.unique(np.round(np.arange(-64, 99) * G / 64, 2)), G / 64),  # the file rounds as well
+    # Whole mg of a sensor with steps of 3.9, which was bumped.
+    (np.round(3.9 * np.r_[-200:200, 500, 1234]) * G / 1e3, 3.9e-3 * G),
     (np.array([-3, -2, 4, 9, 10, 40]) * 0.25 + 0.07, 0.25),
     (np.sort(np.random.default_rng(1).normal(size=300)), 0.0),
     (np.arange(5) * 3.0, 0.0),  # no sensor is so coarse

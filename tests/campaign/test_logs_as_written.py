@@ -146,6 +146,13 @@ def test_names_with_units(tmp_path, names, factor, unit):
         found(acs.read_log(path, unit="milli-g"))
 
 
+def test_names_of_a_western_windows_are_read(tmp_path):
+    names = ("Zeit [s]", "Längs [m/s²]", "Quer [m/s²]", "Höhe [m/s²]")
+    path = written(tmp_path, rows_of(table(names=names)), encoding="cp1252")
+    columns = dict(zip(("fx", "fy", "fz"), names[1:], strict=True))
+    assert "from Längs [m/s²], Quer" in said(found(path, time=names[0], columns=columns))
+
+
 @pytest.mark.parametrize("name", [
     "Temp (C)", "Temperature [°C]", "imu_temp", "T_degC", "tempC", "sensorTemperature",
 ])  # fmt: skip

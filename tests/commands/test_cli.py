@@ -216,7 +216,7 @@ def test_unknown_names_and_files(arguments, expected):
 
 
 def test_usage_errors():
-    for arguments in (["scheme"], ["cells"], ["nothing"], ["schemes", "--nothing"]):
+    for arguments in (["scheme"], ["plan"], ["cells"], ["nothing"], ["schemes", "--nothing"]):
         result = call(*arguments)
         assert result.exit_code == 2
         assert "Usage:" in result.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calling import succeed
+from calling import refusal, succeed
 
 from accelstudy.basics import suggested
 from accelstudy.schemes import get_scheme
@@ -80,6 +80,7 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page():
     reading = ("--columns", "fx=0,fy=1,fz=2", "--rate", "50")
     (diagnose, apply) = suggestions(printed)
     succeed(*apply, *reading)
+    assert "a.xlsx: a spreadsheet" in refusal(*apply[:-1], "a.xlsx", *reading)
     done = succeed(*diagnose, "--replicates", "100", "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")

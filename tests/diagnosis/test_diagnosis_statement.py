@@ -1,10 +1,19 @@
 """What a credible set leaves no doubt of, on sets made by hand."""
 
+from types import SimpleNamespace as Diagnosis
+
 import pytest
 from diagnosis_helpers import explanation
 
 from accelstudy.diagnosis.decision.statement import family_of, statement_of
-from accelstudy.diagnosis.report.words import missing, most_probable, not_told_apart, without_a_name
+from accelstudy.diagnosis.report.words import (
+    missing,
+    most_probable,
+    not_told_apart,
+    stands_for,
+    without_a_name,
+)
+from accelstudy.effects import get_effect
 
 SLOW, EVEN = "slow change in time", "even nonlinearity"
 
@@ -193,3 +202,16 @@ def test_names_that_are_not_alike_are_no_component():
 def test_nothing_is_certain_of_what_no_effect_explains(explanations):
     says = without_a_name(statement_of(made(*explanations), cosine))
     assert says.startswith("Something is missing from the model")
+
+
+def test_an_effect_stands_only_for_those_that_the_model_has_not():
+    names = (
+        ("warm_up+bias_drift", 0.64),
+        ("warm_up+thermal_bias", 0.2),
+        ("thermal_bias+bias_drift", 0.1),
+    )
+    finding = Diagnosis(statement=statement_of(made(*names), cosine))
+    assert [len(part.names) for part in finding.statement.certain] == [2, 2]
+    found = [get_effect(name) for name in ("bias_drift", "thermal_bias")]
+    said = stands_for(Diagnosis(verdict="unknown", finding=finding, found=found))
+    assert said == ["In the model thermal bias stands for warm up as well."]

@@ -10,6 +10,7 @@ from session_helpers import NINE, SENSOR, document, write_document
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
+from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.epochs.comparison import Comparison
@@ -68,6 +69,12 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
     apart = wrapped(angles_of(second.correct(readings)) - angles_of(forces))
     np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
     assert [c.parameters[i].name for i in c.change.changed] == ["b_y"]
+
+
+def test_another_gravity_is_said_to_change_the_scales():
+    one, other = calibrated(1), calibrated(1, gravity=G * (1 + 200e-6))
+    assert "in one place, this alone changes each scale by 200 ppm" in compare(one, other).verdict
+    assert "Gravity" not in compare(one, one).verdict
 
 
 def test_what_cannot_be_compared_is_said():

@@ -231,9 +231,10 @@ def place_of(source: Source, key: str, column: Place | None = None) -> int | Non
 
 
 def _not_found(source: Source, key: str) -> InputError:
+    how = "" if key == "time" else f"; give `columns` {key}=NAME, or its number"
     return InputError(
-        f"{source.path}: which column is {key}? "
-        f"The columns are {short_list(source.names)}, counted from 0"
+        f"{source.path}: which column is {key}? The columns are "
+        f"{short_list(source.names) or 'none'}, counted from 0{how}"
     )
 
 
@@ -469,7 +470,7 @@ class Recording:
             where, cell = part.source.look_up(row, place)
             raise InputError(
                 f"{part.path}: {where}, column {part.source.names[place]} (time): time does not "
-                f"increase ({cell}); give the rate if it does not count"
+                f"increase ({cell}); the rate (`rate`) does without it"
             )
         if lost.sum() > MAX_BAD_SHARE * len(lost):
             said, key = self._describe(i, int(np.argmax(lost)))

@@ -390,7 +390,12 @@ def _read(path: Path) -> bytes:
     except (gzip.BadGzipFile, EOFError, zlib.error):
         raise InputError(f"{path}: not a whole gzip file") from None
     if not content.isascii() or 0 in content[:4096]:
-        content = content.decode(_encoding_of(content[:4096]), errors="replace").encode()
+        encoding = _encoding_of(content[:4096])
+        try:
+            content = content.decode(encoding).encode()
+        except UnicodeDecodeError:  # what is no UTF-8 is mostly that of a Western Windows
+            encoding = "cp1252" if encoding.startswith("utf-8") else encoding
+            content = content.decode(encoding, errors="replace").encode()
     return content.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in content else content
 
 

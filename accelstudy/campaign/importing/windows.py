@@ -208,8 +208,8 @@ class Windows:
             )
         noise = _noise_floor(counts)
         sd = max(THRESHOLD_FACTOR * noise, min(QUIET_FACTOR * noise, QUIET))
-        reason = f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s², "
-        return Threshold(sd, noise, reason + "around which windows at rest crowd")
+        reason = f"{sd / noise:.3g} times the noise floor of {noise:.3g} m/s²"
+        return Threshold(sd, noise, f"{reason}, the sd of most windows at rest")
 
 
 def usual_window(log: Recording) -> float:

@@ -288,9 +288,9 @@ def stands_for(diagnosis: Diagnosis) -> list[str]:
     d, said = diagnosis, []
     for part in d.finding.statement.certain if d.verdict == "unknown" else ():
         added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
-        if added and len(part.names) > 1:
-            others = _names([n for n in part.names if n.name not in added])
-            said.append(f"In the model {words(added[0])} stands for {others} as well.")
+        others = [name for name in part.names if name.name not in added]
+        if added and others:
+            said.append(f"In the model {words(added[0])} stands for {_names(others)} as well.")
     return said
 
 
