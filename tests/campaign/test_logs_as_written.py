@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import numpy as np
 import pandas as pd
 import pytest
-from calling import refusal, succeed
+from calling import refusal, refused, succeed
 from log_helpers import BIAS, HAND_RATE, HOLD, HOLDS, MOVE, SCALE, by_hand, found, open_log
 from recorded import EPOCH, message, ulog, write_bag, write_ulog
 
@@ -132,18 +132,18 @@ def test_sensors_of_one_log_lose_the_same_rows(tmp_path):
     (("t", "AccX_mg", "AccY_mg", "AccZ_mg"), 1e3 / G, "mg"),
     (("t", "Acceleration x (m/s²)", "Acceleration y (m/s²)", "Acceleration z (m/s²)"), 1, "m/s^2"),
 ])  # fmt: skip
-def test_names_with_units(tmp_path, names, factor, unit):
+def test_names_with_units(names, factor, unit):
     turns = {"x-axis (deg/s)": 0.1, "wx [rad/s]": 0.2}
-    path = written(tmp_path, rows_of(table(forces=FORCES * factor, names=names, **turns)))
-    campaign = found(path)
+    log = table(forces=FORCES * factor, names=names, **turns)
+    campaign = found(log)
     assert f"({unit})" in said(campaign)
     assert campaign.unit == unit
-    applied = acs.calibrate(campaign).apply(path)
+    applied = acs.calibrate(campaign).apply(log)
     # Rows at rest have the length of gravity.
     norm = np.linalg.norm(applied[[f"f{a}_calibrated_mps2" for a in "xyz"]], axis=1)
     assert np.median(norm) == pytest.approx(G, rel=2e-3)
     if unit == "mg":
-        found(acs.read_log(path, unit="milli-g"))
+        found(acs.read_log(log, unit="milli-g"))
 
 
 def test_names_of_a_western_windows_are_read(tmp_path):
@@ -156,17 +156,15 @@ def test_names_of_a_western_windows_are_read(tmp_path):
 @pytest.mark.parametrize("name", [
     "Temp (C)", "Temperature [°C]", "imu_temp", "T_degC", "tempC", "sensorTemperature",
 ])  # fmt: skip
-def test_a_temperature_by_any_usual_name(tmp_path, name):
-    path = written(tmp_path, rows_of(table(**{name: TEMPERATURE})))
-    campaign = found(path)
+def test_a_temperature_by_any_usual_name(name):
+    campaign = found(table(**{name: TEMPERATURE}))
     np.testing.assert_allclose(campaign.temperature, 20 + campaign.time / 20, atol=0.01)
     assert f"temperature from {name}" in said(campaign)
 
 
 @pytest.mark.parametrize("names", [("imu_temp", "cpu_temp"), ("Temp [K]",), ("temp (°F)",)])
-def test_a_temperature_that_is_not_used_is_said(tmp_path, names):
-    path = written(tmp_path, rows_of(table(**dict.fromkeys(names, 290.5))))
-    campaign = found(path)
+def test_a_temperature_that_is_not_used_is_said(names):
+    campaign = found(table(**dict.fromkeys(names, 290.5)))
     assert campaign.temperature is None
     assert f"temperature: which of {', '.join(names)}, in °C?" in said(campaign)
 
@@ -178,7 +176,7 @@ def test_a_temperature_that_is_not_used_is_said(tmp_path, names):
     ("/imu/data/", "/", "/imu/data/header/stamp/sec", "/imu/data/header/stamp/nanosec"),
     ("", "_", "secs", "nsecs"),
 ])  # fmt: skip
-def test_columns_of_ros_are_recognised(tmp_path, prefix, point, seconds, rest):
+def test_columns_of_ros_are_recognised(prefix, point, seconds, rest):
     whole = np.floor(TIME + 1e-9)
     columns = {
         f"{prefix}header{point}seq": np.arange(N),
@@ -187,9 +185,7 @@ def test_columns_of_ros_are_recognised(tmp_path, prefix, point, seconds, rest):
         f"{prefix}angular_velocity{point}x": 0.0,
     }
     axes = [f"{prefix}linear_acceleration{point}{axis}" for axis in "xyz"]
-    frame = pd.DataFrame(columns).assign(**dict(zip(axes, FORCES.T, strict=True)))
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    assert_timed(found(tmp_path / "log.csv", FLU))
+    assert_timed(found(pd.DataFrame(columns | dict(zip(axes, FORCES.T, strict=True))), FLU))
 
 
 START = pd.Timestamp("2024-01-31 23:58:59")
@@ -233,10 +229,9 @@ def test_dates_and_clocks_are_a_column_of_time(tmp_path, case):
         assert_timed(found(tmp_path / "log.parquet"))
 
 
-def test_years_that_do_not_fit_are_no_traceback(tmp_path):
-    frame = table(time=np.datetime64("2999-01-01", "ms") + np.arange(N))
-    frame.to_parquet(tmp_path / "log.parquet")
-    assert "--rate" in refusal("import", tmp_path / "log.parquet", "--out", tmp_path / "out")
+def test_years_that_do_not_fit_are_no_traceback():
+    with refused("give the rate (`rate`)"):
+        acs.find_holds(table(time=np.datetime64("2999-01-01", "ms") + np.arange(N)))
 
 
 @pytest.mark.parametrize("index", ["dates", "zone", "durations"])
@@ -362,26 +357,23 @@ def test_a_bag_with_fewer_messages_than_it_says(tmp_path):
 # --- other rates, and a file for each position ---------------------------------------------------
 
 
-def test_a_slow_log_has_longer_windows(tmp_path):
+def test_a_slow_log_has_longer_windows():
     """At 5 Hz a second has too few samples for a variance."""
     slow = np.concatenate([np.repeat(FORCES[i : i + 150 : 3], 2, axis=0) for i in range(0, N, 150)])
-    path = written(tmp_path, rows_of(table(time=np.arange(len(slow)) / 5, forces=slow)))
-    found(path)
+    found(table(time=np.arange(len(slow)) / 5, forces=slow))
 
 
-@pytest.mark.parametrize("words", [(), ("--rate", "100")], ids=["untimed", "short"])
-def test_short_files_of_one_position_each_are_taken_whole(tmp_path, words):
-    folder, means = tmp_path / "positions", []
-    folder.mkdir()
+@pytest.mark.parametrize("rate", [None, 100], ids=["untimed", "short"])
+def test_short_files_of_one_position_each_are_taken_whole(tmp_path, rate):
+    means = []
     for number in range(1, HOLDS + 1):
         samples = FORCES[200 * number - 150 : 200 * number - 50]
         if number == 4:  # the sensor is turned in it
             samples = samples + np.linspace(0, 1, 100)[:, None]
         means.append(samples.mean(axis=0))
         frame = pd.DataFrame(samples, columns=["x", "y", "z"])
-        frame.to_csv(folder / f"p{number}.csv", index=False)
-    succeed("import", folder, *words, "--no-figure", "--out", tmp_path / "out")
-    campaign = acs.read_campaign(tmp_path / "out")
+        frame.to_csv(tmp_path / f"p{number}.csv", index=False)
+    campaign = acs.find_holds(tmp_path, rate=rate)
     # The fourth is left out.
     assert campaign.positions.tolist() == [1, 2, 3, *range(5, HOLDS + 1)]
     np.testing.assert_allclose(campaign.forces, np.delete(means, 3, axis=0), atol=1e-9)
