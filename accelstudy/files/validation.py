@@ -125,12 +125,13 @@ WORDS = {
     "string_type": "must be a text",
     "string_unicode": "must be a text in UTF-8",
     "string_too_short": f"{_LEAST} characters",
-    "string_too_long": f"{_MOST} characters",
     **dict.fromkeys(("list_type", "tuple_type"), "must be a list"),
     "too_short": f"{_LEAST} entries",
     "too_long": f"{_MOST} entries",
     **dict.fromkeys(("bool_type", "bool_parsing"), "must be true or false"),
     "literal_error": "must be {expected}",
+    "string_pattern_mismatch": "must match {pattern}",
+    "invalid_key": "a key must be a text",
     **dict.fromkeys(("model_type", "dict_type", "dataclass_type"), _KEYS),
 }
 """What would be right, by the type of pydantic's error; two types have a text of their own."""

@@ -30,7 +30,7 @@ from pydantic_core import core_schema
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
-from accelstudy.basics.errors import InputError
+from accelstudy.basics.errors import InputError, shown
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
@@ -176,15 +176,19 @@ def _simulated(effects: list[str]) -> SensorModel | None:
 _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 
 
-def _own_name(name: str) -> str:
-    if name in MODELS:
-        raise InputError("is the name of a registered model; choose another")
-    if name == "all" or not re.fullmatch(_NAME, name) or len(name) > MAX_NAME_BYTES:
+def _name(name: str) -> str:
+    if not re.fullmatch(_NAME, name) or len(name) > MAX_NAME_BYTES:
         raise InputError(
-            "is not a valid name: use letters, digits, _ and -, "
-            f"at most {MAX_NAME_BYTES} of them, and not `all`"
+            f"{shown(name)} is not a valid name: use letters, digits, _ and -, "
+            f"at most {MAX_NAME_BYTES} of them, and begin with a letter or a digit"
         )
     return name
+
+
+def _own_name(name: str) -> str:
+    if name in MODELS or name == "all":
+        raise InputError("is the name of registered models; choose another")
+    return _name(name)
 
 
 Models = Annotated[list[SensorModel], _several(_model, lambda: [*MODELS, *OWN_MODELS.get()])]
@@ -423,8 +427,9 @@ class Study(Configuration):
         "replicates are enough: leave it out",
     }
 
-    study: Annotated[str, Field(pattern=f"^{_NAME}$", max_length=MAX_NAME_BYTES)] = Field(
-        description="name; results go to results/<study>/"
+    study: Annotated[str, AfterValidator(_name)] = Field(
+        description="name; results go to results/<study>/",
+        json_schema_extra={"pattern": f"^{_NAME}$", "maxLength": MAX_NAME_BYTES},
     )
     seed: kinds.Seed = Field(description="seed of all random numbers")
     gravity_mps2: kinds.Gravity = Field(STANDARD_GRAVITY, description="true local gravity")
