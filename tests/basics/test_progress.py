@@ -47,23 +47,18 @@ def seen(screen, quiet=False):
     return screen.getvalue()
 
 
-def test_bars_on_a_terminal():
+def test_what_takes_long_gets_bars_on_a_terminal_alone(monkeypatch):
+    """Not if quiet, in a pipe, used from Python, or fast."""
     text = seen(Terminal())
     assert "null simulation" in text
     assert "sets" in text
-
-
-def test_what_is_fast_gets_no_bar(monkeypatch):
-    monkeypatch.setattr(progress, "DELAY", 2.0)
-    assert seen(Terminal()) == ""
-
-
-def test_nothing_if_quiet_in_a_pipe_or_used_from_python(monkeypatch):
-    assert seen(Terminal(), quiet=True) == ""
-    assert seen(io.StringIO()) == ""
+    assert seen(Terminal(), quiet=True) == seen(io.StringIO()) == ""
     with redirect_stderr(Terminal()) as screen:
         work()
     assert screen.getvalue() == ""
+    monkeypatch.setattr(progress, "DELAY", 2.0)
+    assert seen(Terminal()) == ""
+    monkeypatch.setattr(progress, "DELAY", 0.0)
     monkeypatch.setenv("TERM", "dumb")
     assert seen(Terminal()) == ""
 

@@ -18,6 +18,7 @@ import pandas as pd
 import pytest
 import yaml
 from calling import succeed
+from log_helpers import session
 from places import ROOT
 from recorded import write_bag
 from transcript import commands_of_page
@@ -113,11 +114,9 @@ def read(force):
 
 def logged(seed, directions, moving, still):
     """True forces of a session, and its readings: each position is shaken before it rests."""
-    rng, parts = np.random.default_rng(seed), []
-    for force in -GRAVITY * directions:
-        parts += [force + rng.normal(0, 2, (moving, 3)), np.tile(force, (still, 1))]
-    true = np.concatenate(parts)
-    return true, read(true) + rng.normal(0, 0.005, true.shape)
+    true, _ = session(seed, sigma=0, still=still, moving=moving, forces=-GRAVITY * directions)
+    noise = np.random.default_rng(seed).normal(0, 0.005, true.shape)
+    return true, read(true) + noise
 
 
 def test_a_geodesist_levels_a_log(typed_in):
