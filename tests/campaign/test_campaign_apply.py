@@ -9,18 +9,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from calling import refused
-from campaign_helpers import GRAVITY, NINE, ROBOT, simulated_campaign
+from campaign_helpers import NINE, ROBOT, simulated_campaign
 
+import accelstudy as acs
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.applying import calibration_of, read_calibration
-from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import Source
-from accelstudy.campaign.session import Campaign
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
@@ -35,8 +33,7 @@ AXES = ["fx", "fy", "fz"]
 @pytest.fixture(scope="module")
 def plain():
     """A calibration of the nine parameters, with a robot."""
-    fit = fit_campaign(simulated_campaign(TRUTH), NINE, ROBOT)
-    return calibration_of(calibration_document(fit))
+    return acs.calibrate(simulated_campaign(TRUTH), approach="robot").sensor
 
 
 @pytest.fixture
@@ -129,29 +126,20 @@ def test_what_is_no_calibration_is_one_line(plain, tmp_path, change, part):
 
 SESSION = 600.0
 SIGMA = 1e-4
+IDEAL = [f"{name}: 0, 0, 0" for name in ("bias", "scale", "nonorthogonality")]
 ATTITUDES = np.random.default_rng(4).uniform(-60, 60, (40, 2)) * GON
 
 
-def calibrated(effects, values, approach=GRAVITY, **changes):
+def calibrated(effects, values, approach="gravity", **changes):
     """A calibration that has effects, in a session with time, temperature and vibration."""
-    model = get_model(f"bias-scale-nonorthogonality+{effects}")
-    directions = get_scheme("fibonacci-30").directions
-    n = len(directions)
-    rng = np.random.default_rng(3)
-    conditions = {
-        "time": np.linspace(10, SESSION, n),
-        "temperature": rng.uniform(15, 35, n),
-        "vibration": rng.uniform(0, 2, n),
-        "yaw": rng.uniform(-3, 3, n),
-    }
-    simulated = session(model, model.vector(values), directions, hold=HoldConditions(**conditions))
-    drawn = simulated.draw(Noise(sigma_force=SIGMA, sigma_angle=0.1 * MGON), 1, rng)
-    angles = {"angles": drawn.angles[0], "sigma_angle": 0.1 * MGON} if approach is ROBOT else {}
-    campaign = Campaign(
-        name="extended", positions=np.arange(1, n + 1), forces=drawn.forces[0],
-        gravity=simulated.gravity, sigma_force=SIGMA, **{**conditions, **angles, **changes},
+    sizes = ", ".join(str(values.get(name, 0)) for name in get_model(effects).parameter_names)
+    campaign = acs.simulate_campaign(
+        seed=2, scheme="fibonacci-30", effects=(*IDEAL, f"{effects}: {sizes}"), sigma=SIGMA,
+        robot_sigma="0.1mgon", interval=SESSION / 29, temperature="15:35",
+        temperature_order="random", vibration="0:2", yaw="random",
     )  # fmt: skip
-    return calibration_of(calibration_document(fit_campaign(campaign, model, approach)))
+    model = f"bias-scale-nonorthogonality+{effects}"
+    return acs.calibrate(replace(campaign, **changes), model=model, approach=approach).sensor
 
 
 def rows_of(effects, values, **columns):
@@ -253,7 +241,7 @@ def test_the_sensor_takes_along_what_is_its_own(effects, values):
     """What the rig had is left with it; the rotation against the flange is taken along."""
     own = values if effects == "mounting_rotation" else {}
     known = dict(zip(get_model(effects).parameter_names, values.values(), strict=True))
-    taken = calibrated(effects, known, ROBOT)
+    taken = calibrated(effects, known, "robot")
     assert {name for name in known if name in taken.model.parameter_names} == set(own)
     table, warnings = leveled_rows(taken, rows_of("mounting_rotation", own), sigma=0.0)
     assert_leveled(table)
