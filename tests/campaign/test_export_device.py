@@ -13,18 +13,14 @@ import numpy as np
 import pytest
 from calling import refusal, refused, succeed
 
-from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
+import accelstudy as acs
+from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.c_code import c_header
-from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export, losses
-from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import HoldConditions, effect_names, get_effect
 from accelstudy.sensors.frames import parse_frame
-from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.models import compose
 
 G = 9.81
 MGON = np.pi / 200 / 1000
@@ -246,20 +242,19 @@ def test_a_header_says_what_it_takes_and_where_it_is_from():
 
 
 @cache
-def content_of(model, temperature=False):
-    """Content of calibration.json of a campaign that has the effects beside a model."""
-    warmed = {"temperature": (10, 40), "temperature_order": "random"} if temperature else {}
-    settings = CampaignSettings(
+def calibration_of(model):
+    """A calibration of a campaign that has the effects beside a model."""
+    warm = {"temperature": (10, 40), "temperature_order": "random"} if "thermal" in model else {}
+    campaign = acs.simulate_campaign(
         scheme="fibonacci-36", repeat_first=6, order="random", seed=11,
-        effects=tuple(model.split("+")[1:]), **warmed,
+        effects=model.split("+")[1:], **warm,
     )  # fmt: skip
-    campaign, _ = simulate_campaign(settings)
-    fit = fit_campaign(campaign, get_model(model), get_approach("gravity"))
-    return calibration_document(fit)
+    return acs.calibrate(campaign, model=model, approach="gravity")
 
 
-def calibrated(model, *, temperature=False, **changes):
-    return calibration_of({**content_of(model, temperature), **changes})
+def read_in(**layout):
+    """The calibration of nine parameters, of a log with a layout."""
+    return replace(calibration_of(NINE).sensor, log=LogLayout(**layout))
 
 
 NINE = "bias-scale-nonorthogonality"
@@ -268,7 +263,7 @@ NINE = "bias-scale-nonorthogonality"
 def written(folder, model, **changes):
     """Path of calibration.json."""
     path = folder / "calibration.json"
-    path.write_text(json.dumps({**content_of(model), **changes}), encoding="utf-8")
+    path.write_text(json.dumps({**calibration_of(model).content, **changes}), encoding="utf-8")
     return path
 
 
@@ -330,7 +325,7 @@ def corrected_by_px4(p, readings, temperature):
 
 
 def test_px4_holds_bias_scale_and_curves_of_the_temperature():
-    calibration = calibrated("bias-scale+thermal_bias+thermal_curve", temperature=True)
+    calibration = calibration_of("bias-scale+thermal_bias+thermal_curve").sensor
     assert losses(calibration, "px4") == []
     parameters = px4_of(export(calibration, "px4"))
     assert parameters["TC_A_ENABLE"] == 1
@@ -353,7 +348,7 @@ def test_what_px4_cannot_hold_is_said_with_its_size(model, missing, tmp_path):
     assert f"has no place for {missing};" in warning
     assert warning.removeprefix("warning: ") in result.stdout
     said = [float(n) for n in re.findall(r"by ([\d.]+) mgon", warning)[:2]]
-    calibration = calibrated(model)
+    calibration = calibration_of(model).sensor
     rng, n = np.random.default_rng(3), 20000
     z, azimuth = rng.uniform(np.cos(np.pi / 4), 1, n), rng.uniform(0, 2 * np.pi, n)
     r = np.sqrt(1 - z**2)
@@ -376,8 +371,9 @@ def test_matrix_has_what_imu_calib_takes(frame, unit):
     """SM · reading − bias, with the first three columns and minus the last one."""
     counts = unit == "counts"
     scale, offset = ([0.02, 0.021, 0.019], [5, 1, -4]) if counts else ([9.80665] * 3, [0.0] * 3)
-    log = {"unit": unit, "frame": frame, **({"scale": scale, "offset": offset} if counts else {})}
-    calibration = calibrated(NINE, log=log)
+    calibration = read_in(unit=unit, frame=frame, **(
+        {"scale": scale, "offset": offset} if counts else {}
+    ))  # fmt: skip
     matrix = np.loadtxt(StringIO(export(calibration, "matrix")))
     sm, bias = matrix[:, :3], -matrix[:, 3]
     axes, forces = parse_frame(frame), attitudes(30)
@@ -386,12 +382,8 @@ def test_matrix_has_what_imu_calib_takes(frame, unit):
     np.testing.assert_allclose(readings @ sm.T - bias, axes.from_frd(forces), atol=1e-9)
 
 
-def test_px4_takes_no_counts():
-    log = {"unit": "counts", "scale": [0.02] * 3, "offset": [0] * 3, "frame": "frd"}
-    with pytest.raises(InputError, match="PX4 takes readings in m/s\\^2"):
-        export(calibrated(NINE, log=log), "px4")
-
-
-def test_px4_has_no_lag():
-    (loss,) = losses(calibrated("bias-scale+thermal_bias(tau=300)", temperature=True), "px4")
+def test_px4_takes_no_counts_and_has_no_lag():
+    with refused("PX4 takes readings in m/s^2"):
+        export(read_in(unit="counts", scale=[0.02] * 3, offset=[0] * 3), "px4")
+    (loss,) = losses(calibration_of("bias-scale+thermal_bias(tau=300)").sensor, "px4")
     assert "thermal_bias with one of 300 s is right at a settled temperature only" in loss
