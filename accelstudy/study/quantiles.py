@@ -63,10 +63,11 @@ def controlled_quantiles(
     variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
     if count < MIN_REPLICATES or theory is None or known is None or not np.isfinite(known).all():
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
-    paired = theory if converged is None else theory[converged]
     failed = len(theory) - count
+    paired = theory[converged] if failed else theory
     linear, low, high = np.quantile(theory, [p, p - wide, p + wide])
-    sd = _sd_near((own - paired)[:DIFFERENCE_REPLICATES], paired[:DIFFERENCE_REPLICATES], p, wide)
+    some = slice(DIFFERENCE_REPLICATES)
+    sd = _sd_near(own[some] - paired[some], paired[some], p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
         # Share of the replicates that only one of the two has below its quantile.
         apart = MEAN_OF_NORMAL * sd / slope + failed / len(theory)

@@ -121,7 +121,7 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     def coded(names: Collection[str]) -> pa.DictionaryArray:
         different = [*dict.fromkeys(names)]
         codes = np.array([different.index(name) for name in names], np.int32)
-        return pa.DictionaryArray.from_arrays(np.resize(codes, count * u), different)
+        return pa.DictionaryArray.from_arrays(np.tile(codes, count * u // len(codes)), different)
 
     columns = {
         "cell": coded([cell.name]),

@@ -169,10 +169,10 @@ def calibrations(cell: Cell, block: Block) -> dict[str, Array]:
         "sigma_priori": priori,
         "sigma_posteriori": posteriori,
         "sigma_and_error": together,
-        "inside": (np.abs(error) <= sigmas_95(block.redundancy) * posteriori).astype(float),
+        "inside": np.abs(error) <= sigmas_95(block.redundancy) * posteriori,
         "variance_factor": factor,
         "tilt_squared": squares,
-        "tilt": np.column_stack([tilt, tilt.max(axis=1)]),
+        "tilt": np.column_stack([tilt, np.maximum(*tilt.T)]),
     }
 
 
