@@ -142,10 +142,7 @@ def cells(configs: Sequence[str | PathLike[str]]) -> None:
 
 @verb
 def claims(results: str | PathLike[str]) -> None:
-    """Print the verdicts on claims as Markdown.
-
-    The paper's claims stand first, then those of this project about what simulation adds to linear
-    theory.
+    """Print the verdicts on the paper's claims as Markdown.
 
     Parameters
     ----------

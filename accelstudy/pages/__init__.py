@@ -39,9 +39,6 @@ BADGES = {
     "reproduced": ("✓ reproduced", "good"),
     "not reproduced": ("✗ not reproduced", "bad"),
     "slip in the paper": ("! slip in the paper", "noise"),
-    "holds": ("✓ holds", "good"),
-    "does not hold": ("✗ does not hold", "bad"),
-    "not decided": ("? not decided", "open"),
 }
 """Word and colour class of each verdict; none rests on the colour alone."""
 WORDS = ("amount", "counted", "number", "p_value", "short_list", "words")

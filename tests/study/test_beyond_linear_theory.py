@@ -6,7 +6,7 @@ import pytest
 from study_helpers import NINE, grid, make_study, run_study
 
 from accelstudy.study.figures import draw, figure_names
-from accelstudy.study.figures.theory import largest_of_groups
+from accelstudy.study.figures.beyond_linear_theory import largest_of_groups
 
 NAME = "beyond-linear-theory"
 SIGMA = 0.3

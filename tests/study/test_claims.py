@@ -1,4 +1,4 @@
-"""The paper's claims and those of this project: verdicts that can be either.
+"""The paper's claims: verdicts that can be either.
 
 The golden set keeps their numbers.
 """
@@ -16,20 +16,15 @@ from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
-from accelstudy.study.beyond_linear_theory import beyond_linear_theory
 from accelstudy.study.claims.page import claims_markdown, claims_page
 from accelstudy.study.claims.quantities import Evidence, claim_table
 from accelstudy.study.claims.verdicts import (
-    FAILS,
-    HOLDS,
     NOT_REPRODUCED,
-    OPEN,
     REPRODUCED,
     TABLES,
     judge,
     judge_claim,
     judge_claims,
-    judge_simulation,
 )
 from accelstudy.study.sensitivity import shapley_table
 
@@ -166,74 +161,6 @@ def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
     assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]
 
 
-# --- what simulation adds ------------------------------------------------------------------------
-
-
-def simulation(schemes=("mclaren-24", "rings-24"), of="rings-24", **changed):
-    """Numbers of made-up set-ups, of which those of some parameters by gravity are others."""
-    usual = {"bias": 1e-4, "excess": -1e-4, "bias_half": 1e-5, "excess_half": 1e-5}
-    labels = {"model": NINE, "sensor_sigma_mps2": 0.002}
-    rows = pd.DataFrame([
-        {**labels, "scheme": scheme, "approach": approach, "parameter": parameter, **usual}
-        for scheme in schemes for approach in ("gravity", "robot") for parameter in ("b_x", "s_z")
-    ])  # fmt: skip
-    there = (rows["scheme"] == of) & (rows["approach"] == "gravity") & (rows["parameter"] == "s_z")
-    for column, value in changed.items():
-        rows.loc[there, column] = value
-    return rows
-
-
-def judged_simulation(rows):
-    return pd.DataFrame(judge_simulation(rows, 0.002)).set_index("claim")
-
-
-@pytest.mark.parametrize(("claim", "changed", "verdict", "ours"), [
-    ("bias-small", {}, HOLDS, 0.01),
-    ("bias-small", {"bias": -0.009, "bias_half": 5e-4}, HOLDS, 0.9),
-    ("bias-small", {"bias": -0.009, "bias_half": 2e-3}, OPEN, 0.9),
-    ("bias-small", {"bias": 0.011, "bias_half": 2e-3}, OPEN, 1.1),
-    ("bias-small", {"bias": -0.05}, FAILS, 5),
-    ("variance-linear", {}, HOLDS, 0.01),
-    ("variance-linear", {"excess": 0.009, "excess_half": 2e-3}, OPEN, 0.9),
-    ("variance-linear", {"excess": -0.04}, FAILS, 4),
-    ("noise-when-off", {}, HOLDS, 10),
-    ("noise-when-off", {"excess": 0.001, "excess_half": 2e-3}, OPEN, np.sqrt(10)),
-    ("noise-when-off", {"excess": 0.01}, FAILS, 1),
-])  # fmt: skip
-def test_what_simulation_adds_holds_or_not_or_is_not_decided(claim, changed, verdict, ours):
-    claims = judged_simulation(simulation(**changed))
-    judged = claims.loc[f"{claim}-gravity"]
-    assert judged["verdict"] == verdict
-    assert judged["ours"] == pytest.approx(ours)
-    assert judged["ci95_low"] < judged["ours"] < judged["ci95_high"]
-    assert (f"with {NINE} (rings-24)" in judged["sentence"]) == bool(changed)
-    counts = int(verdict == FAILS), int(verdict == OPEN)
-    assert "Not so in {} and not decided in {} of 2 set-ups.".format(*counts) in judged["sentence"]
-    assert set(claims.filter(like="-robot", axis=0)["verdict"]) == {HOLDS}
-
-
-def test_what_simulation_adds_in_simulated_set_ups(tables, judged):
-    """At 2 mm/s² linear theory is right; in the limits there is no room for anything else."""
-    own = judged[judged["section"] == ""]
-    assert len(own) == 6
-    assert own["paper"].isna().all()
-    assert set(own.loc[["bias-small-robot", "variance-linear-robot"], "verdict"]) == {HOLDS}
-    rows = beyond_linear_theory(tables["cells"], tables["summary"])
-    rows = rows[rows["approach"] == "gravity"]
-    assert own.loc["bias-small-gravity", "ours"] == pytest.approx(100 * rows["bias"].abs().max())
-    off = np.sqrt(0.01 / rows["excess"].abs().max())
-    assert own.loc["noise-when-off-gravity", "ours"] == pytest.approx(off)
-
-
-def test_what_simulation_adds_is_judged_at_the_papers_noise_and_where_theory_knows_all(evidence):
-    rows = simulation()
-    noisy = rows.assign(sensor_sigma_mps2=0.2, bias=1.0, bias_half=0.0)
-    both = judged_simulation(pd.concat([rows, noisy]))
-    pd.testing.assert_frame_equal(both, judged_simulation(rows))
-    heavy = evidence(noise={"effects": ["heavy_tails(nu=3)"]})
-    assert (judge(heavy)["section"] != "").all()
-
-
 # --- for people ----------------------------------------------------------------------------------
 
 
@@ -244,11 +171,7 @@ def test_every_claim_is_on_the_page_and_in_the_markdown(judged, evidence):
         for words in (row["statement"], row["sentence"], row["verdict"]):
             assert words in text_of(page)
             assert words in text
-    papers = claims[claims["section"] != ""]
-    first = text.partition("\n\n")[0]
-    assert [line.count("|") for line in first.splitlines()] == [7] * (len(papers) + 2)
-    assert "not of the paper" in page
-    assert "not of the paper" not in claims_page(papers, schemes)
+    assert [line.count("|") for line in text.splitlines()] == [7] * (len(claims) + 2)
     assert "<b>&</b>" not in page
     assert "&lt;b&gt;&amp;&lt;/b&gt;" in page
     assert not re.search(r"\bnan\b", page + text, re.IGNORECASE)

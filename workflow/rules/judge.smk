@@ -54,6 +54,6 @@ rule claims:
     params:
         version=VERSION,
     message:
-        "Judge the paper's claims, and what simulation adds"
+        "Judge the paper's claims"
     script:
         "../scripts/claims.py"

@@ -18,11 +18,9 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
     """Page (HTML, self-contained) with all claims and their verdicts."""
     from accelstudy.pages import render  # which shows numbers as here
 
-    papers, own = claim_rows(claims)
     return render(
         "study/claims/page.html.j2",
-        papers=papers,
-        own=own,
+        claims=claim_rows(claims),
         schemes=_scheme_rows(by_scheme),
         next_steps=[
             ("See what another study would run", f"accelstudy cells config/config.yaml {SWEEP}"),
@@ -32,31 +30,31 @@ def claims_page(claims: pd.DataFrame, by_scheme: pd.DataFrame) -> str:
 
 
 def claims_markdown(claims: pd.DataFrame) -> str:
-    """The claims as tables in Markdown, one row each: those of the paper, then of this project."""
-    return "\n".join(_markdown(rows) for rows in claim_rows(claims) if rows)
-
-
-def _markdown(rows: Rows) -> str:
+    """The claims as a table in Markdown, one row each."""
+    rows = claim_rows(claims)
     bold = [{**row, "verdict": f"**{row['verdict']}**"} for row in rows]
     lines = [[*rows[0]], ["---"] * len(rows[0]), *(row.values() for row in bold)]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
-def claim_rows(claims: pd.DataFrame) -> tuple[Rows, Rows]:
-    """Return what readers see of the claims of the paper, and of those of this project."""
-    papers, own = [], []
+def claim_rows(claims: pd.DataFrame) -> Rows:
+    """Return what readers see of the claims."""
+    rows = []
     for claim in claims.to_dict("records"):
         unit = "" if claim["unit"] in ("1", "ratio") else f" {claim['unit']}"
         spread = interval(claim["ci95_low"], claim["ci95_high"])
-        ours = f"{number(claim['ours'])}{unit}" + (f" ({spread})" if spread else "")
-        judged = {"verdict": claim["verdict"], "why": claim["sentence"]}
-        if claim["section"]:
-            paper = "–" if pd.isna(claim["paper"]) else f"{number(claim['paper'])}{unit}"
-            said = {"section": claim["section"], "claim": claim["statement"], "paper": paper}
-            papers.append({**said, "ours (95 % interval)": ours, **judged})
-        else:
-            own.append({"claim": claim["statement"], "found (95 % interval)": ours, **judged})
-    return papers, own
+        row = {
+            "section": claim["section"],
+            "claim": claim["statement"],
+            "paper": "–" if pd.isna(claim["paper"]) else f"{number(claim['paper'])}{unit}",
+            "ours (95 % interval)": f"{number(claim['ours'])}{unit}",
+            "verdict": claim["verdict"],
+            "why": claim["sentence"],
+        }
+        if spread:
+            row["ours (95 % interval)"] += f" ({spread})"
+        rows.append(row)
+    return rows
 
 
 def _scheme_rows(by_scheme: pd.DataFrame) -> Rows:

@@ -1,101 +1,29 @@
-"""The Monte Carlo compared with closed forms and linear theory, and what it adds to them."""
+"""What simulation adds to linear theory, which knows no bias and one variance."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from accelstudy.basics.shares import Z95
 from accelstudy.drawing import style
-from accelstudy.study.beyond_linear_theory import (
-    MIN_NONLINEAR_SHARE,
-    beyond_linear_theory,
-    knows_all,
-    noise_when_off,
-)
 from accelstudy.study.figures.factors import NOISES
-from accelstudy.study.figures.panels import MAX_PANELS, key, narrow, panels, points
+from accelstudy.study.figures.panels import MAX_PANELS, key, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
-BAND = "#DDDDDD"
-GAP = 0.25
-"""Space between two groups of parameters, whose width is 1."""
-
-
-@register("closed-forms", "summary", angles=False)
-def monte_carlo_against_theory(tables: Tables, study: Study) -> Figure:
-    """Monte Carlo against closed forms and linear theory.
-
-    Empirical standard deviation of each parameter of each cell over the expected one: from the
-    closed forms where they apply (left), from linear theory elsewhere (right). The empirical ones
-    are plain, without a control variate, so that they owe nothing to linear theory. The grey band
-    is where 95 % of the points are expected from the number of simulated calibrations alone, and
-    the share that lies in it is written below. Points are ordered by approach and by that number.
-    """
-    table = ratios_to_theory(tables["summary"])
-
-    def draw(ax: Axes, rows: DataFrame) -> None:
-        ax.axhline(1, color=style.INK, linewidth=0.6)
-        ax.grid(False, axis="x")
-        groups = style.in_order(rows["group"])
-        for i, group in enumerate(groups):
-            members = rows[rows["group"] == group].sort_values(["approach", "half"])
-            members = members.assign(x=i * (1 + GAP) + np.linspace(0, 1, len(members)))
-            low, high = 1 - members["half"], 1 + members["half"]
-            ax.fill_between(members["x"], low, high, step="mid", color=BAND, linewidth=0)
-            points(ax, members, y="ratio", markersize=1.6, markeredgewidth=0)
-        names = [narrow(style.group_label(group)) for group in groups]
-        ax.set_xticks(np.arange(len(groups)) * (1 + GAP) + 0.5, names)
-        ax.tick_params(axis="x", length=0)
-
-    legend = [
-        *style.approach_handles(table["approach"].unique()),
-        key("where 95 % are expected", color=BAND, linewidth=6),
-        key("equal", linewidth=0.6),
-    ]
-    return panels(
-        table,
-        draw,
-        60,
-        column="theory",
-        xlabel="within the band: {share}",
-        ylabel="plain empirical sd / expected sd",
-        legend=legend,
-        width_ratios=table.groupby("theory")["group"].nunique().clip(lower=2),
-    )
-
-
-def ratios_to_theory(summary: DataFrame) -> DataFrame:
-    """Parameters with `ratio`, the plain empirical over the expected sd, and `half` of its band.
-
-    `share` says how many of all that are compared with the same `theory` lie within the band.
-    """
-    exact = summary["sd_closed_form"].notna()
-    expected = summary["sd_closed_form"].where(exact, summary["sd_linear"])
-    table = summary.assign(
-        group=summary["parameter"].map(style.group_of),
-        theory=np.where(exact, "closed form", "linear theory (other cells)"),
-        ratio=summary["sd_plain"] / expected,
-        half=Z95 / np.sqrt(2 * (summary["n_converged"].astype(float).clip(lower=2) - 1)),
-    )
-    table = table[(summary["n_converged"] > 1) & np.isfinite(table["ratio"])]
-    within = (table["ratio"] - 1).abs() <= table["half"]
-    shares = {
-        theory: f"{100 * its.mean():.1f} % of {len(its)} sds"
-        for theory, its in within.groupby(table["theory"])
-    }
-    return table.assign(share=table["theory"].map(shares)).sort_values("theory", kind="stable")
-
-
-# --- what simulation adds ------------------------------------------------------------------------
-
+MIN_NONLINEAR_SHARE = 0.01
+"""Share of the variance from which linear theory counts as off."""
 APPROACH_DISTANCE = 0.36
 """Height between two approaches; rows are 1 apart."""
 LIMIT: style.Style = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
 ROW_MM = 4.2
 
 
-@register("beyond-linear-theory", "cells", "summary", when=knows_all, angles=False)
-def draw_beyond_linear_theory(tables: Tables, study: Study) -> Figure:
+@register(
+    *("beyond-linear-theory", "cells", "summary"),
+    # Calibrations know of all that is simulated, and linear theory with them.
+    when=lambda study: study.simulated_effects is None and not study.noise.effects,
+    angles=False,
+)
+def beyond_linear_theory(tables: Tables, study: Study) -> Figure:
     """What simulation adds to linear theory.
 
     How far simulated calibrations are from linear theory, which knows no bias and one variance.
@@ -152,7 +80,7 @@ def largest_of_groups(tables: Tables) -> DataFrame:
     """
     import pandas as pd
 
-    rows = beyond_linear_theory(tables["cells"], tables["summary"])
+    rows = bias_and_excess(tables["cells"], tables["summary"])
     rows = rows.assign(
         group=rows["parameter"].map(style.group_of),
         title=rows["model"].map(style.model_title),
@@ -166,6 +94,42 @@ def largest_of_groups(tables: Tables) -> DataFrame:
     keys = ["cell", "title", "approach", "group", "noise", "quantity", "label"]
     table = pd.concat(parts).groupby(keys, sort=False)[["size", "limit"]].max().reset_index()
     excess = table[(table["quantity"] == "excess") & (table["noise"] > 0)]
-    off = {name: noise_when_off(excess["noise"], excess[name]) for name in ("size", "limit")}
+    # The excess grows with the square of the noise; where there is none, that noise is infinite.
+    off = {
+        name: excess["noise"] * np.sqrt(MIN_NONLINEAR_SHARE / excess[name])
+        for name in ("size", "limit")
+    }
     label = f"{NOISES[0].title} for {100 * MIN_NONLINEAR_SHARE:g} % / {NOISES[0].shown_unit}"
     return pd.concat([table, excess.assign(quantity="noise", label=label, **off)])
+
+
+def bias_and_excess(cells: DataFrame, summary: DataFrame) -> DataFrame:
+    """Bias and excess of the variance of each parameter of each cell, with their uncertainties.
+
+    Parameters
+    ----------
+    cells, summary : tables of a study
+
+    Returns
+    -------
+    DataFrame
+        Rows of `summary` with `bias` over the standard deviation, `excess` (the variance over that
+        of linear theory, less 1), and `bias_half` and `excess_half`: half the width of intervals
+        that hold all numbers of their column together with a probability of 95 %.
+    """
+    from scipy import special
+
+    compared = (cells["control"] == "linear") & (cells["n_converged"] > 1)
+    compared &= cells["gravity_error_mps2"] == 0
+    rows = summary[summary["cell"].isin(cells["cell"][compared])]
+    relative = (rows["sd_empirical"] / rows["sd_linear"]) ** 2
+    errors = {
+        "bias": rows["bias_se"] / rows["sd_empirical"],
+        "excess": 2 * relative * rows["sd_se"] / rows["sd_empirical"],
+    }
+    rows = rows.assign(bias=rows["bias"] / rows["sd_empirical"], excess=relative - 1)
+    known = np.isfinite(errors["bias"]) & np.isfinite(errors["excess"])
+    both_tails = 0.05 / max(int(known.sum()), 1)
+    sigmas = special.stdtrit(rows["n_converged"] - 1, 1 - both_tails / 2)
+    halves = {f"{name}_half": sigmas * error for name, error in errors.items()}
+    return rows.assign(**halves)[known]
