@@ -40,18 +40,18 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
 
 def study_tables(study: Study) -> dict[str, pd.DataFrame]:
     """Run a checked study in memory; see `run_study`."""
-    estimates: dict[str, pd.DataFrame] = {}
+    estimates: list[pd.DataFrame] = []
 
     def keep(cell: Cell, replicates: Replicates) -> None:
         settings = study.sensitivity
         if study.paper and settings and cell.name == settings.cell(cell.approach, cell.scheme):
-            estimates[cell.name] = estimates_table(cell, replicates).to_pandas()
+            estimates.append(estimates_table(cell, replicates).to_pandas())
 
     tables = simulated_tables(study.cells, study.seed, keep)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        evidence = Evidence(study, tables, estimates.__getitem__)
+        evidence = Evidence(study, tables, pd.concat(estimates))
         tables |= {"claims": judge(evidence), "claims_by_scheme": evidence.by_scheme}
     return tables

@@ -66,12 +66,11 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables):
     """Function that gives the evidence where the study, its tables or `by_scheme` are others."""
-    estimates_of = tables["estimates"].groupby("cell", observed=True).get_group
-    usual = Evidence(make_study(**KEYS), tables, estimates_of)
+    usual = Evidence(make_study(**KEYS), tables, tables["estimates"])
 
     def of(by_scheme=usual.by_scheme, noise=(), **changed):
         study = make_study(**KEYS, noise=dict(noise))
-        other = Evidence(study, {**tables, **changed}, estimates_of)
+        other = Evidence(study, {**tables, **changed}, usual.estimates)
         vars(other)["by_scheme"] = by_scheme
         return other
 
@@ -155,7 +154,7 @@ def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
     usual = evidence()
-    other = Evidence(usual.study, {**tables, "summary": summary}, usual.estimates_of)
+    other = Evidence(usual.study, {**tables, "summary": summary}, usual.estimates)
     reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
     assert set(reductions["scheme"]) == {"mclaren-24"}
     assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]

@@ -6,7 +6,7 @@ claim, and further numbers that its rule or its sentence uses.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -35,10 +35,7 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
-ESTIMATED = [
-    *("replicate", "parameter", "converged"),
-    *("sigma_priori", "omega", "linear_omega", "redundancy"),
-]
+ESTIMATED = ["cell", "converged", "sigma_priori", "omega", "linear_omega", "redundancy"]
 """Columns of the estimates that are used."""
 LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
 """Probabilities of quantiles of single simulations: the first and the last are the ends of the
@@ -60,12 +57,12 @@ class Evidence:
     ----------
     study : Study, with `sensitivity`
     tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
-    estimates_of : function that returns estimates of a cell by its name, at least `ESTIMATED`
+    estimates : DataFrame, the estimates of the cells that the claims use, at least `ESTIMATED`
     """
 
     study: Study
     tables: Mapping[str, pd.DataFrame]
-    estimates_of: Callable[[str], pd.DataFrame]
+    estimates: pd.DataFrame
 
     @property
     def settings(self) -> SensitivityConfig:
@@ -85,6 +82,26 @@ class Evidence:
         """Rows of a table that are of one cell."""
         rows = self.tables[table]
         return rows[rows["cell"] == self.settings.cell(approach, scheme)]
+
+    @cached_property
+    def sigmas(self) -> dict[str, tuple[Cell, Array]]:
+        """Cells by their names, each with sigmas a posteriori of its calibrations that converged.
+
+        They are (2, c, u) arrays, of the calibrations and by linear theory of the same noise.
+        """
+        cells, sigmas = {cell.name: cell for cell in self.study.cells}, {}
+        converged = self.estimates[self.estimates["converged"]]
+        for name, rows in converged.groupby("cell", observed=True):
+            cell = cells[str(name)]
+            omega, linear, priori = (
+                rows[column].to_numpy().reshape(-1, cell.n_unknowns)
+                for column in ("omega", "linear_omega", "sigma_priori")
+            )
+            theory, freedom = cell.linear_theory, rows["redundancy"].iloc[0] or np.nan
+            by_theory = np.nan if theory is None else theory.sigma
+            both = np.sqrt(omega / freedom) * priori, np.sqrt(linear / freedom) * by_theory
+            sigmas[cell.name] = cell, np.stack(both)
+        return sigmas
 
     @cached_property
     def by_scheme(self) -> pd.DataFrame:
@@ -244,14 +261,12 @@ def reduction(evidence: Evidence, effect: str) -> Numbers:
 
 def single_reductions(evidence: Evidence, effect: str, scheme: str, paper: float) -> Numbers:
     """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
-    cells = {cell.name: cell for cell in evidence.study.cells}
-    pair = [cells[evidence.settings.cell(each, scheme)] for each in reversed(APPROACHES)]
-    sigmas = [_sigmas(cell, evidence.estimates_of(cell.name), effect) for cell in pair]
-    n, known = min(map(len, sigmas)), None
-    ratio, linear = (sigmas[0][:n] / sigmas[1][:n]).T
-    robot, gravity = map(KnownValues.of, pair)
-    if robot and gravity:
-        known = robot.effect_ratio_quantiles(gravity, effect, LEVELS)
+    pair = [evidence.sigmas[evidence.settings.cell(each, scheme)] for each in APPROACHES]
+    gravity, robot = (sigmas[..., cell.columns_of(effect)].mean(axis=2) for cell, sigmas in pair)
+    n = min(gravity.shape[1], robot.shape[1])
+    ratio, linear = robot[:, :n] / gravity[:, :n]
+    below, above = (KnownValues.of(cell) for cell, _ in pair)
+    known = above.effect_ratio_quantiles(below, effect, LEVELS) if above and below else None
     quantiles = controlled_quantiles(LEVELS, ratio, linear, known)
     share = share_below(1 - paper / 100, ratio, quantiles)
     ends = _ends(100 * (1 - quantiles.value[[-1, len(LEVELS) // 2, 0]]))
@@ -260,23 +275,6 @@ def single_reductions(evidence: Evidence, effect: str, scheme: str, paper: float
 
 def _ends(values: Iterable[float]) -> Numbers:
     return dict(zip(("single_low", "median", "single_high"), map(float, values), strict=True))
-
-
-def _sigmas(cell: Cell, estimates: pd.DataFrame, effect: str) -> Array:
-    """Mean sigma a posteriori of an effect in each calibration that converged.
-
-    Returns
-    -------
-    (c, 2) array, of the calibrations and by linear theory of the same noise
-    """
-    names = [parameter.name for parameter in get_effect(effect).parameters]
-    rows = estimates[estimates["parameter"].isin(names) & estimates["converged"]]
-    theory = cell.linear_theory
-    priori = np.nan if theory is None else theory.sigma[cell.columns_of(effect)].mean()
-    own = np.sqrt(rows["omega"] / rows["redundancy"]) * rows["sigma_priori"]
-    linear = np.sqrt(rows["linear_omega"] / rows["redundancy"]) * priori
-    both = pd.DataFrame({"own": own, "linear": linear})
-    return both.groupby(rows["replicate"]).mean().to_numpy()
 
 
 def correlations(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +41,8 @@ def judge_claims(
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
-
-    @cache
-    def estimates_of(cell: str) -> pd.DataFrame:
-        return read_table(estimates, columns=ESTIMATED, rows=("cell", [cell]))
-
     read = {name: read_table(tables[name]) for name in TABLES}
-    evidence = Evidence(study, read, estimates_of)
+    evidence = Evidence(study, read, read_table(estimates, ESTIMATED))
     claims = judge(evidence)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], evidence.by_scheme, provenance)
