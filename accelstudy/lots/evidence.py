@@ -46,7 +46,6 @@ class SensorEvidence:
     pairs : dict of two names in order to the log odds of both together
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting
-    pair_specs : dict of two names to their best settings beside each other
     shown : dict of effect to what its shapes would show in the residuals
     tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
     residuals : (m,) array, m/s², of the means of the positions, equally uncertain
@@ -61,7 +60,6 @@ class SensorEvidence:
     pairs: dict[tuple[str, str], float] = field(default_factory=dict)
     classes: tuple[tuple[str, ...], ...] = ()
     specs: dict[str, str] = field(default_factory=dict)
-    pair_specs: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     shown: dict[str, ShapeEquations] = field(default_factory=dict)
     tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     residuals: Array = field(default_factory=lambda: np.zeros(0))
@@ -72,7 +70,7 @@ class SensorEvidence:
     @property
     def kept(self) -> SensorEvidence:
         """The same without what a lot only gathers, so that memory hardly follows their number."""
-        return replace(self, pair_specs={}, shown={}, tested={})
+        return replace(self, shown={}, tested={})
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,13 +137,11 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
             f"{UNKNOWN}({coordinate} → {target})": log
             for (coordinate, target), log in unknown.by_place(evidence, z).items()
         }
-    pairs, pair_specs = {}, {}
+    pairs = {}
     for pair in weigh_sets(singles.shapes, residuals, evidence, most=2):
-        effects = sorted((h.effect for h in pair.best if h.effect), key=lambda e: e.name)
-        if len(effects) == 2:
-            one, other = effects
-            pairs[one.name, other.name] = pair.log_density - nothing
-            pair_specs[one.name, other.name] = one.spec, other.spec
+        one, other = sorted(shape.effect.name if shape.effect else "" for shape in pair.best)
+        if one:
+            pairs[one, other] = pair.log_density - nothing
     of_unit_weight = max(evidence.variance(square), MIN_VARIANCE)
     variance = of_unit_weight if noise is None else 1.0
     observed = [detection.densities[name] - nothing for name in problem.field.names]
@@ -159,7 +155,6 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         specs={
             name: best.effect.spec for name, best in singles.best.items() if best.effect is not None
         },
-        pair_specs=pair_specs,
         shown={
             name: ShapeEquations.of(problem.frame, effects, variance)
             for name, shapes in problem.examined.candidates.items()

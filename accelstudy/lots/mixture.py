@@ -10,20 +10,19 @@ with r_i(s) the odds of the campaign of sensor i for the set s against nothing, 
 over all that could be missing: a sensor may be odd, and then have something of its own. Sets have
 up to three effects, and a sensor has up to two of them.
 
-The r_i take the sizes of the sensors for independent. An effect may as well be the same in all of
-them: then the evidence is that of all campaigns as one, and either is equally probable a priori. If
-the sensors were in the same positions and conditions, it is that of their mean, also for two
-effects. Where the sizes of the type are known (`sizes`), B_Z is the integral with odds r_i of these
-sizes, times what their being fitted takes away: the evidence of one size over the likelihood of the
-best one.
+These r_i take the sizes of the sensors for independent. As probable a priori is that a type has
+sizes, about which those of its sensors scatter more or less: then the r_i are the odds for sizes of
+the type (`sizes`). Of effects whose sizes are not looked at, one size in all sensors has the
+evidence of all campaigns as one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,8 @@ from scipy import special
 from accelstudy.lots.sizes import Names, TypicalSet
 
 Array = NDArray[np.float64]
+OddsOf: TypeAlias = Callable[[Names], Array]
+"""Log odds of the sensors for some effects together."""
 
 PRIOR_ODD = 0.01
 """Prior probability that a sensor is odd."""
@@ -39,8 +40,8 @@ PRIOR_MISSING = 0.5
 """Prior probability that the model of the lot lacks anything."""
 PRIOR_ALL = 0.5
 """Prior probability that all sensors have an effect of the lot."""
-PRIOR_EQUAL = 0.5
-"""Prior probability that an effect is equally large in all sensors."""
+PRIOR_ALIKE = 0.5
+"""Prior probability that sizes are those of a type, with any scatter; else each has its own."""
 PRIOR_FURTHER = 0.3
 """Prior probability of two effects rather than one, and of three rather than two."""
 MAX_SINGLES, MAX_EXTENDED = 12, 3
@@ -63,15 +64,16 @@ class Mixture:
     pairs : mapping of two effects to (n,) array, log odds of both together; NaN where a sensor has
         none
     prior : mapping of each effect to its prior probability; these sum to 1
-    common : mapping of one or two effects to the log odds that they are the same in all sensors
-    typical : mapping of one or two effects to odds with sizes of the type, where these are known
+    common : mapping of effects to the log odds that they are the same in all sensors
+    typical : mapping of one or two effects to odds with sizes of the type, for each scatter
     """
 
     odds: Mapping[str, Array]
     pairs: Mapping[Names, Array]
     prior: Mapping[str, float]
     common: Mapping[Names, float] = field(default_factory=dict)
-    typical: Mapping[Names, TypicalSet] = field(default_factory=dict)
+    typical: Mapping[Names, Sequence[TypicalSet]] = field(default_factory=dict)
+    _known: dict[Names, list[tuple[float, OddsOf]]] = field(default_factory=dict, init=False)
 
     @cached_property
     def sets(self) -> dict[Names, float]:
@@ -113,7 +115,8 @@ class Mixture:
                 nodes, weights = _nodes(len(names))
                 place = names.index(name)
                 others = tuple(axis for axis in range(len(names)) if axis != place)
-                mass = self._of_shares(names, self._judging(names)).sum(axis=others)
+                shares = sum(w * self._of_shares(names, odds) for w, odds in self._judged(names))
+                mass = np.asarray(shares).sum(axis=others)
                 log = np.log(np.maximum(mass / weights, 1e-300))
                 fine = np.exp(np.interp(grid, nodes[:-1], log[:-1]))
                 density += p * mass[:-1].sum() * fine / fine.sum()
@@ -138,13 +141,14 @@ class Mixture:
 
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the model of the lot lacks some effects."""
-        odds_of = self._judging(names)
-        weights, each = np.ravel(self._of_shares(names, odds_of)), []
-        for logs in self._contributions(names, odds_of):
-            shares = np.exp(logs - np.logaddexp.reduce(logs))
-            each.append(shares.reshape(*logs.shape[:2], -1) @ weights)
-        *parts, odd = np.concatenate(each, axis=1)
-        return dict(zip(_subsets(names), parts, strict=True)), odd
+        table = np.zeros((len(_subsets(names)) + 1, len(self._anything)))
+        for probability, odds_of in self._judged(names):
+            weights, each = np.ravel(self._of_shares(names, odds_of)), []
+            for logs in self._contributions(names, odds_of):
+                shares = np.exp(logs - np.logaddexp.reduce(logs))
+                each.append(shares.reshape(*logs.shape[:2], -1) @ weights)
+            table += probability * np.concatenate(each, axis=1)
+        return dict(zip(_subsets(names), table[:-1], strict=True)), table[-1]
 
     def having(self, name: str) -> Array:
         """Posterior of each sensor to have an effect, (n,)."""
@@ -166,7 +170,16 @@ class Mixture:
         both = self.pairs.get(subset)
         return least if both is None else np.where(np.isnan(both), least, both)
 
-    def _contributions(self, names: Names, odds_of: Callable[[Names], Array]) -> Iterator[Array]:
+    def _of_type(self, one: TypicalSet, subset: Names) -> Array:
+        """Log odds of the sensors with sizes of a type, (n,).
+
+        A sensor that is not usual, whose noise may be another one as well, says no more than by
+        itself.
+        """
+        odds = one.odds[subset]
+        return np.where(one.usual, odds, np.minimum(odds, self._of_own_sizes(subset)))
+
+    def _contributions(self, names: Names, odds_of: OddsOf) -> Iterator[Array]:
         """Log of what each of `_subsets`, and oddness, contributes: (s + 1, b, nodes ...) arrays.
 
         Each is of b sensors.
@@ -187,45 +200,43 @@ class Mixture:
             some = odds[:, first : first + BLOCK]
             yield some.reshape(*some.shape, *[1] * size) + prior
 
-    def _log_likelihood(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
+    def _log_likelihood(self, names: Names, odds_of: OddsOf) -> Array:
         """Log likelihood of shares times their prior weights, (nodes ...)."""
         each = self._contributions(names, odds_of)
         logs = sum(np.logaddexp.reduce(logs).sum(axis=0) for logs in each)
         return np.asarray(logs + _log_weights(len(names)))
 
     def _evidence(self, names: Names) -> float:
-        """Log evidence of effects: with sizes of each sensor, or of the type."""
-        own = self._of_own(names)
-        if names in self.typical:
-            alike = self._of_typical(names)
-        elif names in self.common:
-            alike = self.common[names]
-        else:
-            return own
-        return float(np.logaddexp(own + np.log(1 - PRIOR_EQUAL), alike + np.log(PRIOR_EQUAL)))
+        """Log evidence of effects, whatever their sizes."""
+        return float(special.logsumexp([log for log, _ in self._weighed(names)]))
 
-    def _of_own(self, names: Names) -> float:
-        """Log evidence with sizes of each sensor."""
-        return float(special.logsumexp(self._log_likelihood(names, self._of_own_sizes)))
+    def _weighed(self, names: Names) -> list[tuple[float, OddsOf]]:
+        """Log evidence of effects by how their sizes differ, and what sensors say of them then."""
+        if names in self._known:
+            return self._known[names]
+        own, types = self._of_own_sizes, self.typical.get(names, ())
+        alike: list[tuple[float, OddsOf]] = []
+        for one in types:
+            odds = partial(self._of_type, one)
+            log = np.log(PRIOR_ALIKE / len(types)) + one.cost + self._log_evidence(names, odds)
+            alike.append((float(log), odds))
+        if not alike and names in self.common:
+            # Which of the sensors have it, is not asked then.
+            alike = [(float(np.log(PRIOR_ALIKE) + self.common[names]), own)]
+        prior = np.log(1 - PRIOR_ALIKE) if alike else 0.0
+        self._known[names] = [(float(prior + self._log_evidence(names, own)), own), *alike]
+        return self._known[names]
 
-    def _of_typical(self, names: Names) -> float:
-        """Log evidence with sizes of the type."""
-        of_type = self.typical[names]
-        whole = special.logsumexp(self._log_likelihood(names, of_type.odds.__getitem__))
-        if names in self.common:
-            return float(whole + self.common[names] - of_type.alike)
-        for name in names:
-            alone = self.typical.get((name,))
-            whole += self.common.get((name,), -np.inf) - (alone.alike if alone else 0.0)
-        return float(whole)
+    def _log_evidence(self, names: Names, odds_of: OddsOf) -> float:
+        """Log evidence of effects, over their shares."""
+        return float(special.logsumexp(self._log_likelihood(names, odds_of)))
 
-    def _judging(self, names: Names) -> Callable[[Names], Array]:
-        """Odds of subsets by which sensors and shares are judged: those that explain more."""
-        if names in self.typical and self._of_typical(names) >= self._of_own(names):
-            return self.typical[names].odds.__getitem__
-        return self._of_own_sizes
+    def _judged(self, names: Names) -> list[tuple[float, OddsOf]]:
+        """Probability of each way in which sizes differ, and what sensors say then."""
+        logs, odds = zip(*self._weighed(names), strict=True)
+        return [*zip(special.softmax(logs).tolist(), odds, strict=True)]
 
-    def _of_shares(self, names: Names, odds_of: Callable[[Names], Array]) -> Array:
+    def _of_shares(self, names: Names, odds_of: OddsOf) -> Array:
         """Posterior probabilities of the nodes of each share, (nodes ...)."""
         return np.asarray(special.softmax(self._log_likelihood(names, odds_of)))
 

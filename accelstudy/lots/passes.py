@@ -18,16 +18,15 @@ from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.evidence.noise_tests import AXES, NOISES, TAILS
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.effects import effect_names, get_effect
 from accelstudy.lots.evidence import COMMON, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.mixture import LotTest, Mixture
 from accelstudy.lots.sizes import (
     Names,
     PooledEffect,
-    Shapes,
     TypeSizes,
     TypicalSet,
+    most_likely,
     sensor_equations,
     weigh_pooled,
 )
@@ -139,11 +138,12 @@ class Pass:
         those, their = [sensors[i] for i in usual], [said[i] for i in usual]
         mean = _evidence_of_mean(those, their, whole, sensors[0].seed - 1 if sensors[0].seed else n)
         now = replace(now, mean=mean, pooled=weigh_pooled(their))
-        if len(usual) < 2 or not (shapes := now.strongest()):
+        asked = now.strongest()
+        specs = {name: now.shapes[name] for names in asked for name in names}
+        if len(usual) < 2 or not specs:
             return now
-        specs = tuple(dict.fromkeys(spec for of_set in shapes.values() for spec in of_set.values()))
-        told = mapped(partial(sensor_equations, specs=specs), sensors)
-        return replace(now, sizes=TypeSizes.of([*told], specs, shapes, usual))
+        told = mapped(partial(sensor_equations, specs=[*specs.values()]), sensors)
+        return replace(now, sizes=TypeSizes.of([*told], specs, asked, usual))
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -176,47 +176,34 @@ class Pass:
         prior = {name: WEIGHTS[kind] / counts[kind] / total for name, kind in kinds.items()}
         common: dict[Names, float] = {(name,): one.odds for name, one in self.pooled.items()}
         if (mean := self.mean) is not None:
-            # What is larger than noise in the mean is no noise; what is sudden has no mean.
-            of_mean = {(name,): log for name, log in mean.odds.items() if name not in NOISES}
-            common |= {
-                names: log
-                for names, log in (of_mean | self._pairs(mean)).items()
-                if not any(map(_is_sudden, names))
-            }
+            common |= {(n,): log for n, log in mean.odds.items() if n.startswith(UNKNOWN)}
+            # What is larger than noise in the mean is no noise.
             common[COMMON,] = mean.odds[LEVEL_OF_NOISE]
         return Mixture(odds, pairs, prior, common, self._typical)
 
     @property
-    def _typical(self) -> dict[Names, TypicalSet]:
+    def _typical(self) -> dict[Names, list[TypicalSet]]:
         """Odds with sizes of the type, of what more than few sensors have."""
         sets = {} if self.sizes is None else self.sizes.sets
         n = len(self.sensors)
         return {
-            names: one for names, one in sets.items() if min(one.shares.values()) * n > self._few
+            names: alike
+            for names, alike in sets.items()
+            if min(most_likely(alike).shares.values()) * n > self._few
         }
 
-    def _looked_at(self, name: str) -> Names | None:
-        """Most probable set with an effect, of those whose sizes were looked at."""
-        shapes = {} if self.sizes is None else self.sizes.shapes
-        return next((s for s in self.mixture.sets if name in s and s in shapes), None)
+    @cached_property
+    def shapes(self) -> dict[str, str]:
+        """Effects in the settings that explain most of what all sensors have in common."""
+        specs = {name: one.spec for name, one in self.pooled.items()}
+        of_mean = {} if self.mean is None else self.mean.specs
+        return {name: of_mean.get(name, spec) for name, spec in specs.items()}
 
-    def strongest(self) -> dict[Names, Shapes]:
-        """Return the most probable sets of effects and each of their effects, with best shapes."""
+    def strongest(self) -> list[Names]:
+        """Return the most probable sets of one and two effects, and each of their effects."""
         best = [*self.mixture.sets][:MAX_SETS]
         sets = dict.fromkeys([*((name,) for names in best for name in names), *best])
-        return {
-            names: self._best_shapes(names)
-            for names in sets
-            if 0 < len(names) < 3 and all(name in self.pooled for name in names)
-        }
-
-    def _best_shapes(self, names: Names) -> Shapes:
-        of_all = {name: self.pooled[name].spec for name in names}
-        if self.mean is None:
-            return of_all
-        if (specs := self.mean.pair_specs.get((names[0], names[-1]))) is not None:
-            return dict(zip(names, specs, strict=True))
-        return {name: self.mean.specs.get(name, spec) for name, spec in of_all.items()}
+        return [s for s in sets if 0 < len(s) < 3 and all(name in self.shapes for name in s)]
 
     def _pairs(self, one: SensorEvidence) -> dict[Names, float]:
         """Log odds of two classes together."""
@@ -277,12 +264,13 @@ class Pass:
 
     def _rivals(self, name: str) -> list[str]:
         """Effects that all campaigns together hardly tell from one that is not certain."""
-        names = self._looked_at(name)
+        asked = [] if self.sizes is None else self.sizes.asked
+        names = next((s for s in self.mixture.sets if name in s and s in asked), None)
         if self.sizes is None or names is None or names not in self.mixture.typical:
             return []
         rivals = []
         for rival in self.classes:
-            if self.given[rival] < MIN_RIVAL or rival in names or (rival,) not in self.sizes.shapes:
+            if self.given[rival] < MIN_RIVAL or rival in names or rival not in self.sizes.specs:
                 continue
             left, whole = self.sizes.apart(names, name, rival)
             if left < min(UNTOLD, RESEMBLES * whole):
@@ -378,8 +366,8 @@ class Pass:
 
     def spec(self, name: str) -> str | None:
         """Return an effect in the setting that explains most; None of what is no effect."""
-        if self.sizes is not None and (names := self._looked_at(name)) is not None:
-            return self.sizes.shapes[names][name]
+        if self.sizes is not None and name in self.sizes.specs:
+            return self.sizes.specs[name]
         counted: dict[str, float] = {}
         for one, weight in zip(self.evidence, self.mixture.having(name).tolist(), strict=True):
             if (spec := one.specs.get(name)) is not None:
@@ -397,11 +385,6 @@ def _evidence_of_mean(
     with suppress(InputError):  # the positions do not determine the model
         return replace(mean, model=whole, seed=seed).evidence()
     return None
-
-
-def _is_sudden(name: str) -> bool:
-    """Whether something is an effect that comes to each sensor at a time of its own."""
-    return name in effect_names() and get_effect(name).sudden
 
 
 def _kind(name: str) -> str:

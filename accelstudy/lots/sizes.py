@@ -1,12 +1,15 @@
-"""Sizes of effects: one that all sensors have, and those of a type, with a scatter.
+"""Sizes of effects in a type: the same in all of its sensors, or with a scatter about their mean.
 
 Sensor i tells of the parameters β of some effects by ℓ_i(β) = βᵀ b_i − βᵀ N_i β / 2, in units of
 its noise. In a type each effect has sizes β ~ N(μ, S), S = τ² ‖μ‖²/k · I, in a part ρ of the
 sensors, and 0 in the others, independently of other effects. So the odds of sensor i for a set are
 
-    log r_i = (b_i + S⁻¹μ)ᵀ (S⁻¹ + N_i)⁻¹ (b_i + S⁻¹μ)/2 − μᵀ S⁻¹ μ/2 − log|I + S N_i|/2,
+    log r_i = ℓ_i(μ) + (b_i − N_i μ)ᵀ (S⁻¹ + N_i)⁻¹ (b_i − N_i μ)/2 − log|I + N_i S|/2
 
-with the μ, ρ and τ that make the likelihood of all sensors largest.
+for some τ, from 0 on, with the μ and ρ that make the likelihood of all sensors largest. A μ that is
+fitted pays for that as any effect of unknown size does: with λ = ρ μᵀ Σ_i (N_i⁻¹ + S)⁻¹ μ, the
+noncentrality of what all sensors show, and g of its prior (`evidence.size`), evidence is likelihood
+times the mean of (1 + g)^(−k/2) exp(−λ/(2 + 2 g)).
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.size import Evidence, Level, log_mean
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import Frame
 from accelstudy.effects import Effect, get_effect
@@ -32,13 +35,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Names = tuple[str, ...]
 """Names of some effects, in order."""
-Shapes = Mapping[str, str]
-"""Names of some effects, in order, with the settings of each."""
 
 MAX_LOG_DIFFERENCE = 0.3
 """Largest difference of the logarithms of settings that are nearly the same."""
-SCATTERS = (0.25, 1.0)
-"""τ, scatter of the parameters of a type in parts of their size."""
+SCATTERS = (0.0, 0.25, 1.0)
+"""τ, scatter of the parameters of a type in parts of their size; beyond, each sensor has its own
+size."""
 SHARES = (0.9, 0.35)
 """ρ from which the search begins, for each effect."""
 MIN_FREEDOM = 20
@@ -219,22 +221,24 @@ def weigh_pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
 
 @dataclass(frozen=True)
 class TypicalSet:
-    """A set of effects in the sensors of a type.
+    """A set of effects in the sensors of a type, with a scatter.
 
     Attributes
     ----------
     odds : mapping of each of its subsets to (n,) array, log odds of the sensors
     log_likelihood : float, of the sizes and shares
+    cost : float, log of the evidence over the likelihood, as sizes are fitted
     sizes : mapping of each effect to (k,) array, μ of its parameters
     shares : mapping of each effect to ρ
-    alike : float, log likelihood ratio of one size in all sensors, the most probable one
+    usual : (n,) bool array, the sensors by which sizes and shares were found
     """
 
     odds: Mapping[Names, Array]
     log_likelihood: float
+    cost: float
     sizes: Mapping[str, Array]
     shares: Mapping[str, float]
-    alike: float
+    usual: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,14 +247,16 @@ class TypeSizes:
 
     Attributes
     ----------
-    shapes : mapping of sets of one or two effects to the shape of each
+    specs : mapping of effects to their settings
+    asked : tuple of sets of one or two of these effects
     normal, right : (n, K, K) and (n, K) arrays, of all parameters that show, in units in which they
         show equally well
-    columns : mapping of each effect in a shape to its parameters among the K
+    columns : mapping of each effect to its parameters among the K
     usual : int array, places of the sensors that tell what is typical
     """
 
-    shapes: Mapping[Names, Shapes]
+    specs: Mapping[str, str]
+    asked: Sequence[Names]
     normal: Array
     right: Array
     columns: Mapping[str, NDArray[np.int_]]
@@ -260,8 +266,8 @@ class TypeSizes:
     def of(
         cls,
         each: Sequence[SensorEquations],
-        specs: Sequence[str],
-        shapes: Mapping[Names, Shapes],
+        specs: Mapping[str, str],
+        asked: Sequence[Names],
         usual: Sequence[int],
     ) -> TypeSizes:
         """Gather what sensors tell of effects.
@@ -270,14 +276,14 @@ class TypeSizes:
 
         Parameters
         ----------
-        each : what the sensors tell of `specs`, the effects with their settings
-        shapes, usual : as above
+        each : what the sensors tell of `specs`, side by side
+        specs, asked, usual : as above
         """
         normal, right, _ = map(np.array, zip(*(one.equations for one in each), strict=True))
         pooled = Equations.pooled(one.equations for one in each)
-        ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)])
+        ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs.values())])
         turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
-        for spec, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
+        for name, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
             block = slice(first, end)
             shown = Equations(
                 pooled.normal[block, block], pooled.right[block], pooled.squares[block]
@@ -286,10 +292,10 @@ class TypeSizes:
             # In these directions and units the sensors together tell as much of each.
             turned.append(np.zeros((ends[-1], len(values))))
             turned[-1][block] = directions / np.sqrt(values / len(each))
-            columns[spec] = place + np.arange(len(values))
+            columns[name] = place + np.arange(len(values))
             place += len(values)
         turn = np.concatenate(turned, axis=1)
-        raw = cls(shapes, turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
+        raw = cls(specs, asked, turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
         counted = [each[i] for i in usual]
         variance = raw.only(usual)._variance(
             sum(one.square for one in counted), sum(one.redundancy for one in counted)
@@ -304,8 +310,8 @@ class TypeSizes:
     def _variance(self, squares: float, redundancy: int) -> float:
         """Noise that the one or two effects leave that explain most."""
         left = [squares / redundancy]
-        for specs in (s for r in (1, 2) for s in combinations(self.columns, r)):
-            at = np.concatenate([self.columns[spec] for spec in specs])
+        for names in (s for r in (1, 2) for s in combinations(self.columns, r)):
+            at = np.concatenate([self.columns[name] for name in names])
             inverse = np.linalg.pinv(self.normal[:, at[:, None], at], rcond=1e-8, hermitian=True)
             b = self.right[:, at]
             part = float(np.einsum("nk,nkl,nl->", b, inverse, b))
@@ -315,24 +321,26 @@ class TypeSizes:
         return max(min(left), 1e-12)
 
     @cached_property
-    def sets(self) -> dict[Names, TypicalSet]:
-        """Sets of effects that show: odds of each sensor, with sizes of the type."""
+    def sets(self) -> dict[Names, list[TypicalSet]]:
+        """Sets of effects that show, with each of `SCATTERS`."""
         return {
             names: self._of_set(names)
-            for names, shapes in self.shapes.items()
-            if all(len(self.columns[spec]) for spec in shapes.values())
+            for names in self.asked
+            if all(len(self.columns[name]) for name in names)
         }
 
-    def _of_set(self, names: Names) -> TypicalSet:
-        """Odds of a set with the sizes and shares that are most probable."""
-        parts = [self.columns[self.shapes[names][name]] for name in names]
+    def _of_set(self, names: Names) -> list[TypicalSet]:
+        """Odds of a set with the sizes and shares that are most probable, for each scatter."""
+        parts = [self.columns[name] for name in names]
         at, of = np.concatenate(parts), np.repeat(names, [len(part) for part in parts])
         # From many that have each effect, and from few that have one of them.
         most, few = SHARES
         starts = [dict.fromkeys(names, most)]
         starts += [{**starts[0], name: few} for name in names]
-        found = [self._search(at, of, shares, scatter) for scatter in SCATTERS for shares in starts]
-        return max(found, key=lambda one: one.log_likelihood)
+        return [
+            most_likely([self._search(at, of, shares, scatter) for shares in starts])
+            for scatter in SCATTERS
+        ]
 
     def _search(
         self, at: NDArray[np.int_], of: NDArray[np.str_], start: Mapping[str, float], scatter: float
@@ -351,25 +359,25 @@ class TypeSizes:
         has = np.array([[name in subset for name in names] for subset in ((), *subsets)])
         whole, pulled = (a[self.usual].sum(axis=0) for a in (normal, right))
         same = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
-        shares, alike = np.array([*start.values()]), float(pulled @ same) / 2
+        shares = np.array([*start.values()])
         mean, before = same / np.array([start[name] for name in of]), -np.inf
         odds = np.zeros((1 + len(subsets), len(right)))
         for _ in range(MAX_STEPS):
             squares = {name: float(np.mean(mean[of == name] ** 2)) for name in names}
-            variances = np.array([max(scatter**2 * squares[name], 1e-12) for name in of])
+            variances = np.array([scatter**2 * squares[name] for name in of])
             taken, seen = [], []
             for row, at in enumerate(places, start=1):
                 n, b = normal[:, at[:, None], at], right[:, at]
                 m, s = mean[at], variances[at]
-                inverse = np.linalg.inv(n + np.diag(1 / s))
-                pull = b + m / s
+                beside = np.eye(len(at)) + n * s  # I + N S
+                spread = s[:, None] * np.linalg.inv(beside)  # (S⁻¹ + N)⁻¹
+                lost, rest = n @ spread, b - n @ m
                 odds[row] = (
-                    np.einsum("nk,nkl,nl->n", pull, inverse, pull) / 2
-                    - m @ (m / s) / 2
-                    - np.linalg.slogdet(np.eye(len(at)) + s[:, None] * n)[1] / 2
-                )
+                    (b + rest) @ m
+                    + np.einsum("nk,nkl,nl->n", rest, spread, rest)
+                    - np.linalg.slogdet(beside)[1]
+                ) / 2
                 # Weighted least squares: (N⁻¹ + S)⁻¹ = N − N (S⁻¹ + N)⁻¹ N.
-                lost = n @ inverse
                 taken.append(n - lost @ n)
                 seen.append(b - np.einsum("nkl,nl->nk", lost, b))
             prior = np.where(has, np.log(shares), np.log1p(-shares)).sum(axis=1)
@@ -386,12 +394,19 @@ class TypeSizes:
                 pulled[at] += w @ b
             shares = np.clip(weights.sum(axis=1) @ has[1:] / len(self.usual), 0.01, 0.999)
             mean = np.linalg.pinv(whole, rcond=1e-6, hermitian=True) @ pulled
+        sizes = [mean[of == name] for name in names]
+        # Sets of one are the first ones.
+        shown = [
+            float(share * size @ alone[self.usual].sum(axis=0) @ size)
+            for share, size, alone in zip(shares, sizes, taken, strict=False)
+        ]
         return TypicalSet(
             odds=dict(zip(((), *subsets), odds, strict=True)),
             log_likelihood=before,
-            sizes={name: mean[of == name] for name in names},
+            cost=sum(map(_cost_of_fitting, map(len, sizes), shown)),
+            sizes=dict(zip(names, sizes, strict=True)),
             shares=dict(zip(names, shares.tolist(), strict=True)),
-            alike=alike,
+            usual=np.isin(np.arange(len(right)), self.usual),
         )
 
     def apart(self, names: Names, name: str, rival: str) -> tuple[float, float]:
@@ -403,13 +418,12 @@ class TypeSizes:
         name : str, one of them
         rival : str, another effect that may be there in its place
         """
-        of_type, shapes = self.sets[names], {**self.shapes[rival,], **self.shapes[names]}
+        of_type, own = most_likely(self.sets[names]), self.columns[name]
         normal, mean = self.normal[self.usual].sum(axis=0), of_type.sizes[name]
-        own = self.columns[shapes[name]]
         others = [other for other in names if other != name]
 
         def left(beside: Sequence[str]) -> float:
-            parts = [self.columns[shapes[other]] for other in beside]
+            parts = [self.columns[other] for other in beside]
             rest = np.concatenate([np.zeros(0, dtype=int), *parts])
             cross = normal[np.ix_(own, rest)]
             inverse = np.linalg.pinv(normal[np.ix_(rest, rest)], rcond=1e-8, hermitian=True)
@@ -417,3 +431,20 @@ class TypeSizes:
             return float(of_type.shares[name] * mean @ shown @ mean)
 
         return left([*others, rival]), left(others)
+
+
+def most_likely(sets: Sequence[TypicalSet]) -> TypicalSet:
+    """Return the one with the most probable sizes and shares."""
+    return max(sets, key=lambda one: one.log_likelihood)
+
+
+def _cost_of_fitting(dim: int, shown: float) -> float:
+    """Log of the evidence over the likelihood of a size that is fitted, over the prior of sizes.
+
+    Parameters
+    ----------
+    dim : int, parameters of an effect
+    shown : float, λ of these sizes in all sensors
+    """
+    g = SIZES / dim
+    return float(log_mean(-dim / 2 * np.log1p(g) - shown / (2 * (1 + g)), SIZE_WEIGHTS))

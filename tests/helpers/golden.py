@@ -67,7 +67,7 @@ def changes(one, other):
     """Relative changes of the numbers that differ between two lines of the same words."""
     pairs = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
     apart = [(value(a), value(b)) for a, b in pairs if not same_number(a, b)]
-    return [abs(a - b) / max(abs(a), abs(b)) for a, b in apart]
+    return [abs(a - b) / max(abs(a), abs(b), ZERO) for a, b in apart]  # 0 became −0
 
 
 class Difference(NamedTuple):

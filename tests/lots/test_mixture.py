@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from accelstudy.diagnosis.evidence.size import Evidence, Level
+from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import SensorEvidence, lot_classes
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import (
+    PRIOR_ALIKE,
     PRIOR_ALL,
-    PRIOR_EQUAL,
     PRIOR_FURTHER,
     PRIOR_MISSING,
     PRIOR_ODD,
@@ -26,10 +26,10 @@ from accelstudy.lots.passes import LEVEL, Pass
 from accelstudy.lots.sizes import (
     SCATTERS,
     Equations,
-    PooledEffect,
     SensorEquations,
     ShapeEquations,
     TypeSizes,
+    most_likely,
     weigh_pooled,
 )
 from accelstudy.sensors.models import get_model
@@ -92,8 +92,7 @@ def type_of(rng, sizes, like=0.0, first=0.0):
     each = [Equations(a.T @ a, a.T @ b, np.sum(a**2, axis=0)) for a, b in zip(d, z, strict=True)]
     told = [SensorEquations(e, float(b @ b), ROWS) for e, b in zip(each, z, strict=True)]
     sets = [s for r in (1, 2) for s in combinations(NAMES, r)]
-    shapes = {names: {name: name for name in names} for names in sets}
-    return d, z, TypeSizes.of(told, NAMES, shapes, range(len(sizes)))
+    return d, z, TypeSizes.of(told, dict(zip(NAMES, NAMES, strict=True)), sets, range(len(sizes)))
 
 
 def two_effects(rng, like=0.0, first=0.0):
@@ -138,9 +137,9 @@ def test_the_evidence_of_a_set_is_its_integral():
     }
     for names, value in expected.items():
         assert np.exp(mixture.sets[names]) == pytest.approx(value, rel=1e-6)
-    # An effect may as well be equally large in all sensors; then their mean tells.
+    # An effect may as well be equally large in all sensors.
     alike = replace(mixture, common={(one,): 3.0}).sets[one,]
-    value = (1 - PRIOR_EQUAL) * expected[one,] + PRIOR_EQUAL * alone * np.exp(3.0)
+    value = (1 - PRIOR_ALIKE) * expected[one,] + PRIOR_ALIKE * alone * np.exp(3.0)
     assert np.exp(alike) == pytest.approx(value, rel=1e-6)
     # Each sensor lacks some set, or is odd.
     lacks, odd = mixture.sensors
@@ -193,8 +192,8 @@ def test_sizes_of_the_type_say_which_sensors_have_it():
         sizes = np.zeros((20, 3))
         sizes[:, 0] = 0.43 * (1 + 0.25 * rng.standard_normal(20)) * lacks
         *_, of_lot = type_of(rng, sizes)
-        alone = replace(of_lot, shapes={(first,): {first: first}}).sets
-        mixture = mixture_of(np.zeros((20, 1)), common={(first,): 50.0}, typical=alone)
+        alone = replace(of_lot, asked=[(first,)]).sets
+        mixture = mixture_of(np.zeros((20, 1)), typical=alone)
         said += mixture.having(first).tolist()
         true += lacks.tolist()
         _, low, high = mixture.share(first)
@@ -209,11 +208,11 @@ def test_sizes_of_the_type_say_which_sensors_have_it():
 def test_odds_are_the_integral_over_the_sizes_of_the_type():
     _, _, _, sizes = two_effects(np.random.default_rng(1))
     both = NAMES[:2]
-    of_type = sizes.sets[both]
-    assert of_type.shares[NAMES[0]] > 0.9
-    assert of_type.shares[NAMES[1]] == pytest.approx(1 / 3, abs=0.15)
+    best = most_likely(sizes.sets[both])
+    assert best.shares[NAMES[0]] > 0.9
+    assert best.shares[NAMES[1]] == pytest.approx(1 / 3, abs=0.15)
 
-    def integral(i, names, scatter):
+    def integral(of_type, i, names, scatter):
         """Log of the mean of exp(ℓ) over normal sizes, by quadrature."""
         at = [NAMES.index(name) for name in names]
         normal, right = sizes.normal[i][np.ix_(at, at)], sizes.right[i][at]
@@ -227,10 +226,24 @@ def test_odds_are_the_integral_over_the_sizes_of_the_type():
         quadratic = np.einsum("nk,kl,nl->n", b, normal, b)
         return np.log(np.sum(density * np.exp(b @ right - quadratic / 2)))
 
-    for i, names in ((0, both[:1]), (20, both[1:]), (3, both)):
-        odds = of_type.odds[names][i]
-        near = [integral(i, names, scatter) - odds for scatter in SCATTERS]
-        assert min(map(abs, near)) < 1e-3 * max(1, abs(odds))
+    for scatter, of_type in zip(SCATTERS, sizes.sets[both], strict=True):
+        for i, names in ((0, both[:1]), (20, both[1:]), (3, both)):
+            expected = integral(of_type, i, names, scatter)
+            assert of_type.odds[names][i] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
+def test_a_size_that_is_fitted_costs_what_its_integral_says():
+    """One size in all sensors: the evidence is the mean of the likelihood over the prior of it."""
+    *_, sizes = type_of(np.random.default_rng(6), np.full((N, 3), [1.0, 0.0, 0.0]))
+    alone = NAMES[:1]
+    of_type = sizes.sets[alone][SCATTERS.index(0.0)]
+    normal, right = sizes.normal[:, 0, 0].sum(), sizes.right[:, 0].sum()
+    best, sigma = right / normal, 1 / np.sqrt(normal)
+    size = best + sigma * np.linspace(-9, 9, 2001)
+    likelihood = np.exp(size * right - size**2 * normal / 2)
+    prior = stats.norm.pdf(size[:, None], 0, sigma * np.sqrt(SIZES)) @ SIZE_WEIGHTS
+    integral = np.log(np.sum(likelihood * prior) * (size[1] - size[0]))
+    assert of_type.odds[alone].sum() + of_type.cost == pytest.approx(integral, abs=0.1)
 
 
 def test_what_a_third_has_is_found_beside_what_all_have():
@@ -238,8 +251,7 @@ def test_what_a_third_has_is_found_beside_what_all_have():
     rng, named, right = np.random.default_rng(2), 0, []
     for _ in range(10):
         lacks, _, _, sizes = two_effects(rng, like=0.7)
-        common = {(name,): sizes.sets[name,].alike - 3 for name in NAMES}
-        mixture = mixture_of(np.zeros((N, 3)), common=common, typical=sizes.sets)
+        mixture = mixture_of(np.zeros((N, 3)), typical=sizes.sets)
         named += next(iter(mixture.sets)) == NAMES[:2]
         right.append(np.mean((mixture.having(NAMES[1]) > 0.5) == lacks[:, 1]))
     assert named >= 9
@@ -299,9 +311,7 @@ def test_what_the_lot_lacks_is_named_and_what_one_sensor_lacks_makes_it_odd():
     true = np.zeros((20, 3))
     true[:, 0] = 0.6
     *_, sizes = type_of(rng, true)
-    alone = replace(sizes, shapes={NAMES[:1]: {NAMES[0]: NAMES[0]}})
-    joint = {NAMES[0]: PooledEffect(alone.sets[NAMES[:1]].alike, NAMES[0])}
-    rest = replace(one, pooled=joint, sizes=alone).without_odd()
+    rest = replace(one, sizes=replace(sizes, asked=[NAMES[:1]])).without_odd()
     assert len(rest.sensors) == 19
     assert [*rest.classes] != [*one.classes]  # their order follows the evidence
     assert rest.p_value > one.p_value
