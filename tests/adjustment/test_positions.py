@@ -39,12 +39,6 @@ from accelstudy.simulation.sessions import Noise
 FEW, MANY = 400, 1600
 
 
-def dense_projector(solution):
-    """R = I − Ã (Ãᵀ Ã)⁻¹ Ãᵀ as it is defined."""
-    a = solution.design
-    return np.eye(len(a)) - a @ np.linalg.solve(a.T @ a, a.T)
-
-
 def peak(function):
     """Largest memory in use while a function runs, MB."""
     tracemalloc.start()
@@ -59,7 +53,8 @@ def peak(function):
 def test_blocks_are_those_of_the_whole_projector(approach, sigma_gravity):
     solution = solve(NINE, approach, draw(3, noise=Noise(sigma_gravity=sigma_gravity)))
     n, c = solution.misclosures.shape
-    whole = dense_projector(solution)
+    a = solution.design
+    whole = np.eye(len(a)) - a @ np.linalg.solve(a.T @ a, a.T)  # as it is defined
     for i in range(n):
         at = slice(i * c, (i + 1) * c)
         np.testing.assert_allclose(solution.blocks[i], whole[at, at], rtol=0, atol=1e-12)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
-from quality_helpers import SIGMA, draw, ideal_session, solutions, with_error
+from quality_helpers import SIGMA, draw, ideal_session, solutions
 from scipy.stats import chi2, f, kstest, ncf, ncx2
 from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 
@@ -194,6 +194,13 @@ def test_studentised_statistic_is_that_of_a_fit_without_the_position(approach):
         rest = calibrate(NINE, approach, observed.take(np.delete(np.arange(24), position)))
         expected = tests.statistic[position] / q / rest.variance_posteriori[0]
         assert tests.studentised[position] == pytest.approx(expected, rel=2e-3)
+
+
+def with_error(observed, position, error):
+    """Add an error (3,) to the forces of a position."""
+    forces = observed.forces.copy()
+    forces[:, position] += error
+    return replace(observed, forces=forces)
 
 
 @BOTH

@@ -4,7 +4,7 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from scheme_helpers import KNOWN, gravity_scale_correlation
+from scheme_helpers import KNOWN
 from usual import BOTH, GRAVITY, NINE, PAPER, ROBOT, TWELVE
 
 from accelstudy.adjustment import calibrate
@@ -160,8 +160,8 @@ def test_closed_forms_of_the_gravity_based_calibration(scheme):
     for kind, sigma in gravity_sigma(directions, 0.002).items():
         np.testing.assert_allclose(found.sigma[KINDS[kind]], sigma, rtol=1e-9)
     correlation = found.cofactors / np.outer(found.sigma, found.sigma)
-    expected = np.eye(9)
-    expected[3:6, 3:6] += gravity_scale_correlation(directions) * (1 - np.eye(3))
+    expected, m = np.eye(9), float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
+    expected[3:6, 3:6] += -3 * m / (1 - 3 * m) * (1 - np.eye(3))
     np.testing.assert_allclose(correlation, expected, rtol=0, atol=1e-9)
 
 

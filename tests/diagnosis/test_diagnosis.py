@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from diagnosis_helpers import ROTATIONS, campaign
+from diagnosis_helpers import campaign
 from usual import NINE
 
 from accelstudy.adjustment.quality import solve
@@ -123,6 +123,14 @@ def test_what_an_effect_does_to_the_other_parameters_is_predicted(approach):
     before, after = ([getattr(c, when) for c in found.changes] for when in ("before", "after"))
     assert np.max(np.abs(np.subtract(after, true) / sigma)) < 4
     assert np.max(np.abs(np.subtract(before, true) / sigma)) > 10
+
+
+ROTATIONS = {
+    *("cross_axis_misalignment", "mounting_rotation", "base_tilt", "encoder_offset"),
+    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity", "joint_compliance"),
+    "mounting_slip",
+}
+"""Effects that only turn the sensor or misread its attitude."""
 
 
 @pytest.mark.parametrize(("approach", "effect", "invisible"), [

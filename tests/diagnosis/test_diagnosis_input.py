@@ -161,18 +161,13 @@ def test_positions_that_are_needed_to_hold_some_out_are_counted():
     assert "18 in all; there are 16" in found.gap.reason
 
 
-def exact(measured):
-    """A campaign of a real sensor without any noise."""
-    truth = np.array([0.05, -0.02, 0.03, 2e-3, -1e-3, 1e-3, 1e-3, -2e-3, 1e-3])
-    f_b = np.column_stack(specific_force(*measured.angles.T, measured.gravity))
-    return replace(measured, forces=NINE.sense(f_b, truth, measured.gravity, measured.hold))
-
-
 @pytest.mark.parametrize(("approach", "digits"), [(ROBOT, 16), (GRAVITY, 6)])
 def test_no_effect_is_named_in_what_is_its_own_model(robot, approach, digits):
     """Residuals of rounding only, in which sigma is known to be far larger."""
-    measured = exact(robot)
-    measured = replace(measured, forces=np.round(measured.forces, digits))
+    truth = np.array([0.05, -0.02, 0.03, 2e-3, -1e-3, 1e-3, 1e-3, -2e-3, 1e-3])
+    f_b = np.column_stack(specific_force(*robot.angles.T, robot.gravity))
+    forces = NINE.sense(f_b, truth, robot.gravity, robot.hold)
+    measured = replace(robot, forces=np.round(forces, digits))
     found = diagnosis_document(diagnose(measured, NINE, approach))
     assert found["verdict"] in {"no_effect", "noise_model"}
     assert found["gap"]["sigma0_squared"]["before"] < 1e-6

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from norm_model import SHOWN, left_of, nine
+from norm_model import SHOWN, nine
 from scipy import stats
 from usual import GRAVITY, NINE, G
 
@@ -25,6 +25,11 @@ def shown():
             get_scheme("fibonacci-36"), NINE, GRAVITY, Noise(sigma_force=SIGMA)
         )
         return examined, visibility_table(examined)
+
+
+def left_of(design, columns):
+    """What a least-squares fit of a design (n, u) leaves of columns (n, k)."""
+    return columns - design @ np.linalg.lstsq(design, columns, rcond=None)[0]
 
 
 @pytest.fixture(scope="module")

@@ -28,14 +28,6 @@ FULL = {
 """A campaign with all columns, in which no effect of the catalogue hides behind another, but a
 thermal curve behind a thermal bias: there are two temperatures."""
 
-ROTATIONS = {
-    *("cross_axis_misalignment", "mounting_rotation", "base_tilt", "encoder_offset"),
-    *("encoder_scale", "encoder_eccentricity", "axis_nonperpendicularity", "joint_compliance"),
-    "mounting_slip",
-}
-"""Effects that only turn the sensor or misread its attitude."""
-
-
 SCHEMA = Draft202012Validator(
     yaml.safe_load((ROOT / "docs/reference/diagnosis.schema.yaml").read_text(encoding="utf-8"))
 )

@@ -19,8 +19,3 @@ def nine(u):
     """Derivatives of |f| by the parameters of bias, scale and non-orthogonality, (n, 9)."""
     x, y, z = u.T
     return np.column_stack([u, u**2, x * y, x * z, y * z])
-
-
-def left_of(design, columns):
-    """What a least-squares fit of a design (n, u) leaves of columns (n, k)."""
-    return columns - design @ np.linalg.lstsq(design, columns, rcond=None)[0]

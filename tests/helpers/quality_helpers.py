@@ -49,10 +49,3 @@ def solutions(approach, observed):
     for i in range(len(observed.forces)):
         part = replace(together, **{name: getattr(together, name)[i : i + 1] for name in arrays})
         yield solve(NINE, approach, one(observed, i), part)
-
-
-def with_error(observed, position, error):
-    """Add an error (3,) to the forces of a position."""
-    forces = observed.forces.copy()
-    forces[:, position] += error
-    return replace(observed, forces=forces)

@@ -1,7 +1,5 @@
 """Schemes of which tests know what they determine."""
 
-import numpy as np
-
 KNOWN = (
     "faces-6",
     "d-optimal-9",
@@ -21,9 +19,3 @@ KNOWN = (
     "fibonacci-50",
 )
 """Those of the literature and more, by the number of positions."""
-
-
-def gravity_scale_correlation(directions):
-    """Correlation of two scales in the gravity-based calibration, −3m / (1 − 3m)."""
-    m = float(np.mean(directions[:, 0] ** 2 * directions[:, 1] ** 2))
-    return -3 * m / (1 - 3 * m)

@@ -69,8 +69,3 @@ def run_study(folder, pattern="{model}", **keys):
         write_table(folder / f"{name}.parquet", tables[name], PROVENANCE)
         tables[name] = read_table(folder / f"{name}.parquet")
     return tables
-
-
-def estimates_in(folder):
-    """Files of estimates in the folder of `run_study`."""
-    return sorted(folder.rglob("estimates.parquet"))

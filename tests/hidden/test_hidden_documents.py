@@ -23,9 +23,6 @@ CONFIG = parse_hidden(read_layer(ROOT / "studies/hidden/config/hidden-effects.ya
 RENEWED = "`make hidden-docs`, which takes an hour, makes the score anew"
 
 
-SCORE = (DOCS / "guides/hidden-effects-score.md").read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize("study", ["hidden-effects", "real-noise"])
 def test_the_score_is_that_of_the_study(study):
     """Of this configuration and, where the study was run here, of this very run."""

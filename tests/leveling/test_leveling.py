@@ -18,10 +18,8 @@ from accelstudy.leveling.angles import (
     wrapped,
 )
 
-SIGMA = 0.002
 ROLLS = st.floats(-199 * GON, 199 * GON)
 PITCHES = st.floats(-95 * GON, 95 * GON)
-EQUAL_NOISE = SIGMA**2 * np.eye(3)
 
 
 def force(roll, pitch):

@@ -8,7 +8,6 @@ from accelstudy.leveling.distribution import TiltDistribution
 from accelstudy.leveling.error import TiltError
 
 P = np.array([0.025, 0.25, 0.5, 0.75, 0.95, 0.975, 0.999])
-NONE = np.zeros((2, 0))
 
 
 def distribution(quadratic, covariance=None, constant=(0.0, 0.0), linear=None):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from page_helpers import text_of
-from study_helpers import NINE, PROVENANCE, estimates_in, grid, make_study, run_study
+from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
 from usual import PAPER_TRUTH
 
 from accelstudy.basics.units import MGON
@@ -185,7 +185,7 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, evidence, tm
         "html": tmp_path / "claims.html",
     }
     judge_claims(
-        make_study(**KEYS), estimates_in(folder),
+        make_study(**KEYS), sorted(folder.rglob("estimates.parquet")),
         {name: folder / f"{name}.parquet" for name in TABLES}, outputs, PROVENANCE,
     )  # fmt: skip
     claims = read_table(outputs["claims"])

@@ -87,12 +87,9 @@ def test_the_schema_accepts_what_the_models_accept():
             validate({**base, **changes}, schema, set_default=False)
 
 
-def blocks_of(schema):
-    return [schema, *schema["$defs"].values()]
-
-
 def test_the_schema_explains_every_key():
-    for block in blocks_of(config_schema()):
+    schema = config_schema()
+    for block in (schema, *schema["$defs"].values()):
         assert block["description"]
         for name, key in block["properties"].items():
             assert "description" in key or "$ref" in key, name
@@ -153,19 +150,15 @@ BAD = {
 }  # fmt: skip
 
 
-def fails(path, *parts):
-    """Message of a configuration that is refused, by the function and by the command line."""
-    with refused(*parts, start=f"{path}: ") as caught:
-        read_study(path)
-    assert refusal("cells", path) == f"error: {caught.value}\n"
-    return str(caught.value)
-
-
 @pytest.mark.parametrize(("changes", "expected"), [(c, e) for c, *e in BAD.values()], ids=[*BAD])
 def test_bad_content(changes, expected, tmp_path):
+    """By the function, and by the command line."""
     path = tmp_path / "study.yaml"
     path.write_text(yaml.safe_dump(content(**changes)))
-    assert len(fails(path, *expected)) < len(str(path)) + 700
+    with refused(*expected, start=f"{path}: ") as caught:
+        read_study(path)
+    assert refusal("cells", path) == f"error: {caught.value}\n"
+    assert len(str(caught.value)) < len(str(path)) + 700
 
 
 def test_overlaid_files_are_all_named(tmp_path):

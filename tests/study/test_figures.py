@@ -279,19 +279,16 @@ def test_colours_of_causes_keep_apart(eye):
 
 @pytest.mark.parametrize("cmap", ["viridis", "cividis", "Blues", "RdBu_r"])
 def test_numbers_on_a_map_can_be_read(cmap):
-    """The threshold of WCAG 2.2 for text, 4.5, is just missed by an ink that is not black."""
+    """The relative luminances are compared, from CIE L*.
+
+    The threshold of WCAG 2.2 for text, 4.5, is just missed by an ink that is not black.
+    """
     ax = style.new_figure(1, 20).subplots()
     image = ax.imshow([[0, 1]], cmap=cmap)
     for value in np.linspace(0, 1, 101):
-        (one, other) = sorted(
-            brightness(colour) for colour in (style.ink_on(image, value), image.to_rgba(value))
-        )
+        colours = style.ink_on(image, value), image.to_rgba(value)
+        one, other = sorted(((seen(each, "normal")[0] + 16) / 116) ** 3 for each in colours)
         assert (other + 0.05) / (one + 0.05) > 3.9
-
-
-def brightness(colour):
-    """Relative luminance, from CIE L*."""
-    return ((seen(colour, "normal")[0] + 16) / 116) ** 3
 
 
 @pytest.mark.parametrize(("model", "title"), [

@@ -56,14 +56,8 @@ def test_without_snakemake_one_line_says_what_to_install(tmp_path, monkeypatch):
 
 # --- templates and sensors -----------------------------------------------------------------------
 
-TEMPLATE = pytest.mark.parametrize("template", TEMPLATES)
 
-
-def content(folder):
-    return read_layer(folder / "config" / "config.yaml")
-
-
-@TEMPLATE
+@pytest.mark.parametrize("template", TEMPLATES)
 def test_each_template_is_planned_by_its_workflow_with_all_profiles(template, tmp_path):
     init(tmp_path / "mine", "--template", template)
     profiles = {p.relative_to(ROOT) for p in (ROOT / "profiles").rglob("*.yaml")}
@@ -103,7 +97,7 @@ def test_a_campaign_brings_noise_gravity_positions_and_what_its_calibration_find
     assert study.gravity_mps2 == 9.81
     assert study.sensor["bias"].value == pytest.approx([0.12, -0.07, 0.2], abs=1e-4)
     assert study.sensor["scale"].value == pytest.approx([3000, -2000, 1000], abs=10)
-    (measured,) = content(tmp_path / "campaigns")["campaigns"]
+    (measured,) = read_layer(tmp_path / "campaigns/config/config.yaml")["campaigns"]
     assert measured["campaign"] == str(folder)
 
 
