@@ -7,3 +7,5 @@ rule study:
     default_target: True
     input:
         rules.all.input,
+    message:
+        f"All results of the study {STUDY.study}"

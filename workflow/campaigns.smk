@@ -55,6 +55,8 @@ rule campaigns:
     input:
         OUTPUTS,
         TOGETHER,
+    message:
+        f"All results of the batch {BATCH.batch}"
 
 
 rule public:

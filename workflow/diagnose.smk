@@ -21,6 +21,8 @@ rule round_trip:
     default_target: True
     input:
         f"{RESULTS}/diagnosis",
+    message:
+        f"The diagnosis of {TRIP.campaign.name}"
 
 
 rule simulate_campaign:

@@ -13,3 +13,5 @@ rule all:
     default_target: True
     input:
         rules.campaigns.input,
+    message:
+        f"All results of the batch {BATCH.batch}"
