@@ -41,10 +41,10 @@ def git_commit() -> str:
     An installed package may lie within a repository that has nothing to do with it, as in the
     environment of a project; it is of that repository only if its files are.
     """
-    folder = Path(__file__).parent
+    package = Path(__file__).parents[1]
 
     def git(*arguments: str) -> str:
-        command = ["git", "-C", str(folder), *arguments]
+        command = ["git", "-C", str(package), *arguments]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     try:

@@ -119,6 +119,8 @@ def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monke
     installed = tmp_path / "env" / "tables.py"
     installed.parent.mkdir()
     installed.write_text("")
+    beside = tmp_path / "beside.py"
+    beside.write_text("")
     monkeypatch.setattr(tables, "__file__", str(installed))
     git(tmp_path, "init")
     git(tmp_path, "commit", "--allow-empty", "--message", "somebody's project")
@@ -126,7 +128,10 @@ def test_a_repository_around_an_installed_package_is_not_its_own(tmp_path, monke
     git_commit.cache_clear()
     git(tmp_path, "add", "--all")
     git(tmp_path, "commit", "--message", "a copy under git")
-    assert git_commit() == git(tmp_path, "rev-parse", "HEAD")
+    assert git_commit() == (head := git(tmp_path, "rev-parse", "HEAD"))
+    git_commit.cache_clear()
+    beside.write_text("an edit")
+    assert git_commit() == f"{head}+"
 
 
 # --- whole or not at all -------------------------------------------------------------------------
