@@ -392,7 +392,7 @@ class SensitivityConfig(Block):
             if study.paper and 0 not in getattr(self, name):
                 raise InputError(f"sensitivity.{name}: must contain 0, which paper: true needs")
         cells = {cell.name: cell for cell in study.cells}
-        for name in map(self.cell, ("gravity", "robot")):
+        for name in map(self.cell, APPROACHES):
             if name not in cells or cells[name].replicates < 2:
                 raise InputError(
                     f"sensitivity: needs at least 2 replicates of the cell {name}, with the noise "
@@ -405,6 +405,8 @@ class SensitivityConfig(Block):
                 raise InputError(f"sensitivity: {name} has no redundancy, which paper: true needs")
 
 
+APPROACHES = ("gravity", "robot")
+"""The approaches that the analysis, the figures of the paper and its claims compare."""
 CLAIMED_EFFECTS = {"bias", "scale", "nonorthogonality"}
 """Effects that the model of the paper's claims and figures must have."""
 HOLD_KEYS = {

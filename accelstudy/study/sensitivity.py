@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,12 +11,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import to_si
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import leveling_shares
-
-if TYPE_CHECKING:
-    from accelstudy.study.config import SensitivityConfig, Study
-
-APPROACHES = ("gravity", "robot")
-"""The approaches with whose calibrations the sensitivity is analysed."""
+from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
 
 
 def sensitivity_table(study: Study, summary: pd.DataFrame) -> pd.DataFrame:

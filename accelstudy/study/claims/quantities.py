@@ -24,10 +24,9 @@ from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import overtaken
 from accelstudy.study.cell import Cell
-from accelstudy.study.config import SensitivityConfig, Study
+from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
 from accelstudy.study.known import KnownValues
 from accelstudy.study.quantiles import controlled_quantiles, share_below
-from accelstudy.study.sensitivity import APPROACHES
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from accelstudy.drawing import style
+from accelstudy.study.config import APPROACHES
 from accelstudy.study.figures.panels import Image, in_shown_units, key, matrix, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
-APPROACHES = ("gravity", "robot")
 MIN_WRITTEN = 0.005
 """Correlations above this are written into their field."""
 WIDTH = 0.36
