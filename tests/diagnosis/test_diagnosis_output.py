@@ -5,9 +5,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -84,25 +82,9 @@ RENDERED = {"named": ("residuals", "gap"), "learned": ("shape",)}
 """Figures that are rendered, by case; all others are only composed, which takes far less time."""
 
 
-class Written(NamedTuple):
-    """A diagnosis, the folder of its files, and the content of diagnosis.json."""
-
-    diagnosed: accelstudy.Diagnosis
-    folder: Path
-    content: dict
-
-    @property
-    def found(self):
-        return self.diagnosed.result
-
-    @property
-    def page(self):
-        return (self.folder / "report.html").read_text(encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Diagnoses of all cases, each made and written once."""
+    """Diagnoses of all cases, each made once, with what was written."""
     root = tmp_path_factory.mktemp("diagnoses")
 
     @cache
@@ -113,7 +95,10 @@ def written(tmp_path_factory):
         with composed(*RENDERED.get(case, ())):
             diagnosed.save(folder)
         content = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-        return Written(diagnosed, folder, content)
+        page = (folder / "report.html").read_text(encoding="utf-8")
+        return SimpleNamespace(
+            diagnosed=diagnosed, found=diagnosed.result, folder=folder, content=content, page=page
+        )
 
     return get
 
@@ -126,11 +111,11 @@ def named(written):
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_verdict_is_written_and_told(written, case):
-    diagnosed, out, content = written(case)
+    one = written(case)
+    content, page, out = one.content, one.page, one.folder
     assert content["verdict"] == ("named" if case == "gravity" else case)
     assert [error.message for error in SCHEMA.iter_errors(content)] == []
-    page = written(case).page
-    assert HEADLINES[case] in diagnosed.verdict
+    assert HEADLINES[case] in one.diagnosed.verdict
     assert HEADLINES[case] in text_of(page)
     drawn = {path.stem for path in (out / "figures").glob("*.svg")}
     assert {"evidence", "residuals"} <= drawn
@@ -287,7 +272,7 @@ def test_the_schema_asks_what_a_verdict_requires(written, change, path):
 
 
 def test_positions_say_what_was_held_out(written):
-    _, out, content = written("named")
+    out, content = written("named").folder, written("named").content
     positions = pd.read_parquet(out / "positions.parquet")
     held = positions["split"] == "held-out"
     assert positions.loc[held, "position"].tolist() == content["gap"]["held_out_positions"]
@@ -315,7 +300,7 @@ def test_a_bumped_position_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("case", ["named", "gravity", "noise_model"])
 def test_the_model_is_a_study(written, case):
-    _, out, content = written(case)
+    out, content = written(case).folder, written(case).content
     study = read_study(ROOT / "config/config.yaml", out / "model.yaml")
     assert study.study == case
     assert study.sigma_force == pytest.approx(content["noise"]["sigma_mps2"])
