@@ -3,10 +3,11 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
-from calling import call, refusal, succeed
+from calling import refusal, refused
 
-from accelstudy.campaign.format import read_campaign
+import accelstudy as acs
 
 G, RATE, HOLD = 9.80665, 25.0, 4.0
 QUARTER = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])  # x of the reference points right
@@ -64,109 +65,91 @@ def plate(tmp_path_factory):
     write(folder / "partly.csv", beside[len(beside) // 2 :], 1000 + len(beside) // 2 / RATE, names)
     measured = noisy(together @ SMALL.T, OF_SENSOR, np.array([0.3, -0.2, 0.1]), 0.02)
     write(folder / "log.csv", measured, 1000)
-    succeed("import", folder / "alone.csv", "--out", folder / "alone", "--no-figure")
-    succeed("calibrate", folder / "alone", "--out", folder / "ref")
+    acs.calibrate(acs.find_holds(folder / "alone.csv")).save(folder / "ref")
     return folder
 
 
-def given(plate, out, log="ref.csv", calibration="ref/calibration.json", *more):
-    """Words of an import beside a reference."""
-    beside = ("--reference-log", plate / log, "--reference", plate / calibration)
-    return ("import", plate / "log.csv", "--out", out, "--no-figure", *beside, *more)
+def imported(plate, beside="ref.csv", calibration="ref/calibration.json", **how):
+    """The campaign of the log beside a reference."""
+    how = {"log": plate / "log.csv", "reference_log": plate / beside, **how}
+    return acs.find_holds(reference=plate / calibration, **how)
 
 
-def test_from_two_logs_to_the_sensor(plate, tmp_path):
-    said = succeed(*given(plate, tmp_path / "c"))
-    assert "x right, y back, z down" in said.output
-    campaign = read_campaign(tmp_path / "c")
+def test_from_two_logs_to_the_sensor(plate):
+    campaign = imported(plate)
+    assert "x right, y back, z down" in " ".join(campaign.notes)
     assert campaign.reference.frame == "rbd"
     assert campaign.reference.calibration == "alone"
     # Four seconds less trims and half windows, at 25 per second.
     assert campaign.reference.sigma_mps2 == pytest.approx(0.01 / np.sqrt(70), rel=0.4)
-    succeed(
-        *("calibrate", tmp_path / "c", "--out", tmp_path / "out", "--approach", "robot"),
-        *("--model", "bias-scale-nonorthogonality-crossaxis"),
+    calibration = acs.calibrate(
+        campaign, approach="robot", model="bias-scale-nonorthogonality-crossaxis"
     )
-    content = json.loads((tmp_path / "out" / "calibration.json").read_text())
     # Fourteen holds of four seconds hardly tell their own noise, so nothing is accepted by it.
     assert campaign.sigma_dof < 8
-    assert content["quality"]["state"] == "cannot tell"
-    assert content["reference"]["calibration"] == "alone"
-    tilt = content["quality"]["tilt_rms_mgon"]
+    assert calibration.state == "cannot tell"
+    assert calibration.content["reference"]["calibration"] == "alone"
+    tilt = calibration.content["quality"]["tilt_rms_mgon"]
     assert 0 < tilt["reference_roll"] < tilt["parameters_roll"]
     # The rotation between the sensors is part of what is estimated: forces in the axes of the
     # reference come out, whatever the sensor was turned by.
-    matrix, bias = (np.array(content["affine"][key]) for key in ("matrix", "bias_mps2"))
+    affine = calibration.content["affine"]
     levels = -G * np.array([[0.3, 0.2, 0.93], [-0.4, 0.1, 0.91]])
     read = levels @ SMALL.T @ OF_SENSOR.T + [0.3, -0.2, 0.1]
-    np.testing.assert_allclose((read - bias) @ matrix.T, levels, atol=0.02)
+    found = (read - affine["bias_mps2"]) @ np.transpose(affine["matrix"])
+    np.testing.assert_allclose(found, levels, atol=0.02)
 
 
-def test_other_columns_and_times(plate, tmp_path):
+def test_other_columns_and_times(plate):
     """Columns by option; a clock that is off by an offset; no clock at all."""
-    succeed(*given(plate, tmp_path / "a"))
-    columns = ("--reference-columns", "fx=p,fy=q,fz=r,time=t")
-    succeed(*given(plate, tmp_path / "b", "other.csv", "ref/calibration.json", *columns))
-    moved = ("--reference-offset", "-18")
-    succeed(*given(plate, tmp_path / "c", "shifted.csv", "ref/calibration.json", *moved))
-    first = read_campaign(tmp_path / "a")
-    for name in "bc":
-        np.testing.assert_allclose(read_campaign(tmp_path / name).angles, first.angles, atol=2e-4)
+    first = imported(plate)
+    for log, how in (
+        ("other.csv", {"reference_columns": "fx=p,fy=q,fz=r,time=t"}),
+        ("shifted.csv", {"reference_offset": -18}),
+    ):
+        np.testing.assert_allclose(imported(plate, log, **how).angles, first.angles, atol=2e-4)
 
 
-def test_holds_without_the_reference_are_left_out(plate, tmp_path):
-    said = succeed(*given(plate, tmp_path / "c", "partly.csv")).stderr
+def test_holds_without_the_reference_are_left_out(plate):
+    campaign = imported(plate, "partly.csv")
+    said = " ".join(campaign.warnings)
     assert "hold 1 left out: the reference log does not cover it" in said
-    assert read_campaign(tmp_path / "c").positions[0] == 8
+    assert campaign.positions[0] == 8
 
 
 REFUSED = {
-    "late.csv": ("--reference-log", "whose holds lie from", "--reference-offset"),
-    "shifted.csv": ("--reference-log", "do not turn together", "--reference-offset"),
-    "between.csv": ("--reference-log", "moves in", "--reference-offset"),
-    "in-g.csv": ("--reference-log", "about 1 m/s²", "unit"),
-    "other.csv": ("--reference-log", "--reference-columns"),
-    "askew.csv": ("--reference-log", "turned by 50 gon", "20 gon"),
-    "still.csv": ("--reference-log", "do not turn together"),
+    "late.csv": ("reference_log", "whose holds lie from", "reference_offset"),
+    "shifted.csv": ("reference_log", "do not turn together", "reference_offset"),
+    "between.csv": ("reference_log", "moves in", "reference_offset"),
+    "in-g.csv": ("reference_log", "about 1 m/s²", "unit"),
+    "other.csv": ("reference_log", "reference_columns"),
+    "askew.csv": ("reference_log", "turned by 50 gon", "20 gon"),
+    "still.csv": ("reference_log", "do not turn together"),
     "missing.csv": ("missing.csv",),
 }
 
 
 @pytest.mark.parametrize("log", REFUSED)
-def test_logs_that_tell_no_angles(plate, tmp_path, log):
-    line = refusal(*given(plate, tmp_path / "c", log))
-    for part in REFUSED[log]:
-        assert part in line
-    assert not (tmp_path / "c").exists()
-
-
-def changed(plate, tmp_path, **change):
-    """A calibration.json with something else in it."""
-    content = json.loads((plate / "ref" / "calibration.json").read_text())
-    path = tmp_path / "calibration.json"
-    path.write_text(json.dumps({**content, **change}))
-    return path
+def test_logs_that_tell_no_angles(plate, log):
+    with refused(*REFUSED[log]):
+        imported(plate, log)
 
 
 def test_calibrations_that_tell_no_angles(plate, tmp_path):
-    def line(**change):
-        path = changed(plate, tmp_path, **change)
-        return refusal(*given(plate, tmp_path / "c", "ref.csv", path))
-
+    path = tmp_path / "calibration.json"
     content = json.loads((plate / "ref" / "calibration.json").read_text())
-    none = [[None] * 9] * 9
-    assert "no covariance matrix" in line(covariance=none)
     quality = {**content["quality"], "plausible": False, "warnings": ["s_x is 0.5"]}
-    assert "do not use this calibration: s_x is 0.5" in line(quality=quality)
-    names = [f"b_T_{axis}" for axis in "xyz"]
-    more = [{**content["parameters"][0], "name": name} for name in names]
-    warm = line(
-        effects=[*content["effects"], "thermal_bias"],
-        parameters=[*content["parameters"], *more],
-        covariance=np.eye(12).tolist(),
-    )
-    assert "--reference" in warm
-    assert "thermal_bias needs the temperature" in warm
+    more = [{**content["parameters"][0], "name": f"b_T_{axis}"} for axis in "xyz"]
+    warm = {"effects": [*content["effects"], "thermal_bias"], "covariance": np.eye(12).tolist()}
+    for change, *parts in (
+        ({"covariance": [[None] * 9] * 9}, "no covariance matrix"),
+        ({"quality": quality}, "do not use this calibration: s_x is 0.5"),
+        ({**warm, "parameters": [*content["parameters"], *more]},
+         "reference", "thermal_bias needs the temperature"),
+    ):  # fmt: skip
+        path.write_text(json.dumps({**content, **change}))
+        with refused(*parts):
+            imported(plate, "ref.csv", path)
 
 
 @pytest.mark.parametrize(("words", "part"), [
@@ -186,11 +169,7 @@ def test_options_that_do_not_go_together(plate, tmp_path, words, part):
     assert part in refusal("import", plate / "log.csv", "--out", tmp_path / "c", *words)
 
 
-def test_angles_in_the_log_are_left_out(plate, tmp_path):
-    table = np.loadtxt(plate / "log.csv", delimiter=",", skiprows=1)
-    table = np.column_stack([table, np.zeros((len(table), 2))])
-    path, head = tmp_path / "log.csv", "time,fx,fy,fz,roll,pitch"
-    np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.6f")
-    words = list(given(plate, tmp_path / "c"))
-    words[1] = path
-    assert "columns roll, pitch are left out" in call(*words).stderr
+def test_angles_in_the_log_are_left_out(plate):
+    log = pd.read_csv(plate / "log.csv").assign(roll=0.0, pitch=0.0)
+    said = " ".join(imported(plate, log=log).warnings)
+    assert "columns roll, pitch are left out" in said
