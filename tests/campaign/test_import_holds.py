@@ -11,10 +11,6 @@ def spans(holds):
     return holds.table[["start", "end"]].to_numpy().T
 
 
-def assert_same(holds, others, rtol=1e-5):
-    pd.testing.assert_frame_equal(holds.table, others.table, rtol=rtol, atol=1e-8)
-
-
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("sigma", [0.0005, 0.02, 0.2])
 def test_known_holds(tmp_path, seed, sigma):
@@ -83,7 +79,7 @@ def test_override_and_limits(tmp_path):
     chosen = find_holds(log)
     given = find_holds(log, threshold_mps2=chosen.threshold.sd)
     assert given.threshold.reason == "as given"
-    assert_same(given, chosen)
+    pd.testing.assert_frame_equal(given.table, chosen.table, rtol=1e-5, atol=1e-8)
     assert len(find_holds(log, threshold_mps2=100.0).table) == 1
     longer = find_holds(log, trim_s=0.5)
     np.testing.assert_array_equal(spans(longer).T, spans(chosen).T + np.array([30, -30]))

@@ -2,19 +2,17 @@
 
 import numpy as np
 import pytest
-from calling import succeed
-from log_helpers import find_holds, opened, session, write
+from calling import refused, succeed
+from log_helpers import find_holds, opened, session, table, write
 
-from accelstudy.basics.errors import InputError
+import accelstudy as acs
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.importing.detection import find_blocks
 from accelstudy.campaign.importing.noise import (
     noise_before_rounding,
     rounding_of_mean,
     step_of,
 )
-from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.schemes import get_scheme
 
 BIAS, SCALE = np.array([0.12, -0.08, 0.2]), 1 + 1e-6 * np.array([4000, -3000, 6000])
@@ -92,30 +90,30 @@ def test_the_step_is_said_kept_and_counts_in_the_verdict(tmp_path, step):
 # --- Saturation ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("step", [0.006, 0.02, 0.1, G / 64])
-def test_a_pile_at_the_extreme_that_the_steps_explain_is_no_saturation(tmp_path, step):
+def saturated(read, full_range=None):
+    """Blocks of readings that are left out."""
+    how = {"block": 40, "threshold": 10, "range": full_range}
+    return [*acs.find_holds(table(read), **how).reasons]
+
+
+def faces(seed):
     """Short holds of calm turns, so that the extremes of the log are those of its faces."""
+    held = G * np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
+    return held + 0.02 * np.random.default_rng(seed).standard_normal(held.shape)
+
+
+@pytest.mark.parametrize("step", [0.006, 0.02, 0.1, G / 64])
+def test_a_pile_at_the_extreme_that_the_steps_explain_is_no_saturation(step):
     for seed in range(6):
-        rng = np.random.default_rng(seed)
-        faces = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
-        read = np.round((G * faces + 0.02 * rng.standard_normal(faces.shape)) / step) * step
-        blocks = find_holds_of_blocks(tmp_path, read)
-        assert not blocks.left_out
+        assert saturated(np.round(faces(seed) / step) * step) == []
 
 
-def find_holds_of_blocks(folder, read, full_range=None):
-    settings = ImportSettings(block=40, threshold_mps2=10.0, range_mps2=full_range)
-    return find_blocks(opened(folder, read), settings)
-
-
-def test_with_a_range_only_the_range_counts(tmp_path):
-    rng = np.random.default_rng(1)
-    faces = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
-    read = np.minimum(G * faces + 0.02 * rng.standard_normal(faces.shape), G)
-    assert len(find_holds_of_blocks(tmp_path, read).left_out) == 3
-    assert not find_holds_of_blocks(tmp_path, read, 8 * G).left_out
-    with pytest.raises(InputError, match="saturated in all blocks"):
-        find_holds_of_blocks(tmp_path, read, G)
+def test_with_a_range_only_the_range_counts():
+    read = np.minimum(faces(1), G)
+    assert len(saturated(read)) == 3
+    assert saturated(read, 8 * G) == []
+    with refused("saturated in all blocks"):
+        saturated(read, G)
 
 
 # --- Short rests ---------------------------------------------------------------------------------
