@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from calling import call, refusal
+from calling import call, refusal, succeed
 from click.testing import CliRunner
 from study_helpers import NINE, PROVENANCE, content, grid
 
@@ -26,8 +26,7 @@ from accelstudy.sensors.models import MODELS, PRESETS, get_model
 
 
 def output(*arguments):
-    result = call(*arguments)
-    assert result.exit_code == 0, result.output
+    result = succeed(*arguments)
     assert result.stderr == ""
     return result.stdout
 
@@ -163,11 +162,9 @@ def test_an_unknown_angle_unit(monkeypatch):
     line = "error: unknown angle unit 'grad' (known: gon, deg)\n"
     monkeypatch.delenv("ACCELSTUDY_ANGLE_UNIT", raising=False)
     for arguments in (["--angle-unit", "grad", "models"], ["effects", "--angle-unit", "grad"]):
-        result = call(*arguments)
-        assert (result.exit_code, result.stdout, result.stderr) == (2, "", line)
+        assert refusal(*arguments) == line
     monkeypatch.setenv("ACCELSTUDY_ANGLE_UNIT", "grad")
-    result = call("models")
-    assert (result.exit_code, result.stdout, result.stderr) == (2, "", line)
+    assert refusal("models") == line
 
 
 # --- a study -------------------------------------------------------------------------------------
