@@ -6,13 +6,13 @@
 import inspect
 import json
 import re
-from datetime import datetime
 from importlib import import_module
 from types import SimpleNamespace
 from unittest.mock import ANY
 
 import griffe
 import numpy as np
+import pandas as pd
 import yaml
 from jsonschema import Draft202012Validator
 from places import ROOT
@@ -21,19 +21,7 @@ from study_helpers import grid, make_study, run_study
 import accelstudy
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
-from accelstudy.campaign.calibration.applying import calibration_of
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import (
-    assessed_positions,
-    calibration_document,
-    json_text,
-    quality_document,
-)
-from accelstudy.campaign.calibration.export import export
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.epochs.comparison import Comparison
-from accelstudy.epochs.history import History
+from accelstudy.campaign.calibration.document import json_text
 from accelstudy.lots.evidence import SensorEvidence
 from accelstudy.lots.lot import LotDiagnosis
 from accelstudy.lots.mixture import LotTest
@@ -45,7 +33,6 @@ from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 SENSITIVITY = {"base_samples": 2, "resamples": 2, "roll_gon": 10, "pitch_gon": 0}
 OPTIONAL = {"sigma_position_axes_mps2"}
 """Keys that a file need not have."""
-PROVENANCE = {"config_hash": "0123456789abcdef", "seed": 1}
 
 
 def described(page):
@@ -88,18 +75,17 @@ def strict(schema):
     return content
 
 
-def test_each_key_and_column_of_a_calibration_is_described():
-    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-12"))
-    assessment = assess(fit_campaign(campaign, get_model("bias-scale"), get_approach("robot")))
-    document = calibration_document(assessment.fit)
-    document |= {"quality": quality_document(assessment)}
-    one = calibration_of(json.loads(json_text(document)))
-    dates = [datetime(2025, month, 1) for month in (1, 2, 3)]
-    history = History([one] * 3, dates)
+def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
+    campaigns = [accelstudy.simulate_campaign(seed=n, scheme="fibonacci-12") for n in range(3)]
+    each = [accelstudy.calibrate(c, model="bias-scale", approach="robot") for c in campaigns]
+    dates = [f"2025-0{month}-01" for month in (1, 2, 3)]
+    one, three = each[0], accelstudy.history(each, dates=dates)
+    one.save(tmp_path / "one")
+    three.save(tmp_path / "three")
     written = {
-        "calibration": document,
-        "comparison": Comparison(one, one, 1.0).content,
-        "history": history.content,
+        "calibration": one.content,
+        "comparison": accelstudy.compare(one, one).content,
+        "history": three.content,
         "lot": {**_lot(), "files": []},
     }
     for name, content in written.items():
@@ -107,13 +93,13 @@ def test_each_key_and_column_of_a_calibration_is_described():
         schema = Draft202012Validator(strict(yaml.safe_load(path.read_text(encoding="utf-8"))))
         said = [error.message for error in schema.iter_errors(json.loads(json_text(content)))]
         assert said == [], name
-    advice = accelstudy.advise(campaign, tilt_accuracy="1gon", model="bias-scale")
+    advice = accelstudy.advise(campaigns[0], tilt_accuracy="1gon", model="bias-scale")
     simulation = accelstudy.simulate("bias", ["faces-6", "mclaren-24"], "robot", sigma=1e-3).content
     assert described("file-formats") == {
-        "positions.parquet": list(assessed_positions(assessment)),
+        "positions.parquet": list(pd.read_parquet(tmp_path / "one/positions.parquet")),
         "calibration.h": ANY,
         "calibration.params": ANY,
-        "history.parquet": list(history.values),
+        "history.parquet": list(pd.read_parquet(tmp_path / "three/history.parquet")),
         "advice.json": list(advice.content),
         "simulation.json": list(simulation),
         "campaigns.parquet": list(CAMPAIGN_COLUMNS),
@@ -126,16 +112,14 @@ def test_each_key_and_column_of_a_calibration_is_described():
 
 
 def test_each_name_of_an_exported_calibration_is_described():
-    settings = CampaignSettings(scheme="fibonacci-24", temperature=(10, 40), vibration=(0, 1))
-    effects = ("thermal_bias(tau=60)", "thermal_curve", "vibration_rectification", "warm_up")
-    model = get_model(f"bias-scale+{'+'.join(effects)}")
-    fit = fit_campaign(simulate_campaign(settings)[0], model, get_approach("robot"))
-    calibration = calibration_of(calibration_document(fit))
-    code = export(calibration, "c").split("*/", 1)[1]
+    how = {"scheme": "fibonacci-24", "temperature": (10, 40), "vibration": (0, 1)}
+    model = "bias-scale+thermal_bias(tau=60)+thermal_curve+vibration_rectification+warm_up"
+    calibration = accelstudy.calibrate(accelstudy.simulate_campaign(**how), model=model)
+    code = calibration.export("c").split("*/", 1)[1]
     (signature,) = re.findall(r"void (accel_calibrate\(.*\))", code)
     words = set(re.findall(r"\w+", signature)) - {"const", "3"}
     names = {word.removesuffix("_60") for word in words}
-    lines = [line.split("\t") for line in export(calibration, "px4").splitlines() if line[0] != "#"]
+    lines = [line.split("\t") for line in calibration.export("px4").splitlines() if line[0] != "#"]
     first = {re.sub(r"[YZ](?=OFF|SCALE)", "X", re.sub(r"_[12]$", "_0", line[2])) for line in lines}
     said = described("file-formats")
     assert set(said["calibration.h"]) == names
