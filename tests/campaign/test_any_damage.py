@@ -15,16 +15,14 @@ import pandas as pd
 import pytest
 import yaml
 from calling import call
-from campaign_helpers import GRAVITY, NINE, simulated_campaign
+from campaign_helpers import simulated_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 from study_helpers import content as study_content
 
-from accelstudy.campaign.calibration.document import calibration_document
-from accelstudy.campaign.calibration.fit import fit_campaign
+import accelstudy as acs
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.conversion import Conversion
 
@@ -165,11 +163,11 @@ READ_BY = {
 def whole(tmp_path_factory):
     """A folder with all files, undamaged."""
     folder = tmp_path_factory.mktemp("whole")
-    robot, _ = simulate_campaign(CampaignSettings(n_samples=5, temperature=(10, 40), yaw="random"))
+    robot = acs.simulate_campaign(n_samples=5, temperature=(10, 40), yaw="random")
     write_campaign(robot, folder / "campaign")
     write_campaign(robot, folder / "parquet", "parquet")
     write_campaign(replace(robot, unit="counts", nominal=COUNTS), folder / "counts")
-    document = calibration_document(fit_campaign(simulated_campaign(TRUTH), NINE, GRAVITY))
+    document = acs.calibrate(simulated_campaign(TRUTH), approach="gravity").content
     (folder / "calibration.json").write_text(json.dumps(document), encoding="utf-8")
     LOG.to_csv(folder / "log.csv", index=False)
     LOG.to_parquet(folder / "log.parquet")

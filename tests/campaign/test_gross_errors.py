@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from calling import refused
 
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -15,16 +16,15 @@ from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.campaign.gross_errors.errors import SIGNED_PERMUTATIONS
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.leveling.angles import angles_of
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.conversion import Conversion
 from accelstudy.sensors.models import get_model
 
-CLEAN, _ = simulate_campaign(CampaignSettings(n_samples=50, yaw="random"))
+CLEAN = acs.simulate_campaign(n_samples=50, yaw="random")
 BLIND = replace(CLEAN, angles=None, sigma_angle=None, yaw=None)
-GRAVITY_20, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-20", approach="gravity"))
+GRAVITY_20 = acs.simulate_campaign(scheme="fibonacci-20", approach="gravity")
 
 
 def spoiled(spec, seed=1, campaign=CLEAN):
@@ -81,8 +81,7 @@ def test_what_is_drawn():
 
 
 def test_exchanged_rows_are_in_different_attitudes():
-    settings = CampaignSettings(scheme="faces-6", repeats=4)
-    campaign, _ = simulate_campaign(settings)
+    campaign = acs.simulate_campaign(scheme="faces-6", repeats=4)
     for seed in range(30):
         changed = spoiled("row_order", seed, campaign).forces - campaign.forces
         assert np.abs(changed).max() > 1
@@ -147,10 +146,7 @@ DESIGNS = {
 
 @pytest.fixture(scope="module")
 def designs():
-    return {
-        name: simulate_campaign(CampaignSettings(seed=7, **settings))[0]
-        for name, settings in DESIGNS.items()
-    }
+    return {name: acs.simulate_campaign(seed=7, **how) for name, how in DESIGNS.items()}
 
 
 def exchanged(campaign, rows, places):
@@ -271,8 +267,7 @@ def test_several_gross_errors_are_undone_together(designs):
 
 @pytest.mark.parametrize(("approach", "size"), [("robot", 19.0), ("robot", 2.0), ("gravity", 9.0)])
 def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
-    settings = CampaignSettings(scheme="fibonacci-24", seed=12, approach=approach)
-    campaign, _ = simulate_campaign(settings)
+    campaign = acs.simulate_campaign(scheme="fibonacci-24", seed=12, approach=approach)
     right = diagnose(campaign, get_model("bias-scale-nonorthogonality"))
     outward = campaign.forces[16] / np.linalg.norm(campaign.forces[16])
     campaign.forces[16] += size * outward
