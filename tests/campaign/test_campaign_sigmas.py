@@ -1,6 +1,5 @@
 """Sigmas that a calibration quotes where its noise is estimated: intervals, and their check."""
 
-import json
 import math
 import re
 from dataclasses import replace
@@ -8,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaign_helpers import GRAVITY, NINE, simulated_campaign
+from log_helpers import table
 
+import accelstudy as acs
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import read_calibration
-from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import interval_words, what_a_check_finds
 from accelstudy.campaign.session import Campaign
@@ -45,39 +43,31 @@ def check(errors, sigmas, needed):
     assert np.abs(normal - 0.931).max() < 4.5 * math.sqrt(0.931 * 0.069 / SESSIONS)
 
 
-def test_the_intervals_of_a_calibration_hold_95_percent(tmp_path):
+def test_the_intervals_of_a_calibration_hold_95_percent():
     """24 positions and 9 parameters: r = 15."""
     forces = sessions()
     campaign = Campaign("one", np.arange(1, 25), forces[0], G)
-    fit = fit_campaign(campaign, NINE, GRAVITY)
-    document = calibration_document(fit)
-    needed = document["sigmas_95"]
-    assert document["redundancy"] == 15
+    one = acs.calibrate(campaign, approach="gravity")
+    fit, needed = one.fit, one.content["sigmas_95"]
+    assert one.content["redundancy"] == 15
     assert needed == pytest.approx(2.131, abs=5e-4)  # of any table of Student's t
-    assert [p["ci95"] for p in document["parameters"]] == pytest.approx(needed * fit.sigma)
+    assert [p["ci95"] for p in one.content["parameters"]] == pytest.approx(needed * fit.sigma)
     assert "2.13 of them hold 95 % (Student's t, r = 15)" in interval_words(fit)
 
     adjusted = calibrate(NINE, GRAVITY, Observations(forces, sigma_force=SIGMA, gravity=G))
     truth = np.concatenate([BIAS, SCALE, np.zeros(3)])
     check(adjusted.parameters - truth, adjusted.sigma_posteriori, needed)
 
-    known = fit_campaign(replace(campaign, sigma_force=SIGMA), NINE, GRAVITY)
-    assert known.sigmas_95 == pytest.approx(1.96, abs=5e-5)
-    priori = adjusted.sigma_priori
-    inside = np.mean(np.abs(adjusted.parameters - truth) < known.sigmas_95 * priori, axis=0)
+    known = acs.calibrate(replace(campaign, sigma_force=SIGMA), approach="gravity")
+    needed = known.content["sigmas_95"]
+    assert needed == pytest.approx(1.96, abs=5e-5)
+    inside = np.mean(np.abs(adjusted.parameters - truth) < needed * adjusted.sigma_priori, axis=0)
     assert np.abs(inside - 0.95).max() < 4.5 * ERROR
 
-    log = tmp_path / "log.csv"
-    log.write_text("fx,fy,fz\n0.1,0.2,-9.8\n", encoding="utf-8")
-    few = Campaign("few", np.arange(1, 14), forces[0, ::-1][:13], G)
-    for name, each, said in (
-        ("few", fit_campaign(few, NINE, GRAVITY), "up to 2.78 sigmas"),  # r = 4
-        ("fit", fit, ""), ("known", known, ""),
-    ):  # fmt: skip
-        path = tmp_path / f"{name}.json"
-        path.write_text(json.dumps(calibration_document(each)), encoding="utf-8")
-        leveled = level(read_calibration(path), log)
-        warned = [warning for warning in leveled.warnings if "sigmas" in warning]
+    few = acs.calibrate(Campaign("few", np.arange(1, 14), forces[0, ::-1][:13], G))
+    for calibration, said in ((few, "up to 2.78 sigmas"), (one, ""), (known, "")):  # r = 4
+        leveled = calibration.apply(table([[0.1, 0.2, -9.8]]))
+        warned = [warning for warning in leveled.attrs["warnings"] if "sigmas" in warning]
         assert len(warned) == bool(said)
         assert all(said in warning for warning in warned)
 
