@@ -11,11 +11,7 @@ from page_helpers import text_of
 
 import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import assessed_positions
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.wording import verdict_lines
-from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.data_sheets import of_sigma
 from accelstudy.planning.candidates import in_scheme
@@ -89,11 +85,11 @@ def test_one_p_value_of_a_position_in_conflict(tmp_path):
         errors[[4, 11]] = -np.array([[0.05], [0.012]]) * directions[[4, 11]]
         return errors
 
-    campaign = read_campaign(written(tmp_path / "bumped", CUBE, 1, bumped))
-    assessed = assess(fit_campaign(campaign, get_model("bias-scale-nonorthogonality")))
-    named = {int(campaign.positions[s.position]): s.p_value for s in assessed.suspects}
+    calibration = acs.calibrate(written(tmp_path / "bumped", CUBE, 1, bumped))
+    suspects = calibration.content["quality"]["suspects"]
+    named = {suspect["position"]: suspect["p_value"] for suspect in suspects}
     assert {5, 12} <= set(named)
-    table = assessed_positions(assessed).set_index("position")
+    table = calibration.residuals.set_index("position")
     for position, p_value in named.items():
         assert table.loc[position, "p_value_adjusted"] == p_value < 0.05
 
@@ -105,8 +101,8 @@ def test_an_accepted_calibration_is_not_sent_to_look_for_what_is_wrong(tmp_path)
         return -np.where(np.arange(26) == 4, 0.0095, 0.0)[:, None] * directions
 
     campaign = written(tmp_path / "bumped", CUBE, 1, bumped)
-    said = succeed("calibrate", campaign, "--out", tmp_path / "c").output
-    assert "ACCEPTED" in said
+    said = acs.calibrate(campaign).summary()
+    assert said.startswith("Calibration of made-up: accepted\n")
     assert "In conflict with the others: position 5 " in said
     assert "leave it out if the sensor was bumped there" in said
     assert "looks for what is wrong" not in said
@@ -129,11 +125,11 @@ def test_without_angles_between_the_axes_the_tilt_error_has_a_condition(tmp_path
     for _ in range(8):
         forces = g * faces @ sensor.T + bias + 0.002 * rng.standard_normal(faces.shape)
         read = Campaign("six", np.arange(len(forces)), forces, g, sigma_force=0.002)
-        assessed = assess(fit_campaign(read, get_model("bias-scale")))
-        promised.append(assessed.tilt.total)
-        says = " ".join(verdict_lines(assessed))
-        assert "if the axes of the sensor are at right angles, as the model bias-scale" in says
-        b, s = np.split(assessed.fit.parameters, 2)
+        calibration = acs.calibrate(read, model="bias-scale")
+        promised.append(calibration.tilt_error())
+        said = " ".join(calibration.summary().split())
+        assert "if the axes of the sensor are at right angles, as the model bias-scale" in said
+        b, s = np.split(calibration.parameters["value"].to_numpy(), 2)
         # Directions evenly over the cap up to 50 gon.
         height = 1 - rng.random(4000) * (1 - np.cos(np.pi / 4))
         around = 2 * np.pi * rng.random(4000)
