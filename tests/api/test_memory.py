@@ -72,11 +72,14 @@ def test_tables_files_and_the_command_are_leveled_alike(calibration, table, tmp_
     calibration.save(tmp_path / "calibrated")
     succeed("apply", tmp_path / "calibrated/calibration.json", path, "--out", out)
     of_command, of_file, of_table = (
-        pd.read_parquet(out), calibration.apply(path), calibration.apply(table)
+        pd.read_parquet(out).astype({"near_pole": "boolean"}),
+        calibration.apply(path),
+        calibration.apply(table),
     )  # fmt: skip
     pd.testing.assert_frame_equal(of_file, of_command)
     numbers = of_table.columns.difference(["note"])
     pd.testing.assert_frame_equal(of_table[numbers].reset_index(drop=True), of_file[numbers])
+    assert len(of_table[~of_table["near_pole"]]) == len(table) - 1
     (warning,) = of_table.attrs["warnings"]
     assert "row 4, column fx" in warning
 

@@ -338,6 +338,7 @@ WRONG = {
     "acs.history(calibrations[:2])": "date",
     "acs.history(calibrations[:3], dates=['2025-01-01'])": "1 date for 3 calibrations",
     "acs.lot([folder / 'sensor-0'])": "two sensors or more",
+    "one.apply(table.iloc[:0])": "DataFrame: no row has three numbers",
     "acs.lot(folder / 'sensor-0')": "two sensors or more",
     "acs.lot(str(folder / 'sensor-0'))": "two sensors or more",
     "acs.history(str(folder / 'none'))": "none: no such file",

@@ -91,8 +91,9 @@ class Leveled:
             as they were read if omitted.
         """
         frame = self.log.source.typed_table().to_pandas() if frame is None else frame
-        columns = zip(self.added.column_names, self.added.columns, strict=True)
-        return frame.assign(**{name: column.to_numpy() for name, column in columns})
+        # With a plain bool a row without an answer would make a column that knows no `~`.
+        columns = self.added.to_pandas(types_mapper={pa.bool_(): pd.BooleanDtype()}.get)
+        return frame.assign(**{name: columns[name].array for name in columns})
 
     def tell(self, place: Path) -> None:
         """Print how many rows are leveled, and what the user should know."""
@@ -147,9 +148,8 @@ def level(
         forces = forces @ calibration.mending.T
     usable = forces[np.isfinite(forces).all(axis=1)]
     if not len(usable):
-        raise InputError(
-            f"{read.path}: no row has three numbers; the first: {_reason(calibration, read, 0)}"
-        )
+        first = f"; the first: {_reason(calibration, read, 0)}" if len(forces) else ""
+        raise InputError(f"{read.path}: no row has three numbers{first}")
     check_size(f"{read.path}", usable, calibration.gravity, read.layout.unit, read.conversion)
     if sigma is not None:
         bounds.SIGMA_READING.check_key("`sigma`", sigma)
