@@ -80,13 +80,13 @@ def panels(
     axes = fig.subplots(len(rows), len(columns), squeeze=False, **shared)
     texts = {"title": title or (column and f"{{{column}}}"), "xlabel": xlabel, "ylabel": ylabel}
     labels = {name: np.full(axes.shape, "", object) for name in texts}
-    image = None
+    image, everywhere = None, np.ones(len(table), bool)
     for (i, j), ax in np.ndenumerate(axes):
-        of_row = table[table[row] == rows[i]] if row else table
-        of_column = table[table[column] == columns[j]] if column else table
-        part = of_row.loc[of_row.index.intersection(of_column.index)]
+        in_row = table[row].to_numpy() == rows[i] if row else everywhere
+        in_column = table[column].to_numpy() == columns[j] if column else everywhere
+        part = table[in_row & in_column]
         for name, text in texts.items() if len(table) else ():
-            alike = part if len(part) else of_row if name == "ylabel" else of_column
+            alike = part if len(part) else table[in_row if name == "ylabel" else in_column]
             labels[name][i, j] = text.format_map(alike.iloc[0])
         if part.empty:
             style.say_empty(ax, "none" if len(table) else "nothing to show")
