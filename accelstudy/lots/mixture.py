@@ -61,8 +61,7 @@ class Mixture:
     Attributes
     ----------
     odds : mapping of each effect to (n,) array, log odds of the sensors against nothing
-    pairs : mapping of two effects to (n,) array, log odds of both together; NaN where a sensor has
-        none
+    pairs : mapping of two effects to (n,) array, log odds of both together
     prior : mapping of each effect to its prior probability; these sum to 1
     common : mapping of effects to the log odds that they are the same in all sensors
     typical : mapping of one or two effects to odds with sizes of the type, for each scatter
@@ -165,10 +164,10 @@ class Mixture:
         """Log odds of the sensors for some effects together, with sizes of each sensor, (n,)."""
         if not subset:
             return np.zeros(len(self._anything))
+        if subset in self.pairs:
+            return self.pairs[subset]
         # Two that were not weighed together say no more than the weaker one.
-        least = np.min([self.odds[name] for name in subset], axis=0)
-        both = self.pairs.get(subset)
-        return least if both is None else np.where(np.isnan(both), least, both)
+        return np.asarray(np.min([self.odds[name] for name in subset], axis=0))
 
     def _of_type(self, one: TypicalSet, subset: Names) -> Array:
         """Log odds of the sensors with sizes of a type, (n,).

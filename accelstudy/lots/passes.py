@@ -169,7 +169,8 @@ class Pass:
         pairs: dict[Names, Array] = {}
         for i, one in enumerate(self.evidence):
             for names, log in self._pairs(one).items():
-                pairs.setdefault(names, np.full(len(self.sensors), np.nan))[i] = log
+                # Of a sensor without odds of both they are as where none has any (`Mixture`).
+                pairs.setdefault(names, np.min([odds[name] for name in names], axis=0))[i] = log
         kinds = {name: _kind(name) for name in self.classes}
         counts = Counter(kinds.values())
         total = sum(WEIGHTS[kind] for kind in counts)
