@@ -52,6 +52,7 @@ def test_means():
     campaign = acs.find_holds(log, means=True, unit="g", time="t")
     np.testing.assert_allclose(campaign.forces, np.eye(3)[:2] * STANDARD_GRAVITY)
     np.testing.assert_allclose(campaign.sd, 0.02 * STANDARD_GRAVITY)
+    assert campaign.positions.tolist() == [1, 2]
     assert campaign.n_samples.tolist() == [400, 100]
     assert campaign.time.tolist() == [1, 2]
     expected = 0.02 * STANDARD_GRAVITY * np.sqrt((1 / 400 + 1 / 100) / 2)

@@ -10,7 +10,7 @@ from stand_ins import drawn
 
 import accelstudy as acs
 from accelstudy.api.campaigns import files_of
-from accelstudy.basics.units import GON
+from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import segmentation_figure
@@ -236,6 +236,7 @@ def test_means_with_a_robot(frame, unit):
     campaign = acs.find_holds(log, robot_sigma="3.2mgon", robot_unit=unit, **how)
     np.testing.assert_allclose(campaign.angles, np.column_stack([roll, pitch]), atol=1e-12)
     np.testing.assert_allclose(campaign.yaw, yaw, atol=1e-12)
+    assert campaign.sigma_angle == pytest.approx(3.2 * MGON)
     # Of a log it tells the axes, and not the columns.
     assert campaign.log == LogLayout(frame=frame)
     np.testing.assert_allclose(campaign.forces, forces, atol=1e-12)
