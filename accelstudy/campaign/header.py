@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from datetime import date as calendar_date
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -21,6 +22,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.units import GON
+from accelstudy.campaign.importing.names import unit_of
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import (
     Block,
@@ -127,6 +129,16 @@ def _delimiter(value: Any) -> Any:
     return value
 
 
+def _usual_spelling(*units: str) -> Callable[[Any], Any]:
+    """What reads a unit by any spelling that the name of a column may have: m/s2, µs."""
+
+    def read(value: Any) -> Any:
+        unit = unit_of(value) if isinstance(value, str) else None
+        return unit if unit in units else value
+
+    return read
+
+
 _IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
 
 
@@ -142,7 +154,9 @@ class LogLayout(Block):
         "from 0",
     )
     time: Place | None = Field(None, description="column of time")
-    time_unit: Literal["s", "ms", "us", "ns"] = Field("s", description="unit of that column")
+    time_unit: Annotated[
+        Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling("s", "ms", "us", "ns"))
+    ] = Field("s", description="unit of that column")
     rate_hz: Rate | None = Field(None, description="samples per second, without time")
     variable: str | None = Field(
         None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
@@ -154,7 +168,7 @@ class LogLayout(Block):
     )
     unit: Annotated[
         Literal["m/s^2", "g", "mg", "counts"],
-        BeforeValidator(lambda unit: "mg" if unit == "milli-g" else unit),
+        BeforeValidator(_usual_spelling("m/s^2", "g", "mg", "counts")),
     ] = Field("m/s^2", description="unit of the forces")
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
     offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")

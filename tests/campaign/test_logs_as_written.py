@@ -142,8 +142,9 @@ def test_names_with_units(names, factor, unit):
     # Rows at rest have the length of gravity.
     norm = np.linalg.norm(applied[[f"f{a}_calibrated_mps2" for a in "xyz"]], axis=1)
     assert np.median(norm) == pytest.approx(G, rel=2e-3)
-    if unit == "mg":
-        found(acs.read_log(log, unit="milli-g"))
+    spelling = {"m/s^2": "m/s2", "g": "G", "mg": "milli-g"}[unit]
+    layout = acs.read_log(log, unit=spelling, time_unit="sec").layout
+    assert (layout["unit"], layout["time_unit"]) == (unit, "s")
 
 
 def test_names_of_a_western_windows_are_read(tmp_path):
