@@ -279,6 +279,16 @@ def test_a_position_that_no_calibration_bears_is_left_out(approach, size):
     np.testing.assert_allclose(found.base.parameters, right.base.parameters, atol=0.01)
 
 
+def test_of_many_wrong_positions_the_first_are_named():
+    campaign = acs.simulate_campaign(scheme="fibonacci-200", seed=12, approach="gravity")
+    campaign.forces[::9] *= 1.5
+    with pytest.raises(
+        InputError, match=r"23 positions \(1, 10, .*, 172, …\) are wrong by up to"
+    ) as e:
+        acs.calibrate(campaign)
+    assert len(str(e.value)) < 400
+
+
 def test_a_bias_that_no_sensor_has_is_not_taken_for_bumped_positions():
     """Its positions are far from those of a usual sensor, and yet all agree."""
     rng = np.random.default_rng(1)

@@ -61,7 +61,7 @@ MAX_AXIS_RATIO = 2.0
 """Axes are tried if their distance from the ideal sensor is at most this many times the smallest
 distance of any axes."""
 MAX_NAMED = 20
-"""Largest number of exchanged positions that a message names."""
+"""Largest number of exchanged or wrong positions that a message names."""
 MAX_EXCHANGED = 1000
 """Largest number of rows that are reordered; if more do not fit, their order is not the cause."""
 MIN_POSITIONS_PER_OUTLIER = 8
@@ -449,9 +449,17 @@ def outliers(sensor: RealSensor) -> Iterator[Mending]:
     # Far from a usual sensor, and yet all may fit one whose bias or scale no sensor has.
     if sensor.free.distance.max() < MIN_POSITION_ERROR * sensor.gravity:
         return
-    sizes = comma_list([f"{size:.2g}" for size in sensor.distance[far]])
-    which, are = ("position", "is") if len(bumped) == 1 else ("positions", "are")
-    reason = f"{which} {comma_list([str(p) for p in bumped])} {are} wrong by {sizes} m/s^2"
+    names, sizes = [str(p) for p in bumped], sensor.distance[far]
+    if len(bumped) > MAX_NAMED:  # a raw log taken for a table of means has hundreds
+        first = ", ".join(names[:MAX_NAMED])
+        reason = (
+            f"{len(bumped)} positions ({first}, …) are wrong by up to {sizes.max():.2g} m/s^2, "
+            "like moves in a raw log"
+        )
+    else:
+        which, are = ("position", "is") if len(bumped) == 1 else ("positions", "are")
+        each = comma_list([f"{size:.2g}" for size in sizes])
+        reason = f"{which} {comma_list(names)} {are} wrong by {each} m/s^2"
     left = campaign.without(dict.fromkeys(bumped, reason))
     yield Mending("outlier_position", reason, left, left_out=bumped)
 
