@@ -163,11 +163,11 @@ def sigmas_in(table):
     return table[["sigma_roll_mgon", "sigma_pitch_mgon"]].to_numpy()
 
 
-def assert_leveled(table, within_sigmas=True):
-    """Errors of roll and pitch are small, and within their sigmas."""
+def assert_leveled(table, rms=3):
+    """Errors of roll and pitch are small (mgon), and within their sigmas."""
     errors = 1e3 * table[["roll_gon", "pitch_gon"]].to_numpy() - ATTITUDES / MGON
-    assert np.sqrt(np.mean(errors**2)) < 3
-    assert np.abs(errors / sigmas_in(table)).max() < 4.5 or not within_sigmas
+    assert np.sqrt(np.mean(errors**2)) < rms
+    assert np.abs(errors / sigmas_in(table)).max() < 4.5
 
 
 @pytest.mark.parametrize(("effects", "values", "columns"), [
@@ -197,7 +197,8 @@ def test_a_lag_follows_the_thermometer():
     time = np.linspace(0, 2000, 40)
     rows = rows_of(effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
     table, warnings = leveled_rows(calibrated(effects, values), rows, sigma=0.0)
-    assert_leveled(table, within_sigmas=False)
+    # The lag leaves little of the temperature in a session of 10 minutes; uncorrected, 130 mgon.
+    assert_leveled(table, rms=20)
     said = " ".join(warnings)
     assert "assumes that the sensor has the temperature of row 1" in said
     assert "start of the calibration session" not in said
