@@ -197,7 +197,7 @@ def test_a_lag_follows_the_thermometer():
     time = np.linspace(0, 2000, 40)
     rows = rows_of(effects, values, time=time, temperature=25 + 10 * np.sin(time / 500))
     table, warnings = leveled_rows(calibrated(effects, values), rows, sigma=0.0)
-    # The lag leaves little of the temperature in a session of 10 minutes; uncorrected, 130 mgon.
+    # The lag leaves little of the temperature in 10 minutes; uncorrected it makes about 100 mgon.
     assert_leveled(table, rms=20)
     said = " ".join(warnings)
     assert "assumes that the sensor has the temperature of row 1" in said
