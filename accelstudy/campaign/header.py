@@ -22,8 +22,8 @@ from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.units import GON
-from accelstudy.campaign.importing.names import unit_of
 from accelstudy.campaign.reference import ReferenceSensor
+from accelstudy.campaign.unit_spellings import unit_of
 from accelstudy.files.validation import (
     Block,
     Finite,

@@ -66,7 +66,10 @@ def test_each_template_is_planned_by_its_workflow_with_all_profiles(template, tm
         assert (tmp_path / "mine" / profile).read_text(encoding="utf-8") == text
     planned = snakemake(tmp_path / "mine", "--profile", "profiles/slurm", "--dry-run")
     assert planned.returncode == 0, planned.stdout
-    assert "results/mine/" in planned.stdout
+    assert (
+        f"All results of the {'batch' if template == 'campaigns' else template} mine"
+        in planned.stdout
+    )
     assert "snakemake --cores 2 " in (tmp_path / "mine" / "README.md").read_text("utf-8")
 
 

@@ -10,6 +10,8 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
+from accelstudy.campaign.unit_spellings import unit_of
+
 _OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
 _KNOWN = {
     "fx": rf"f_?x|a_?x|acc?_?x|acc?el_?x|acceler(ation|ometer)x|{_OF_ROS}acceleration_x|x_?axis|x",
@@ -37,30 +39,8 @@ _UNITS_OF: Mapping[str, Collection[str]] = {
     "time": {"s", "ms", "us", "ns"},
     "temperature": {"degC"},
 }
-_SPELLINGS = {
-    "m/s^2": "m/s^2 m/s2 m/s/s m/sec^2 ms^-2 ms-2 mps2 mps^2 ms2",
-    "g": "g g0 gn gs",
-    "mg": "mg milli-g millig",
-    "counts": "counts count lsb raw adc digits digit",
-    "s": "s sec secs second seconds",
-    "ms": "ms msec msecs millis millisecond milliseconds",
-    "us": "us usec usecs micros microsecond microseconds",
-    "ns": "ns nsec nsecs nanosecond nanoseconds",
-    "degC": "c degc deg_c celsius",
-    "other": "k degk kelvin f degf deg_f fahrenheit deg degs deg/s dps mdps rad rad/s gon t ut mt "
-    "nt gauss mgauss ugauss pa hpa kpa mbar bar v mv % %rh rh m mm km m/s km/h hz khz min h hours",
-    "": "- 1 none n/a",
-}
-_UNITS = {spelling: unit for unit, words in _SPELLINGS.items() for spelling in words.split()}
 _IN_BRACKETS = re.compile(r"(.*?)[\s_]*[(\[{<]([^()\[\]{}<>]*)[)\]}>]")
 _AS_ENDING = re.compile(r"(.*[^\W_])[\s_]+([^\W_]+([_/^-]\w+)?)")
-_PLAIN = str.maketrans({"²": "^2", "µ": "u", "μ": "u", "⁻": "-", "·": "", "*": "", ".": ""})
-
-
-def unit_of(text: str) -> str | None:
-    """Unit by any usual spelling: "m/s^2", "g", …; "other" if unused here, None if it is none."""
-    spelled = text.strip().lower().translate(_PLAIN).replace(" ", "").replace("°", "deg")
-    return _UNITS.get(spelled.replace("℃", "degc"))
 
 
 def is_unit(text: str) -> bool:
