@@ -54,12 +54,12 @@ def calibrate(model: SensorModel, approach: Approach, observed: Observations) ->
     count, n = observed.forces.shape[:2]
     size = max(1, AT_ONCE // n)
     if count <= size:
-        return CalibrationProblem.of(model, approach, observed).adjusted()
+        return CalibrationProblem.of(model, approach, observed).adjust()
     parts = []
     for start in range(0, count, size):
         part = observed.sessions(slice(start, start + size))
-        parts.append(CalibrationProblem.of(model, approach, part).adjusted())
-    return Adjustment.joined(parts)
+        parts.append(CalibrationProblem.of(model, approach, part).adjust())
+    return Adjustment.concatenate(parts)
 
 
 def whitened_jacobian(
@@ -159,7 +159,7 @@ class CalibrationProblem:
         """All observations, (R, n, o)."""
         return np.concatenate(self.observed, axis=-1)
 
-    def adjusted(self) -> Adjustment:
+    def adjust(self) -> Adjustment:
         """Adjust all sessions."""
         return adjust(
             self.conditions,
@@ -171,7 +171,7 @@ class CalibrationProblem:
             latent=np.moveaxis(self.observations[..., :3], -1, 0),
         )
 
-    def linearised(self, parameters: Array, adjusted: Array) -> Linearisation:
+    def linearise(self, parameters: Array, adjusted: Array) -> Linearisation:
         """Linearise all sessions at parameters (R, u') and observations (R, n, o)."""
         forces = latent = adjusted[..., :3]
         if not self.conditions.equations.knows_force:
@@ -183,7 +183,7 @@ class CalibrationProblem:
 
     def rows(self, parameters: Array) -> Array:
         """Design matrices at unit weight, (R, conditions, u'), of the raw observations."""
-        white = whitened_design(self.linearised(parameters, self.observations), self.cofactors.T)
+        white = whitened_design(self.linearise(parameters, self.observations), self.cofactors.T)
         return np.asarray(white.transpose(2, 0, 3, 1).reshape(len(parameters), -1, white.shape[1]))
 
 
@@ -225,7 +225,7 @@ class Block:
         )
 
     @classmethod
-    def joined(cls, parts: Iterable[Block]) -> Block:
+    def concatenate(cls, parts: Iterable[Block]) -> Block:
         """Join blocks that follow each other."""
         parts = list(parts)
         whole: dict[str, Any] = {

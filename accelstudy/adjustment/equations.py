@@ -29,7 +29,7 @@ from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
 from accelstudy.sensors.trace import SensorTrace
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.made import key_of
+from accelstudy.symbolic.formula_cache import key_of
 from accelstudy.symbolic.tracing import (
     Traced,
     derivative,

@@ -114,7 +114,7 @@ class Adjustment:
         return np.sqrt(np.diagonal(self.covariance_posteriori, axis1=1, axis2=2))
 
     @classmethod
-    def joined(cls, parts: Sequence[Adjustment]) -> Adjustment:
+    def concatenate(cls, parts: Sequence[Adjustment]) -> Adjustment:
         """Join adjustments of replicates of one problem."""
         arrays: dict[str, Any] = {
             field.name: np.concatenate([getattr(part, field.name) for part in parts])
@@ -240,7 +240,7 @@ class _Step:
 
 def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosure: Array) -> _Step:
     """Solve the linearised problem; `prior_misclosure` is observed minus present parameters."""
-    white = whitened(at, v, q)
+    white = whiten(at, v, q)
     normal, right = _normal_equations(white.design, white.misclosures)
     normal += weights[..., None]
     right += weights @ prior_misclosure
@@ -250,7 +250,7 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
     half = cholesky.forward(lower, right / scale)
     dx = cholesky.backward(lower, half) / scale
 
-    misclosure, v_new = white.solved(dx)
+    misclosure, v_new = white.solve(dx)
     omega = np.einsum("crn,crn->r", misclosure, misclosure)
     left = prior_misclosure - dx
     omega += (left * (weights @ left)).sum(axis=0)
@@ -264,7 +264,7 @@ def _step(at: Linearisation, v: Array, q: Array, weights: Array, prior_misclosur
 
 
 @dataclass(frozen=True)
-class Whitened:
+class WhitenedConditions:
     """Linearised conditions scaled to unit weight: A dx + w = −B v has covariance I.
 
     Attributes
@@ -280,14 +280,14 @@ class Whitened:
     misclosures: Array
     bq: Array
 
-    def solved(self, dx: Array) -> tuple[Array, Array]:
+    def solve(self, dx: Array) -> tuple[Array, Array]:
         """Errors of unit weight (c, R, n) and residuals v (o, R, n) after a step (u, R)."""
         errors = self.misclosures + np.einsum("curn,ur->crn", self.design, dx)
         v = np.einsum("crn,corn->orn", -cholesky.backward(self.factor, errors), self.bq)
         return errors, v
 
 
-def whitened(at: Linearisation, v: Array, q: Array) -> Whitened:
+def whiten(at: Linearisation, v: Array, q: Array) -> WhitenedConditions:
     """Scale conditions linearised at l + v to unit weight.
 
     v : (o, R, n); q : (o, n) variances or (o, o, n) matrices
@@ -296,7 +296,7 @@ def whitened(at: Linearisation, v: Array, q: Array) -> Whitened:
     bq = _times(b, q)
     factor, design = _whiten(at, bq)
     w = cholesky.forward(factor, at.psi - np.einsum("corn,orn->crn", b, v))
-    return Whitened(factor, design, w, bq)
+    return WhitenedConditions(factor, design, w, bq)
 
 
 def whitened_design(at: Linearisation, q: Array) -> Array:

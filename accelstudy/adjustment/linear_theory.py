@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from accelstudy.adjustment import cholesky
 from accelstudy.adjustment.calibration import CalibrationProblem, calibrate
-from accelstudy.adjustment.gauss_helmert import whitened
+from accelstudy.adjustment.gauss_helmert import whiten
 from accelstudy.adjustment.observations import Observations
 from accelstudy.approaches import Approach
 from accelstudy.sensors.sensor import SensorModel
@@ -71,8 +71,8 @@ class LinearTheory:
             return None
         problem = CalibrationProblem.of(model, approach, observed)
         x, v = ideal.parameters[0], ideal.residuals[0]
-        at = problem.linearised(x[None], problem.observations + v)
-        white = whitened(at, v.T[:, None], problem.cofactors.T)
+        at = problem.linearise(x[None], problem.observations + v)
+        white = whiten(at, v.T[:, None], problem.cofactors.T)
         by_errors = cholesky.forward(white.factor, at.jac_observations)
         a = np.moveaxis(white.design[:, :, 0], -1, 0).reshape(-1, len(x))
         rest = white.misclosures[:, 0].T.ravel()

@@ -10,16 +10,16 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import as_campaign, place_of
+from accelstudy.api.calibrations import as_campaign, campaign_path
 from accelstudy.approaches import get_approach
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.basics.progress import show
 from accelstudy.basics.units import attitude_unit, to_attitude
-from accelstudy.campaign.calibration.applying import sensor_of
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import usual_approach
+from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import ADVICE
@@ -29,7 +29,7 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential import wording
 from accelstudy.sequential.advisor import Advice, advise
-from accelstudy.sequential.choice import DEFAULTS, candidates
+from accelstudy.sequential.choice import DEFAULTS, candidate_positions
 from accelstudy.sequential.prior import Prior
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_as_it_is
@@ -56,7 +56,7 @@ class SessionAdvice(Result):
     @classmethod
     def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
         """Advise by the keywords of `accelstudy.advise`, checked."""
-        place = place_of(campaign)
+        place = campaign_path(campaign)
         now = as_campaign(campaign) if place is None else read_as_it_is(place).campaign
         return Adviser(now, place, **given)(now)
 
@@ -79,14 +79,16 @@ class SessionAdvice(Result):
     @cached_property
     def lines(self) -> list[str]:
         """The advice, most important last."""
-        return wording.lines(self.advice, self.session, self._adviser.model, self._adviser.promise)
+        return wording.advice_lines(
+            self.advice, self.session, self._adviser.model, self._adviser.promise
+        )
 
     @property
     def command(self) -> str:
         """Command that calibrates the session if it is enough; else empty."""
         asked = self._adviser
         known = asked.place, asked.called, asked.approach.name, asked.type
-        return suggested.calibrate(*known) if self.enough else ""
+        return suggestions.calibrate(*known) if self.enough else ""
 
     @property
     def content(self) -> dict[str, Any]:
@@ -168,7 +170,7 @@ class Adviser:
         self.approach = get_approach(approach) if approach else usual_approach(session)
         self.model, self.called = get_model(model), model
         chosen = attitudes or DEFAULTS.get(self.approach.name, "grid")
-        self.directions = candidates(chosen, **limits)
+        self.directions = candidate_positions(chosen, **limits)
         self.prior = _prior(prior, self.model)
         self.type = prior if prior is not None and prior.suffix in TYPES else None
 

@@ -14,15 +14,15 @@ from matplotlib.axes import Axes
 
 import accelstudy
 from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics.arguments import check_type, path_of, quantity
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.given import of_type, path_of, quantity
 from accelstudy.basics.progress import say, show, warn
-from accelstudy.basics.units import GON, Given
-from accelstudy.campaign.calibration import applying, export, output, wording
-from accelstudy.campaign.calibration.applying import SensorCalibration, calibration_of
+from accelstudy.basics.units import GON, InputQuantity
+from accelstudy.campaign.calibration import export, output, sensor_calibration, wording
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
 from accelstudy.campaign.calibration.document import assessed_positions, write_json
 from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.sensor_type import with_type
 from accelstudy.campaign.session import Campaign
@@ -33,7 +33,7 @@ from accelstudy.sensors.frames import axes_note
 from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
 
-TILT = Given("rad", "", 1e-3, np.pi / 2)
+TILT = InputQuantity("rad", "", 1e-3, np.pi / 2)
 
 
 class Calibration(Result):
@@ -121,10 +121,10 @@ class Calibration(Result):
         """
         from scipy import stats
 
-        of_type("level", level, float, expected="a probability between 0 and 1")
+        check_type("level", level, float, expected="a probability between 0 and 1")
         if not 0 < level < 1:
             raise InputError(f"level: expected a probability between 0 and 1, not {level:g}")
-        dof = applying.dof_of(self.content)
+        dof = sensor_calibration.dof_of(self.content)
         half = stats.t.ppf((1 + level) / 2, dof) * self.parameters["sigma"]
         value, unit = self.parameters["value"], self.parameters["unit"]
         return pd.DataFrame({"low": value - half, "high": value + half, "unit": unit})
@@ -218,11 +218,13 @@ def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
     """Return a campaign, read if it is given as the path of its folder."""
     if isinstance(campaign, str | PathLike):
         return read_campaign(path_of("campaign", campaign), plausible=plausible)
-    of_type("campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path")
+    check_type(
+        "campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path"
+    )
     return campaign
 
 
-def place_of(campaign: Any) -> Path | None:
+def campaign_path(campaign: Any) -> Path | None:
     """Path of a campaign, for the commands that are suggested; None if it is in memory."""
     return None if isinstance(campaign, Campaign) else Path(campaign)
 

@@ -13,8 +13,8 @@ from typing import Any
 import pandas as pd
 
 from accelstudy.api.logs import Log, keys_of, log_of
+from accelstudy.basics.arguments import as_sequence, path_of
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.given import each, path_of
 from accelstudy.basics.names import matches, natural
 from accelstudy.basics.units import UNITS
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
@@ -61,7 +61,7 @@ class Import:
         settings = settings_of(given, sensors or {})
         reference = _reference(*(given[name] for name in OTHERS[:-1]))
         if not isinstance(log, Log | pd.DataFrame):
-            return cls([*files_of(each(log))], settings, reference)
+            return cls([*files_of(as_sequence(log))], settings, reference)
         log = log_of(log, given)
         layout = settings.model_dump(exclude_unset=True) | log.layout
         return cls([log.file], parse_settings(layout), reference)
@@ -165,7 +165,7 @@ class SimulatedCampaign(Campaign):
     truth: Mapping[str, Any] = field(default_factory=dict)
 
 
-def simulated(settings: Mapping[str, Any]) -> SimulatedCampaign:
+def simulate_from(settings: Mapping[str, Any]) -> SimulatedCampaign:
     """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
     campaign, truth = simulate(CampaignSettings(**settings))
     values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}

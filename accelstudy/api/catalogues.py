@@ -68,7 +68,7 @@ def _item(item: WithSettings, equation: str) -> Row:
     settings = [
         f"{one.name} drawn"
         if math.isnan(value)
-        else f"{one.name}={plain(value)}{'' if one.unit == '1' else f' {one.unit}'}"
+        else f"{one.name}={plain_number(value)}{'' if one.unit == '1' else f' {one.unit}'}"
         for one, value in zip(item.takes, item.settings.values(), strict=True)
     ]
     return {
@@ -80,7 +80,7 @@ def _item(item: WithSettings, equation: str) -> Row:
     }
 
 
-def plain(value: float) -> str:
+def plain_number(value: float) -> str:
     """Write a number with three digits, and never an exponent."""
     return np.format_float_positional(value, 3, fractional=False, trim="-")
 

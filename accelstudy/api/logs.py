@@ -10,13 +10,13 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
+from accelstudy.basics.arguments import path_of, tidy
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import LogFile, Source
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 from accelstudy.pages.notebook import notebook_html
 
 
@@ -82,7 +82,7 @@ def layout_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a layout that keywords say, checked; other keywords do not count."""
     fields = LogLayout.model_fields
     content, names = keys_of({k: given[k] for k in given if KEYS.get(k, k) in fields})
-    return checked(LogLayout, content, "log", names=names).model_dump(exclude_unset=True)
+    return validate(LogLayout, content, "log", names=names).model_dump(exclude_unset=True)
 
 
 KEYS = {

@@ -14,10 +14,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from accelstudy.approaches import get_approach
+from accelstudy.basics.arguments import as_sequence, check_type, quantity, tidy
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.given import each, of_type, quantity, tidy
-from accelstudy.basics.units import MGON, Given, display_unit, to_display
-from accelstudy.basics.wording import counted
+from accelstudy.basics.units import MGON, InputQuantity, display_unit, to_display
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import SIMULATION
@@ -74,11 +74,11 @@ class Simulation(Result):
         """Simulate every combination of models, schemes and approaches of `accelstudy.simulate`."""
         grid: dict[str, Any] = {"sensor_sigma_mps2": [*map(tidy, sigma)], "replicates": replicates}
         for name, (several, get) in GRID.items():
-            for one in each(names[name]):
-                of_type(name, one, str, expected="a name, or several")
-            grid[several] = [get(one).name for one in each(names[name])]
+            for one in as_sequence(names[name]):
+                check_type(name, one, str, expected="a name, or several")
+            grid[several] = [get(one).name for one in as_sequence(names[name])]
         for name, given in {**names, "sigma": sigma}.items():
-            if not each(given):
+            if not as_sequence(given):
                 raise InputError(f"{name}: none is given")
         noise = {
             "sensor": {"sigma_mps2": grid["sensor_sigma_mps2"][0]},
@@ -100,7 +100,7 @@ class Simulation(Result):
     @property
     def verdict(self) -> str:
         """How many calibrations there are and, of one set-up, what they leave."""
-        said = f"{self.name}, {counted(self._converged, 'calibration')}"
+        said = f"{self.name}, {plural(self._converged, 'calibration')}"
         if len(self.cells) > 1 or not self._converged:
             return f"{said}."
         roll, pitch = to_display(self.tilt["rms"], "rad")
@@ -243,13 +243,13 @@ class Simulation(Result):
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:
     """Cells whose sensors have these true parameters."""
-    of_type("truth", truth or {}, Mapping, expected="a mapping of parameter to value")
+    check_type("truth", truth or {}, Mapping, expected="a mapping of parameter to value")
     units = {p.name: p.unit for cell in cells for p in cell.simulated_model.parameters}
     values = {}
     for name, value in (truth or {}).items():
         if name not in units:
             raise UnknownNameError("parameter of the truth", name, units)
-        values[name] = quantity(f"truth: {name}", value, Given(units[name], "", -inf))
+        values[name] = quantity(f"truth: {name}", value, InputQuantity(units[name], "", -inf))
     return [
         replace(cell, truth={**cell.truth, **{k: v for k, v in values.items() if k in cell.truth}})
         for cell in cells

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, brief
 
 
 def read_date(text: str) -> datetime:
@@ -18,7 +18,7 @@ def read_date(text: str) -> datetime:
     try:
         date = datetime.fromisoformat(text)
     except ValueError:
-        raise InputError(f"{shown(text)} is no date, such as 2026-03-01") from None
+        raise InputError(f"{brief(text)} is no date, such as 2026-03-01") from None
     if not 1900 <= date.year < 2200:
         raise InputError(f"{text}: the year must be from 1900 to 2199")
     return date if date.tzinfo is None else date.astimezone(UTC).replace(tzinfo=None)

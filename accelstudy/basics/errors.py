@@ -62,7 +62,7 @@ _BRIEF = reprlib.Repr()
 _BRIEF.maxlevel, _BRIEF.maxstring, _BRIEF.maxother, _BRIEF.maxlong = 3, 60, 60, 60
 
 
-def shown(value: object) -> str:
+def brief(value: object) -> str:
     """Show a value in a message as Python writes it, cut short if it is long."""
     try:
         text = _BRIEF.repr(value)
@@ -78,4 +78,4 @@ class UnknownNameError(InputError):
         known = tuple(known)
         near = difflib.get_close_matches(name[:100] if isinstance(name, str) else "", known, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        super().__init__(f"unknown {kind} {shown(name)}{hint} (known: {', '.join(known)}{more})")
+        super().__init__(f"unknown {kind} {brief(name)}{hint} (known: {', '.join(known)}{more})")

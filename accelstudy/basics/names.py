@@ -9,7 +9,7 @@ from errno import ENAMETOOLONG
 from glob import glob, has_magic
 from pathlib import Path
 
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, brief
 
 MAX_NAME_BYTES = 100
 """Bytes. Endings are added to a name, and the name of a file must stay below 255 bytes."""
@@ -32,12 +32,12 @@ def check_path_name(name: str) -> str:
     """
     if not re.fullmatch(r"\w[\w.-]*", name):
         raise InputError(
-            f"{shown(name)} cannot be the name of a folder; use letters, digits, _, - and ., and "
+            f"{brief(name)} cannot be the name of a folder; use letters, digits, _, - and ., and "
             "begin with a letter, a digit or _"
         )
     if len(name.encode()) > MAX_NAME_BYTES:
         raise InputError(
-            f"{shown(name)} is too long for a folder; use at most {MAX_NAME_BYTES} letters"
+            f"{brief(name)} is too long for a folder; use at most {MAX_NAME_BYTES} letters"
         )
     return name
 
@@ -48,10 +48,10 @@ def check_file_name(path: str | os.PathLike[str]) -> None:
         os.fspath(path).encode()
         os.lstat(path)
     except ValueError:  # not UTF-8, or with a zero
-        raise InputError(f"{shown(str(path))}: no name of a file in UTF-8") from None
+        raise InputError(f"{brief(str(path))}: no name of a file in UTF-8") from None
     except OSError as error:
         if error.errno == ENAMETOOLONG:
-            raise InputError(f"{shown(str(path))}: too long for the name of a file") from None
+            raise InputError(f"{brief(str(path))}: too long for the name of a file") from None
 
 
 def natural(path: str | Path) -> list[tuple[int, str]]:

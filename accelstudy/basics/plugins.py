@@ -43,7 +43,7 @@ _sources: dict[tuple[str, str], str] = {}
 """Name of the plug-in by kind and name of what it registered."""
 
 
-def registered(kind: str, name: str) -> bool:
+def note_registration(kind: str, name: str) -> bool:
     """Note what is registered; return whether a plug-in does it."""
     of_plugin = bool(_loading and _loading[-1])
     if of_plugin:
@@ -74,14 +74,14 @@ def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
     What is no list of texts, the schema of the configuration refuses.
     """
     try:
-        load_files(_named(content))
+        load_files(_named_plugins(content))
     except InputError as error:
         raise InputError(f"{source}: plugins: {error}".removeprefix(": ")) from None
     _missing(content, source)
 
 
 @contextmanager
-def only_named(content: Mapping[str, Any], source: str | Path) -> Iterator[None]:
+def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[None]:
     """Read a file of data, which loads none of the plug-ins that it names.
 
     Raises
@@ -101,7 +101,7 @@ def only_named(content: Mapping[str, Any], source: str | Path) -> Iterator[None]
         ) from None
 
 
-def _named(content: Mapping[str, Any]) -> dict[str, Any]:
+def _named_plugins(content: Mapping[str, Any]) -> dict[str, Any]:
     """Plug-ins that a file names, with the digest of each or None."""
     named = content.get("plugins") or {}
     named = [named] if isinstance(named, str) else named
@@ -114,7 +114,7 @@ def _missing(content: Mapping[str, Any], source: str | Path) -> list[str]:
     """Plug-ins that are named and not loaded; warn of one that is loaded but is another now."""
     missing = []
     loaded = {Path(name).name: digest for name, digest in _files.items()}
-    for name, digest in _named(content).items():
+    for name, digest in _named_plugins(content).items():
         there = loaded.get(Path(name).name)
         if there is None and digest not in loaded.values():
             missing.append(name if digest is None else f"{name} (digest {digest})")
@@ -146,7 +146,7 @@ def _load_file(path: Path) -> None:
     # Under a name that nobody else has, and without a copy in __pycache__ that may be old.
     module = ModuleType(f"plugin_{digest}")
     module.__file__ = str(path)
-    with one_line(str(path), path):
+    with error_as_line(str(path), path):
         code = compile(content, str(path), "exec")
         sys.modules[module.__name__] = module
         with _registering(str(path)):
@@ -159,7 +159,7 @@ def loaded_files() -> list[str]:
     return list(_files)
 
 
-def as_a_key() -> dict[str, Any]:
+def file_key() -> dict[str, Any]:
     """Key of a file that names the loaded files with their digests; empty without any."""
     return {"plugins": dict(_files)} if _files else {}
 
@@ -178,13 +178,13 @@ def load_installed(room: str) -> None:
     InputError
         One line that names the package, its entry point, and what is wrong.
     """
-    for point in installed(room):
+    for point in installed_entry_points(room):
         if point.module not in sys.modules:
-            with one_line(label(point), *_folders(point)), _registering(label(point)):
+            with error_as_line(label(point), *_folders(point)), _registering(label(point)):
                 point.load()
 
 
-def installed(room: str) -> list[EntryPoint]:
+def installed_entry_points(room: str) -> list[EntryPoint]:
     """Entry points of installed packages for a room."""
     points = [point for point in _entry_points(tuple(sys.path)) if point.group == PREFIX + room]
     return sorted(points, key=lambda point: (label(point), point.name))
@@ -208,7 +208,7 @@ def digests() -> dict[str, str]:
     """Digest of the content of each plug-in: files that are loaded, and packages."""
     found = dict(_files)
     for room in sorted({point.group for point in _entry_points(tuple(sys.path))}):
-        points = installed(room.removeprefix(PREFIX))
+        points = installed_entry_points(room.removeprefix(PREFIX))
         found |= {label(point): code_digest(*_folders(point)) for point in points}
     return found
 
@@ -252,7 +252,7 @@ def _registering(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def one_line(name: str, *own: Path) -> Iterator[None]:
+def error_as_line(name: str, *own: Path) -> Iterator[None]:
     """Turn whatever the code of a plug-in raises into one line.
 
     Parameters
@@ -281,7 +281,7 @@ def one_line(name: str, *own: Path) -> Iterator[None]:
 
 
 @contextmanager
-def at_work() -> Iterator[None]:
+def errors_as_lines() -> Iterator[None]:
     """Turn whatever the code of a loaded file raises while it is used into one line."""
     try:
         yield
@@ -292,5 +292,5 @@ def at_work() -> Iterator[None]:
         guilty = next((f.filename for f in reversed(frames) if f.filename in _files), None)
         if guilty is None:
             raise
-        with one_line(guilty, Path(guilty)):
+        with error_as_line(guilty, Path(guilty)):
             raise

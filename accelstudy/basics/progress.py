@@ -90,7 +90,7 @@ def stage(what: str, total: float | None = None) -> Iterator[Callable[[float], N
         yield lambda done: None
         return
     with ExitStack() as stack:
-        bars = _bars.get() or stack.enter_context(_drawn())
+        bars = _bars.get() or stack.enter_context(_progress_bars())
         task = bars.add_task(what, total=total)
         stack.callback(bars.remove_task, task)
         yield partial(bars.advance, task)
@@ -107,7 +107,7 @@ def track(items: Iterable[Item], what: str, total: float | None = None) -> Itera
 
 
 @contextmanager
-def _drawn() -> Iterator[Progress]:
+def _progress_bars() -> Iterator[Progress]:
     """Bars on standard error that appear after a while and vanish at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn

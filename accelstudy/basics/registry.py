@@ -47,12 +47,12 @@ class Registry(Generic[Item]):
     def add(self, name: str, item: Item) -> None:
         """Register an item; raise `InputError` if its name is taken."""
         self.check_free(name)
-        if plugins.registered(self.kind, name) and self._check:
+        if plugins.note_registration(self.kind, name) and self._check:
             self._check(item)
         self._items[name] = item
 
     @property
-    def _all(self) -> dict[str, Item]:
+    def _all_items(self) -> dict[str, Item]:
         """All items; those of installed packages are looked for when one is first asked for."""
         if self._room:
             room, self._room = self._room, ""
@@ -70,19 +70,19 @@ class Registry(Generic[Item]):
         return self.register(kind)
 
     def __contains__(self, name: str) -> bool:
-        return name in self._all
+        return name in self._all_items
 
     def get(self, name: str) -> Item:
         """Return the item of that name; raise `UnknownNameError` if there is none."""
         try:
-            return self._all[name]
+            return self._all_items[name]
         except KeyError:
             more = "" if self._room is None else plugins.HOW
-            raise UnknownNameError(self.kind, name, self._all, more) from None
+            raise UnknownNameError(self.kind, name, self._all_items, more) from None
 
     def names(self) -> tuple[str, ...]:
         """Names of all items."""
-        return tuple(name for name in self._all if name not in self._unlisted)
+        return tuple(name for name in self._all_items if name not in self._unlisted)
 
     @contextmanager
     def without(self, names: Collection[str]) -> Iterator[None]:

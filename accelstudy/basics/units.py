@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from accelstudy.basics.errors import InputError, UnknownNameError, shown
+from accelstudy.basics.errors import InputError, UnknownNameError, brief
 
 if TYPE_CHECKING:
     import numpy as np
@@ -233,25 +233,25 @@ def parse_quantity(
     if match is None or not (match[2] or bare or float(match[1]) == 0):
         example = f"2{next(iter(known))}" if unit != "1" else "2"
         number = "a number" if bare else "a number with its unit"
-        raise InputError(f"expected {number}, as {example}, not {shown(text)}")
+        raise InputError(f"expected {number}, as {example}, not {brief(text)}")
     given = match[2] or (unit if bare else next(iter(known)))
     for spelling, plain in _SPELLINGS.items():
         given = given.replace(spelling, plain)
     given = re.sub(r"(?<=[a-zA-Z])2", "^2", given)
     if given not in known:
-        raise InputError(f"{shown(text)}: the unit must be one of {', '.join(known)}")
+        raise InputError(f"{brief(text)}: the unit must be one of {', '.join(known)}")
     value = float(match[1]) * known[given]
     if not least <= value <= most:
         ends = [f"at least {least / known[given]:.6g}"] if least > -math.inf else []
         ends += [f"at most {most / known[given]:.6g}"] if most < math.inf else []
-        raise InputError(f"{shown(text)}: must be {' and '.join(ends)} {given}")
+        raise InputError(f"{brief(text)}: must be {' and '.join(ends)} {given}")
     if math.isinf(value):
-        raise InputError(f"{shown(text)}: must be a finite number")
+        raise InputError(f"{brief(text)}: must be a finite number")
     return value
 
 
 @dataclass(frozen=True)
-class Given:
+class InputQuantity:
     """A quantity that the user may give, by an option of a command or a key of a configuration.
 
     Attributes

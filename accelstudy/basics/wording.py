@@ -121,15 +121,15 @@ def one_line(text: object, length: int = 100) -> str:
     return line if len(line) <= length else f"{line[:length]} …"
 
 
-def counted(number: int, noun: str) -> str:
+def plural(number: int, noun: str) -> str:
     """Number and noun, in the plural unless the number is 1."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def grouped(names: Sequence[str], said: Callable[[str], str] = words) -> list[str]:
+def words_with_counts(names: Sequence[str], said: Callable[[str], str] = words) -> list[str]:
     """Return names of the catalogue as words, equal ones together: warm up, 2 outlier positions."""
     many = ((names.count(name), said(name)) for name in dict.fromkeys(names))
-    return [counted(number, noun) if number > 1 else noun for number, noun in many]
+    return [plural(number, noun) if number > 1 else noun for number, noun in many]
 
 
 def short_list(names: Sequence[str], most: int = 20) -> str:

@@ -24,7 +24,7 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import whole_parquet, write_parquet
 from accelstudy.files.reading import overlay, read_layer, read_text
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ def read_campaign(
             f"{' or '.join(TABLES)}"
         )
     header = read_header(folder, given)
-    path = table_of(folder)
+    path = find_table(folder)
     if path is None:
         raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
     columns, warnings = read_positions(path)
@@ -97,10 +97,10 @@ def read_campaign(
 def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
     """Header of a campaign folder, overlaid key by key with `given`; errors as `read_campaign`."""
     path = folder / HEADER
-    return checked(Header, overlay(read_layer(path), given or {}), path)
+    return validate(Header, overlay(read_layer(path), given or {}), path)
 
 
-def table_of(folder: Path) -> Path | None:
+def find_table(folder: Path) -> Path | None:
     """Table of positions in a campaign folder; None if there is none, an error if there are two."""
     tables = [folder / name for name in TABLES if (folder / name).exists()]
     if len(tables) > 1:
@@ -214,8 +214,8 @@ def write_campaign(
     """
     folder = Path(folder)
     path = folder / f"positions.{table}"
-    header = checked(Header, _content_of(campaign), folder / HEADER)
-    columns = _columns_of(campaign.whole, header)
+    header = validate(Header, _content_of(campaign), folder / HEADER)
+    columns = _columns_of(campaign.with_left_out, header)
     parse_table(columns, header, path, plausible)
     try:
         with whole_file(path) as temporary:

@@ -23,9 +23,9 @@ from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.units import GON
 from accelstudy.campaign.reference import ReferenceSensor
-from accelstudy.campaign.unit_spellings import unit_of
+from accelstudy.campaign.unit_spellings import parse_unit
 from accelstudy.files.validation import (
-    Block,
+    ConfigSection,
     Finite,
     Gravity,
     NotNegative,
@@ -133,7 +133,7 @@ def _usual_spelling(*units: str) -> Callable[[Any], Any]:
     """What reads a unit by any spelling that the name of a column may have: m/s2, µs."""
 
     def read(value: Any) -> Any:
-        unit = unit_of(value) if isinstance(value, str) else None
+        unit = parse_unit(value) if isinstance(value, str) else None
         return unit if unit in units else value
 
     return read
@@ -142,7 +142,7 @@ def _usual_spelling(*units: str) -> Callable[[Any], Any]:
 _IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
 
 
-class LogLayout(Block):
+class LogLayout(ConfigSection):
     """How the numbers of a log are read: what `import` was told, and `apply` needs again.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
@@ -191,7 +191,7 @@ def _not_zero(value: float) -> float:
 PerAxis = Field(min_length=3, max_length=3)
 
 
-class Nominal(Block):
+class Nominal(ConfigSection):
     """Nominal conversion of counts: f = (raw − offset) · scale, m/s², per axis."""
 
     scale: Annotated[list[Annotated[Finite, AfterValidator(_not_zero)]], PerAxis] = Field(
@@ -200,7 +200,7 @@ class Nominal(Block):
     offset: Annotated[list[Finite], PerAxis] = Field(description="reading at 0 m/s², of x, y and z")
 
 
-class _Gravity(Block):
+class _Gravity(ConfigSection):
     """Gravity where the sensor was."""
 
     value_mps2: Gravity = Field(description="local gravity")
@@ -209,7 +209,7 @@ class _Gravity(Block):
     )
 
 
-class _SensorNoise(Block):
+class _SensorNoise(ConfigSection):
     """A-priori noise of the sensor; without it, the residuals tell it."""
 
     sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
@@ -218,13 +218,13 @@ class _SensorNoise(Block):
     )
 
 
-class _Robot(Block):
+class _Robot(ConfigSection):
     """The robot; exactly when the table has its angles."""
 
     angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
 
 
-class Exclusion(Block):
+class Exclusion(ConfigSection):
     """A hold that is left out of every fit."""
 
     position: Annotated[int, Field(ge=1), Number] = Field(description="number of the hold")
@@ -239,7 +239,7 @@ def _date(value: Any) -> Any:
     return text
 
 
-class Header(Block):
+class Header(ConfigSection):
     """The content of `campaign.yaml`."""
 
     schema_version: Annotated[Literal[1], Number] = Field(description="of this format")

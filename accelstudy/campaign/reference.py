@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
-from accelstudy.files.validation import Block, Finite, SigmaForce
+from accelstudy.files.validation import ConfigSection, Finite, SigmaForce
 from accelstudy.leveling.angles import jacobian, specific_force
 from accelstudy.sensors.frames import Frame, parse_frame
 from accelstudy.sensors.models import compose
@@ -26,7 +26,7 @@ MIN_POLE_DISTANCE = 1e-4
 """rad; nearer to the pole of roll its derivatives are those at this distance."""
 
 
-class ReferenceSensor(Block):
+class ReferenceSensor(ConfigSection):
     """A calibrated sensor whose roll and pitch the table has; instead of a robot."""
 
     calibration: str = Field(description="campaign of its calibration")

@@ -14,15 +14,21 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
-from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, read_calibration
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.detection import MAX_WANDER, Holds, at_range, scatter
-from accelstudy.campaign.importing.noise import hold_noise, shown
-from accelstudy.campaign.importing.recording import AXES, Log, Recording, place_of, read_log
+from accelstudy.campaign.importing.detection import MAX_WANDER, Holds, reaches_range, scatter
+from accelstudy.campaign.importing.noise import hold_noise, sigma_text
+from accelstudy.campaign.importing.recording import (
+    AXES,
+    Recording,
+    SensorLog,
+    find_column,
+    read_log,
+)
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import angles_of, near_pole
 from accelstudy.sensors.frames import FRD, Frame
 
@@ -73,7 +79,7 @@ def open_reference(
             f"`reference_columns`: {unknown[0]}: expected {', '.join(AXES)} and perhaps time"
         )
     time = {"time": columns.pop("time")} if "time" in columns else {}
-    layout = checked(LogLayout, {**time, "columns": columns}, "`reference_columns`")
+    layout = validate(LogLayout, {**time, "columns": columns}, "`reference_columns`")
     try:
         log = read_log(path, layout, like=sensor.usual_layout, conditions=("time",))
     except InputError as error:
@@ -151,7 +157,7 @@ class ReferenceLog:
         note = (
             f"reference: {self.path}, {clock}; its axes x, y, z point "
             f"{frame.description.split(': ')[1]}, as frd of the sensor; sigma of a mean: "
-            f"{shown(noise)}"
+            f"{sigma_text(noise)}"
         )
         columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
         left_out = dict.fromkeys(table.index[poles].tolist(), why)
@@ -170,7 +176,7 @@ class ReferenceLog:
             count = inside.stop - inside.start
             if count * read.step < MIN_COVERAGE * (t1 - t0) or count < MIN_SAMPLES:
                 lost[n] = "the reference log does not cover it"
-            elif at_range(forces[inside], full_range):
+            elif reaches_range(forces[inside], full_range):
                 lost[n] = "the reference is saturated"
             else:
                 records[n] = forces[inside]
@@ -246,9 +252,9 @@ class ReferenceLog:
         return best
 
 
-def _unused(log: Log) -> Iterator[str]:
+def _unused(log: SensorLog) -> Iterator[str]:
     """Say that roll and pitch in the log of the sensor itself are not used."""
-    there = [key for key in ("roll", "pitch") if place_of(log.source, key) is not None]
+    there = [key for key in ("roll", "pitch") if find_column(log.source, key) is not None]
     if there:
         yield (
             f"{log.path}: columns {', '.join(there)} are left out: roll and pitch are those of "

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from accelstudy.adjustment.observations import Known
 from accelstudy.basics.errors import InputError
 from accelstudy.files.reading import read_layer
-from accelstudy.files.validation import Number, ParameterSigma, ParameterValue, checked
+from accelstudy.files.validation import Number, ParameterSigma, ParameterValue, validate
 from accelstudy.sensors.sensor import SensorModel
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
     if "parameters" not in content:
         raise InputError(f"{path}: no file of a type; `accelstudy lot` writes one, {TYPE_FILE}")
     known = {key: content[key] for key in TYPE_KEYS if key in content}
-    read = checked(TypeFile, known, path)
+    read = validate(TypeFile, known, path)
     if {*read.parameters} != {*model.parameter_names}:
         raise InputError(
             f"{path}: tells of {', '.join(read.parameters)}, but the model {model.name!r} has "

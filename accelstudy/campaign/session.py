@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.header import COLUMNS, LogLayout
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.sensor_type import SensorType
@@ -85,7 +85,7 @@ class Campaign:
     sensor_type: SensorType | None = None
 
     def __repr__(self) -> str:
-        return f"Campaign({self.name!r}, {counted(self.n_positions, 'position')})"
+        return f"Campaign({self.name!r}, {plural(self.n_positions, 'position')})"
 
     def _repr_html_(self) -> str:
         import pandas as pd
@@ -101,7 +101,7 @@ class Campaign:
         beside = "without a robot" if self.angles is None else "with a robot"
         if self.reference is not None:
             beside = f"beside the sensor of {self.reference.calibration}"
-        said = f"{counted(self.n_positions, 'position')} {beside}"
+        said = f"{plural(self.n_positions, 'position')} {beside}"
         return notebook_html(f"Campaign {self.name}", "; ".join([said, *self.warnings]), table)
 
     @property
@@ -145,7 +145,7 @@ class Campaign:
         return [{"position": n, "reason": reason} for n, reason in self.reasons.items()]
 
     @property
-    def whole(self) -> Campaign:
+    def with_left_out(self) -> Campaign:
         """The campaign with all its holds, as its file has them."""
         return replace(self, **self._rows()[0], left_out={}) if self.left_out else self
 

@@ -173,7 +173,7 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
     )
     gross = []
     for spec in settings.gross_errors:
-        gross.append(get_gross_error(spec).drawn(campaign, rng["gross"]))
+        gross.append(get_gross_error(spec).draw(campaign, rng["gross"]))
         campaign = gross[-1].act(campaign)
     return campaign, _truth(settings, sensor, hidden, noise_effects, gross)
 
@@ -243,7 +243,7 @@ def _truth(
 ) -> dict[str, Any]:
     def described(effect: Effect, values: Array) -> dict[str, Any]:
         return {
-            **_named(effect),
+            **_name_and_settings(effect),
             "parameters": [
                 {"name": p.name, "value": float(value), "unit": p.unit}
                 for p, value in zip(effect.parameters, values, strict=True)
@@ -258,9 +258,9 @@ def _truth(
         "effects": [described(*pair) for pair in hidden],
         "noise": {
             "sigma_mps2": settings.sigma,
-            "effects": [_named(effect) for effect in noise_effects],
+            "effects": [_name_and_settings(effect) for effect in noise_effects],
         },
-        "gross_errors": [_named(error) for error in gross],
+        "gross_errors": [_name_and_settings(error) for error in gross],
         "settings": {
             key: list(value) if isinstance(value, tuple) else value
             for key, value in asdict(settings).items()
@@ -268,7 +268,7 @@ def _truth(
     }
 
 
-def _named(item: WithSettings) -> dict[str, Any]:
+def _name_and_settings(item: WithSettings) -> dict[str, Any]:
     """Name and settings, each setting with its unit."""
     units = {setting.name: setting.unit for setting in item.takes}
     return {

@@ -20,7 +20,7 @@ _UNITS = {spelling: unit for unit, words in _SPELLINGS.items() for spelling in w
 _PLAIN = str.maketrans({"²": "^2", "µ": "u", "μ": "u", "⁻": "-", "·": "", "*": "", ".": ""})
 
 
-def unit_of(text: str) -> str | None:
+def parse_unit(text: str) -> str | None:
     """Unit by any usual spelling: "m/s^2", "g", …; "other" if unused here, None if it is none."""
     spelled = text.strip().lower().translate(_PLAIN).replace(" ", "").replace("°", "deg")
     return _UNITS.get(spelled.replace("℃", "degc"))

@@ -20,7 +20,7 @@ import click
 from accelstudy.basics.errors import OPTIONS, InputError
 from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
-from accelstudy.files.outputs import Kind, result_folder
+from accelstudy.files.outputs import OutputKind, result_folder
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import PATH, Names
 
@@ -88,7 +88,7 @@ class Command(click.Command):
         *,
         make: Callable[..., Any] | None = None,
         name: str = "",
-        writes: Kind | Place | None = None,
+        writes: OutputKind | Place | None = None,
         out: str = "Folder to write to.",
         optional: bool = False,
         more: str = "",
@@ -99,7 +99,7 @@ class Command(click.Command):
         shared: Iterable[click.Option] = (ANGLE_UNIT, QUIET),
     ) -> None:
         self.verb, self.writes, self.reads = verb, writes, reads
-        place = partial(result_folder, kind=writes) if isinstance(writes, Kind) else writes
+        place = partial(result_folder, kind=writes) if isinstance(writes, OutputKind) else writes
         self.make = make or inspect.unwrap(verb)
         self.run = run or (partial(self._save, place) if place else self.make)
         self.sections = {title: names.split() for title, names in (sections or {}).items()}
@@ -192,7 +192,7 @@ class Command(click.Command):
         read = [one for path in named for one in self.reads(path)]
         inputs = [*inputs_of(self.verb, given), *read]
         opened = nullcontext() if out is None else place(out, inputs=inputs, force=force)
-        work = stage(self.writes.name) if isinstance(self.writes, Kind) else nullcontext()
+        work = stage(self.writes.name) if isinstance(self.writes, OutputKind) else nullcontext()
         with opened as part, work:
             result = self.make(**given)
             if status := getattr(result, "exit_status", 0):

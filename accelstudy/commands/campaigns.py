@@ -12,7 +12,7 @@ import click
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import plural
 from accelstudy.commands.bridge import QUIET, Command, inputs_of
 from accelstudy.files import outputs
 from accelstudy.files.outputs import new_file, result_folder
@@ -73,7 +73,7 @@ def show_import(campaign: Campaign, holds: Holds | None, out: Path, figure: bool
         warn(warning)
     if figure and holds is not None:
         say(f"figure: {out / 'segmentation.png'}")
-    click.echo(f"campaign: {out} ({counted(campaign.n_positions, 'position')})")
+    click.echo(f"campaign: {out} ({plural(campaign.n_positions, 'position')})")
 
 
 IMPORT = Command(

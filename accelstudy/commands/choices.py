@@ -70,7 +70,7 @@ def effects(
     from accelstudy.basics.units import angle_note
 
     if campaign is None and scheme is None:
-        click.echo(listed())
+        click.echo(list_effects())
         say(f"\n{angle_note()}.")
         return
     if campaign is not None and scheme is not None:
@@ -99,7 +99,7 @@ def effects(
     )
 
 
-def listed() -> str:
+def list_effects() -> str:
     """Text on effects of the sensor and of the rig, noise effects and gross errors.
 
     Parameters and typical sizes are in the units shown to people, settings in SI as specs have
@@ -115,7 +115,7 @@ def listed() -> str:
 
 def _items(table: pd.DataFrame) -> Iterator[str]:
     """Lines on each row of a catalogue."""
-    from accelstudy.api.catalogues import plain
+    from accelstudy.api.catalogues import plain_number
     from accelstudy.basics.units import display_unit, to_display
 
     for name, row in table.iterrows():
@@ -123,13 +123,15 @@ def _items(table: pd.DataFrame) -> Iterator[str]:
         lines = [row["summary"], row["plugin"] and f"of the plug-in {row['plugin']}"]
         settings = row["settings"] and f"settings: {row['settings']}"
         if "parameters" in row:
-            low, high = map(plain, to_display(row[["typical_low", "typical_high"]], row["unit"]))
+            low, high = map(
+                plain_number, to_display(row[["typical_low", "typical_high"]], row["unit"])
+            )
             size = f"[{display_unit(row['unit'])}], typically {low} … {high}"
             lines += [f"{row['parameters']} {size}", settings]
             lines += [row["needs"] and f"needs the {row['needs']} of each hold"]
             lines += [row["family"] and f"family: {row['family']}"]
         elif "typical_low" in row:
-            low, high = map(plain, (row["typical_low"], row["typical_high"]))
+            low, high = map(plain_number, (row["typical_low"], row["typical_high"]))
             unit = "" if row["unit"] == "1" else f" {row['unit']}"
             lines += [settings, f"{row['setting']} typically {low} … {high}{unit}"]
         else:

@@ -68,9 +68,9 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""
-        from accelstudy.basics.plugins import at_work  # which help does without
+        from accelstudy.basics.plugins import errors_as_lines  # which help does without
 
-        with interruptible(), at_work():
+        with interruptible(), errors_as_lines():
             return super().invoke(ctx)
 
 

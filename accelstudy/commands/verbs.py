@@ -29,8 +29,8 @@ def run_check_sigmas(**given: Any) -> None:
 
 def run_export(calibration: Path, form: str) -> None:
     """Print a calibration in a form that a device takes, and warn of what the form cannot hold."""
-    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.campaign.calibration.export import export, losses
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 
     sensor = sensor_of(calibration)
     text = export(sensor, form)

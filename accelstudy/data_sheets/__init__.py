@@ -10,14 +10,14 @@ from accelstudy.data_sheets.reading import (
     parse_data_sheet,
     read_data_sheet,
 )
-from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet, of_sigma
+from accelstudy.data_sheets.sheet import QUANTITIES, DataSheet, sheet_of_sigma
 
 __all__ = [
     "QUANTITIES",
     "DataSheet",
     "data_sheet_names",
     "get_data_sheet",
-    "of_sigma",
     "parse_data_sheet",
     "read_data_sheet",
+    "sheet_of_sigma",
 ]

@@ -20,7 +20,7 @@ from accelstudy.data_sheets.sheet import FLICKER, DataSheet
 from accelstudy.effects import get_effect
 from accelstudy.epochs.course import YEAR
 from accelstudy.files.reading import read_json
-from accelstudy.files.validation import Finite, NotNegative, Number, checked
+from accelstudy.files.validation import Finite, NotNegative, Number, validate
 
 NO_HISTORY = "not a history.json of accelstudy"
 MIN_VARIANCE_SHARE = 0.02
@@ -105,7 +105,7 @@ def with_history(sheet: DataSheet, path: str | Path) -> DataSheet:
     InputError
         If it is no history, or none of a bias.
     """
-    document = checked(_Document, read_json(path, NO_HISTORY), f"{path}: {NO_HISTORY}")
+    document = validate(_Document, read_json(path, NO_HISTORY), f"{path}: {NO_HISTORY}")
     names = [parameter.name for parameter in get_effect("bias").parameters]
     biases = [parameter for parameter in document.parameters if parameter.name in names]
     if not biases:

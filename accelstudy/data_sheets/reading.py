@@ -10,8 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from accelstudy.basics.errors import InputError, UnknownNameError, shown
-from accelstudy.basics.plugins import installed, label, one_line
+from accelstudy.basics.errors import InputError, UnknownNameError, brief
+from accelstudy.basics.plugins import error_as_line, installed_entry_points, label
 from accelstudy.basics.units import parse_quantity
 from accelstudy.campaign.sensor_type import TYPE_KEYS
 from accelstudy.data_sheets.sheet import LEAST_FULL_SCALE, MOST, QUANTITIES, DataSheet
@@ -106,18 +106,18 @@ def _quantity(key: str, given: Any) -> tuple[float, str]:
             raise InputError(f"{key}: value: missing")
         text, where = given["value"], str(given.get("source") or "")
     if not isinstance(text, str | int | float) or isinstance(text, bool):
-        raise InputError(f"{key}: must be a number with its unit, not {shown(text)}")
+        raise InputError(f"{key}: must be a number with its unit, not {brief(text)}")
     try:
         size = parse_quantity(str(text), unit)
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
     if size < 0 or (size == 0 and key in (DENSITY, "velocity_random_walk", "position_sigma")):
-        raise InputError(f"{key}: must be more than 0, not {shown(text)}")
+        raise InputError(f"{key}: must be more than 0, not {brief(text)}")
     if size > MOST[unit] or (key == "full_scale" and size < LEAST_FULL_SCALE):
         bound = f"at most {MOST[unit]:g} {unit}"
         if size <= MOST[unit]:
             bound = f"at least {LEAST_FULL_SCALE:g} {unit}"
-        raise InputError(f"{key}: must be {bound}, not {shown(text)}")
+        raise InputError(f"{key}: must be {bound}, not {brief(text)}")
     return size, where
 
 
@@ -125,8 +125,8 @@ def _quantity(key: str, given: Any) -> tuple[float, str]:
 def _files() -> dict[str, Path]:
     """File of each sensor by its name; a package names the folder of its own as entry point."""
     found = _files_of("accelstudy.data_sheets")
-    for point in installed("data_sheets"):
-        with one_line(label(point)):
+    for point in installed_entry_points("data_sheets"):
+        with error_as_line(label(point)):
             own = _files_of(point.module)
             if not own:
                 raise InputError("no data sheet (*.yaml) lies in this package")

@@ -96,15 +96,15 @@ class DataSheet:
             raise InputError("full_scale: missing; nonlinearity is in parts of it")
 
     @property
-    def known(self) -> tuple[str, ...]:
+    def known_quantities(self) -> tuple[str, ...]:
         """Quantities that have a value."""
         return tuple(name for name in QUANTITIES if getattr(self, name) is not None)
 
     @property
-    def unknown(self) -> tuple[str, ...]:
+    def unknown_quantities(self) -> tuple[str, ...]:
         """Quantities without a value; the noise always has one."""
         noise = ("velocity_random_walk", "position_sigma")
-        return tuple(n for n in QUANTITIES if n not in self.known and n not in noise)
+        return tuple(n for n in QUANTITIES if n not in self.known_quantities and n not in noise)
 
     @property
     def content(self) -> dict[str, object]:
@@ -114,7 +114,7 @@ class DataSheet:
             "title": self.title,
             "source": self.source,
         }
-        for key in self.known:
+        for key in self.known_quantities:
             unit = QUANTITIES[key][0]
             value = float(to_recorded(getattr(self, key), unit))
             content[key] = {
@@ -129,7 +129,7 @@ class DataSheet:
         lines = yaml.safe_dump(self.content, sort_keys=False, allow_unicode=True, width=96)
         rest = [
             f"# {key}: {QUANTITIES[key][1]} (as in 1 {recorded_unit(QUANTITIES[key][0])})"
-            for key in self.unknown
+            for key in self.unknown_quantities
         ]
         more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
         return lines + "\n".join(more) + "\n"
@@ -203,7 +203,9 @@ class DataSheet:
         drift = (self.bias_rate or 0.0) * seconds
         return math.hypot(floor, walk, drift, again)
 
-    def warmed(self, kelvin: float, corrected: Collection[str] = ()) -> tuple[float, float]:
+    def temperature_sigmas(
+        self, kelvin: float, corrected: Collection[str] = ()
+    ) -> tuple[float, float]:
         """Standard deviations of what a temperature changes: of the bias, m/s², and of the scale.
 
         Coefficients that are unknown count as zero.
@@ -238,7 +240,7 @@ class DataSheet:
         return 4 * self.nonlinearity * (STANDARD_GRAVITY / self.full_scale) ** 2
 
 
-def of_sigma(sigma: float) -> DataSheet:
+def sheet_of_sigma(sigma: float) -> DataSheet:
     """Sensor of which only the noise of the mean of a position is known, m/s².
 
     It is assumed to be linear, like that of the paper.

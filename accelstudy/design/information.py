@@ -84,7 +84,7 @@ class Information:
         root = self._root
         return np.full_like(self.normal, np.nan) if root is None else root @ root.T
 
-    def beside(self, unknown: int) -> Information:
+    def marginal(self, unknown: int) -> Information:
         """Information on the other parameters if the first ones are unknown, too."""
         return Information(_triangle(self.rows)[unknown:, unknown:], self.conditions - unknown)
 

@@ -20,7 +20,7 @@ from accelstudy.design.continuous import allowed, continuous_optimum
 from accelstudy.design.criteria import Criterion
 from accelstudy.design.spaces import Constraints, Space, Sphere
 from accelstudy.design.task import Task
-from accelstudy.positions.choice import CRITERION_TOLERANCE, first_best, in_order
+from accelstudy.positions.choice import CRITERION_TOLERANCE, first_best, stable_order
 
 Array = NDArray[np.float64]
 
@@ -120,11 +120,11 @@ class Search:
         searches = [replace(self, space=part) for part in parts]
         searches = [search for search in searches if len(search.candidates)]
         if len(searches) > PARTS:
-            tried = [search.value(search.exchanged(1)) for search in searches]
-            searches = [searches[i] for i in in_order(tried, DESIGN_TOLERANCE)[:PARTS]]
-        return self.finished(self._best([search._refined(starts) for search in searches]), bounded)
+            tried = [search.value(search.exchange(1)) for search in searches]
+            searches = [searches[i] for i in stable_order(tried, DESIGN_TOLERANCE)[:PARTS]]
+        return self.finish(self._best([search._refine(starts) for search in searches]), bounded)
 
-    def exchanged(self, start: int) -> Array:
+    def exchange(self, start: int) -> Array:
         """Candidates of which none can be exchanged for a better one, from a random set; (n, 3)."""
         before = self.task.prior + PRIOR_INFORMATION * np.eye(len(self.task.prior))
         informations = self._informations
@@ -137,9 +137,9 @@ class Search:
             for i, old in enumerate(chosen):
                 if order is None:  # the rank of the candidates, until a position is exchanged
                     rank = flat @ self.criterion.gradient(normal).ravel()
-                    order = in_order(rank, CRITERION_TOLERANCE * float(np.abs(rank).max()))
+                    order = stable_order(rank, CRITERION_TOLERANCE * float(np.abs(rank).max()))
                 others = self.candidates[chosen[:i] + chosen[i + 1 :]]
-                apart = self.constraints.apart(self.candidates, others)
+                apart = self.constraints.are_apart(self.candidates, others)
                 tried = order[apart[order]][:MAX_TRIED]
                 if not len(tried):
                     continue
@@ -153,7 +153,7 @@ class Search:
                 break
         return self.candidates[chosen]
 
-    def moved(self, start: Array, step: float) -> Array:
+    def move(self, start: Array, step: float) -> Array:
         """Positions of which none gains by a move of one step across gravity, (n, 3)."""
         tangents = step * self.space.tangents(start)
         if not tangents.shape[2]:
@@ -167,7 +167,7 @@ class Search:
 
         t = before = np.zeros((self.n, moves.shape[1]))
         for _ in range(MAX_SWEEPS):
-            moved = moves[self._swept(directions(t + moves[:, None, :]), MIN_GAIN * step**2)]
+            moved = moves[self._sweep(directions(t + moves[:, None, :]), MIN_GAIN * step**2)]
             if not moved.any():
                 break
             tried = t + moved + FURTHER[:, None, None] * (t + moved - before)
@@ -175,7 +175,7 @@ class Search:
             t = tried[self._furthest(directions(tried), MIN_GAIN * step**2)]
         return directions(t)
 
-    def joined(self, directions: Array) -> Array:
+    def join(self, directions: Array) -> Array:
         """Positions that lie close together replaced by one of them, repeated.
 
         Where repeats are best, a search ends with such positions: near the optimum nothing draws
@@ -196,9 +196,9 @@ class Search:
         loss = self.value(joined) - self.value(directions)
         return joined if loss <= MAX_JOINING_LOSS else directions
 
-    def finished(self, directions: Array, bounded: bool) -> Optimum:
+    def finish(self, directions: Array, bounded: bool) -> Optimum:
         """The optimum of positions that were found; `InputError` if they do not suffice."""
-        directions = rounded(self.joined(directions))
+        directions = round_directions(self.join(directions))
         found = Optimum(directions, self.value(directions))
         if reason := self._missing(directions):
             raise InputError(
@@ -253,13 +253,15 @@ class Search:
         """First of the sets that are equally good, so that rounding does not choose."""
         return found[first_best([self.value(each) for each in found], DESIGN_TOLERANCE)]
 
-    def _refined(self, starts: int) -> Array:
+    def _refine(self, starts: int) -> Array:
         """Best positions from so many random sets."""
-        found = [self.exchanged(start) for start in range(1, starts + 1)]
-        order = in_order([self.value(each) for each in found], DESIGN_TOLERANCE)[:REFINED_STARTS]
+        found = [self.exchange(start) for start in range(1, starts + 1)]
+        order = stable_order([self.value(each) for each in found], DESIGN_TOLERANCE)[
+            :REFINED_STARTS
+        ]
         for step in STEPS:
             for i in order:
-                found[i] = self.moved(found[i], step)
+                found[i] = self.move(found[i], step)
         return self._best([found[i] for i in order])
 
     def _random(self, start: int) -> list[int]:
@@ -271,7 +273,7 @@ class Search:
             free = np.ones(len(self.candidates), dtype=bool)
             while len(chosen) < self.n and free.any():
                 chosen.append(int(rng.choice(np.flatnonzero(free))))
-                free &= self.constraints.apart(self.candidates, self.candidates[chosen[-1:]])
+                free &= self.constraints.are_apart(self.candidates, self.candidates[chosen[-1:]])
             if len(chosen) == self.n:
                 return chosen
             most = max(most, len(chosen))
@@ -280,7 +282,7 @@ class Search:
             f"attitudes; {most} were"
         )
 
-    def _swept(self, around: Array, gain: float) -> NDArray[np.int_]:
+    def _sweep(self, around: Array, gain: float) -> NDArray[np.int_]:
         """Move each position in turn to the best of m places (m, n, 3); the places taken, (n,)."""
         m, n = around.shape[:2]
         flat = around.reshape(-1, 3)
@@ -296,7 +298,7 @@ class Search:
             tried = np.flatnonzero(inside[:, i] & (flat_changes[:, i] @ slope < -gain))
             if len(tried) and self.constraints.least_angle is not None:
                 others = np.delete(around[taken, np.arange(n)], i, axis=0)
-                tried = tried[self.constraints.apart(around[tried, i], others)]
+                tried = tried[self.constraints.are_apart(around[tried, i], others)]
             if not len(tried):
                 continue
             values = self.criterion.value(normal + changes[tried, i])
@@ -312,11 +314,11 @@ class Search:
         each = self.task.informations(tried.reshape(-1, 3)).reshape(*tried.shape[:2], -1)
         normals = self.task.prior + each.sum(axis=1).reshape(-1, *self.task.prior.shape)
         values = self.criterion.value(normals)
-        values[[not self.constraints.met(directions) for directions in tried]] = np.inf
+        values[[not self.constraints.are_met(directions) for directions in tried]] = np.inf
         best = first_best(values)
         return best if values[best] < values[0] - gain else 0
 
 
-def rounded(directions: Array) -> Array:
+def round_directions(directions: Array) -> Array:
     """Directions as they are returned and as a file holds them."""
     return np.asarray(directions).round(DIGITS) + 0.0  # -0.0 becomes 0.0

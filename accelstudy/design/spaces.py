@@ -65,7 +65,7 @@ class Sphere(Space):
 
 
 @dataclass(frozen=True, eq=False)
-class Listed(Space):
+class FiniteSet(Space):
     """A finite set of attitudes.
 
     Attributes
@@ -81,19 +81,19 @@ class Listed(Space):
         return self.points
 
 
-def cube() -> Listed:
+def cube() -> FiniteSet:
     """Attitudes of a cube on a table: on its faces, edges and corners."""
     points = np.vstack([faces(), edges(), corners()])
-    return Listed(_unit(points), "a cube: 6 faces, 12 edges, 8 corners")
+    return FiniteSet(_unit(points), "a cube: 6 faces, 12 edges, 8 corners")
 
 
-def by_eye(step: float) -> Listed:
+def attitudes_by_eye(step: float) -> FiniteSet:
     """Attitudes that a person can judge by eye: roll and pitch in whole steps, rad."""
     turns = max(1, round(np.pi / 2 / step))
     rolls = np.arange(4 * turns) * np.pi / 2 / turns
     pitches = np.arange(-turns + 1, turns) * np.pi / 2 / turns
     points = [-np.array(specific_force(r, p, 1.0, np)) for p in pitches for r in rolls]
-    return Listed(
+    return FiniteSet(
         _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
         f"a block held by hand: roll and pitch in steps of {np.degrees(np.pi / 2 / turns):g}°",
     )
@@ -150,7 +150,7 @@ class Mountings(Space):
         return [Mountings(self.count, axes) for axes in chosen]
 
 
-def listed_in(path: Path) -> Listed:
+def read_attitudes(path: Path) -> FiniteSet:
     """Read the attitudes of a CSV file.
 
     It has the columns x, y, z (directions of gravity in the body frame) or roll_U, pitch_U, where U
@@ -187,7 +187,7 @@ def listed_in(path: Path) -> Listed:
     if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
         raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
     points = np.unique(_unit(values).round(12), axis=0)
-    return Listed(_unit(points), f"{len(points)} attitudes of {path.name}")
+    return FiniteSet(_unit(points), f"{len(points)} attitudes of {path.name}")
 
 
 def attitudes(directions: Array) -> Array:
@@ -232,11 +232,14 @@ class Constraints:
     @property
     def texts(self) -> list[str]:
         """All of them, for people."""
-        texts = [f"{name} from {_shown(a)} to {_shown(b)}" for name, (a, b) in self._ranges.items()]
+        texts = [
+            f"{name} from {_angle_text(a)} to {_angle_text(b)}"
+            for name, (a, b) in self._ranges.items()
+        ]
         if self.pole_distance is not None:
-            texts.append(f"at least {_shown(self.pole_distance)} from the roll pole")
+            texts.append(f"at least {_angle_text(self.pole_distance)} from the roll pole")
         if self.least_angle is not None:
-            texts.append(f"at least {_shown(self.least_angle)} between positions")
+            texts.append(f"at least {_angle_text(self.least_angle)} between positions")
         return texts
 
     def allow(self, directions: Array) -> NDArray[np.bool_]:
@@ -255,14 +258,14 @@ class Constraints:
         """Those of directions (n, 3) that meet the constraints on single positions."""
         return directions[self.allow(directions)]
 
-    def apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
+    def are_apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
         """Which of k directions are far enough from all of the others, (k,)."""
         if self.least_angle is None or not len(others):
             return np.ones(len(directions), dtype=bool)
         limit = np.cos(self.least_angle - TOLERANCE)
         return np.asarray(np.all(directions @ others.T <= limit, axis=1))
 
-    def met(self, directions: Array) -> bool:
+    def are_met(self, directions: Array) -> bool:
         """Whether a set of positions meets all constraints."""
         allowed = bool(np.all(self.allow(directions)))
         if self.least_angle is None or not allowed:
@@ -272,5 +275,5 @@ class Constraints:
         return not near.any()
 
 
-def _shown(angle: float) -> str:
+def _angle_text(angle: float) -> str:
     return f"{float(to_attitude(angle)):.6g} {attitude_unit()}"

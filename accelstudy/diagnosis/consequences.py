@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.units import GON
 from accelstudy.diagnosis.prediction import relative_variance
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.leveling.error import (
@@ -55,7 +55,7 @@ class Change:
 
 
 def parameter_changes(
-    base: Solution, frame: Frame, effects: Sequence[Effect], final: Solution, variance: float
+    base: Solution, frame: SessionFit, effects: Sequence[Effect], final: Solution, variance: float
 ) -> tuple[Change, ...]:
     """Compare what added effects should change of the other parameters with what they do.
 
@@ -67,7 +67,7 @@ def parameter_changes(
     variance : float, of unit weight
     """
     u, residuals = base.model.n_parameters, Residuals.of(base)
-    rows = np.concatenate([residuals.whitened(frame.signatures((e,))) for e in effects], axis=1)
+    rows = np.concatenate([residuals.whiten(frame.signatures((e,))) for e in effects], axis=1)
     shift = np.linalg.lstsq(base.design, rows, rcond=None)[0][:u]
     added = slice(u, u + rows.shape[1])
     # By the same theory the noise of the effect's size is all that makes the change uncertain.
@@ -79,7 +79,7 @@ def parameter_changes(
     return tuple(Change(p.name, p.unit, *values) for p, values in named)
 
 
-def in_use(hold: HoldConditions, g: float) -> tuple[Array, HoldConditions]:
+def forces_in_use(hold: HoldConditions, g: float) -> tuple[Array, HoldConditions]:
     """Specific forces (n, 3) of all tilts up to 50 gon, and holds like those of a campaign.
 
     Parameters
@@ -109,7 +109,7 @@ def leveling_rms(
     variance : float, of unit weight of the extended fit
     """
     g, model = extended.gravity, extended.model
-    f_b, used = in_use(hold, g)
+    f_b, used = forces_in_use(hold, g)
     truth = extended.parameters[: model.n_parameters]
     squares = []
     for one in (base, extended):

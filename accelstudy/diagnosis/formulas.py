@@ -23,7 +23,7 @@ from accelstudy.diagnosis.coordinates import ANGLES, TARGETS, Coordinate, coordi
 from accelstudy.diagnosis.decision.learned import coordinate_values, weigh_place
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.residuals import Residuals, spans
 from accelstudy.diagnosis.space.shapes import Place, function_rows, less_its_mean
 from accelstudy.effects.learned import OF_EACH, WAVES, Learned
@@ -67,8 +67,8 @@ class Ranking:
     formulas: tuple[Formula, ...]
 
 
-def ranked(
-    frame: Frame, evidence: Evidence, effect: Learned, place: Place, beside: Array
+def rank_formulas(
+    frame: SessionFit, evidence: Evidence, effect: Learned, place: Place, beside: Array
 ) -> Ranking:
     """Rank the formulas for a learned function.
 
@@ -80,7 +80,9 @@ def ranked(
     place : Place, coordinate and target of the same
     beside : (m, l) array, basis of the space of what was found beside it
     """
-    functions = _Functions(frame, frame.residuals.beside(beside), effect, argument(frame, effect))
+    functions = _Functions(
+        frame, frame.residuals.orthogonal_to(beside), effect, argument(frame, effect)
+    )
     evidence = replace(evidence, redundancy=functions.residuals.redundancy)
     found = []
     for form in forms(effect.coordinate, functions.arguments):
@@ -100,16 +102,16 @@ def ranked(
     for (form, setting, _), p in zip(found, posterior, strict=False):
         if p >= MIN_POSTERIOR:
             sizes, sigmas, _ = functions.fit(form, setting, taking)
-            shown = _said(sizes, sigmas, target.unit, [target.components[i] for i in taking])
+            shown = _size_text(sizes, sigmas, target.unit, [target.components[i] for i in taking])
             by = "" if form.is_sine else "by "
-            formulas.append(Formula(f"{form.said(setting)}, {by}{shown}", p))
+            formulas.append(Formula(f"{form.text(setting)}, {by}{shown}", p))
     names = tuple(target.components[i] for i in taking)
     which = "all axes" if len(names) == len("xyz") else comma_list(names)
     subject = f"{target.words.format(which)} depends on {coordinate_of(effect.coordinate).words}"
     return Ranking(names, subject, tuple(sorted(formulas, key=lambda one: -one.posterior)))
 
 
-def _said(sizes: Array, sigmas: Array, unit: str, names: Sequence[str]) -> str:
+def _size_text(sizes: Array, sigmas: Array, unit: str, names: Sequence[str]) -> str:
     """Say the size of a form in each component, once if they are alike."""
     texts = [estimate(float(size), sigmas.max(), unit)[0] for size in sizes]
     if len({*texts}) > 1:
@@ -117,7 +119,7 @@ def _said(sizes: Array, sigmas: Array, unit: str, names: Sequence[str]) -> str:
     return f"{comma_list(list(dict.fromkeys(texts)))} {shown_unit(unit)}"
 
 
-def argument(frame: Frame, effect: Learned) -> Array:
+def argument(frame: SessionFit, effect: Learned) -> Array:
     """Return the coordinate of a learned effect in the positions, (n, a)."""
     values = coordinate_values(effect, frame)
     return values if effect.coordinate in (*OF_EACH, "angle") else values[:, :1]
@@ -135,12 +137,12 @@ class _Functions:
     arguments : (n, a) array, the coordinate
     """
 
-    frame: Frame
+    frame: SessionFit
     residuals: Residuals
     effect: Learned
     arguments: Array
 
-    def _left(self, form: Form, settings: Array) -> tuple[Array, Array]:
+    def _residual_functions(self, form: Form, settings: Array) -> tuple[Array, Array]:
         """What the model leaves of a form with t settings, (t, m, c, k), and its share, (t,)."""
         phi = [form.basis(s, self.arguments) for s in settings]
         functions = less_its_mean(np.concatenate(phi, axis=-1))
@@ -155,14 +157,14 @@ class _Functions:
         """Log density of the residuals with each setting (t,) of a form; −inf if none shows."""
         z, logs = self.residuals.z, []
         for settings in np.array_split(form.settings, -(-len(form.settings) // AT_ONCE)):
-            left, share = self._left(form, settings)
+            left, share = self._residual_functions(form, settings)
             columns = left.reshape(*left.shape[:2], -1)
             norms = np.linalg.norm(columns, axis=1)
             sizes = np.broadcast_to(norms.max(axis=1, keepdims=True), norms.shape)
             _, basis, rank = spans(columns, sizes, RULES.visible)
             dims = np.where(share > RULES.visible_shape, rank, 0)
             parts = np.sum((z @ basis) ** 2, axis=1)
-            density = evidence.of_spaces(parts, np.maximum(dims, 1), float(z @ z))
+            density = evidence.spaces_density(parts, np.maximum(dims, 1), float(z @ z))
             logs.append(np.where(dims > 0, density, -np.inf))
         return np.concatenate(logs)
 
@@ -174,9 +176,11 @@ class _Functions:
         shapes = [one for one in tried if (one.effect.coordinate, one.effect.target) == like]
         square = np.array([z @ z])
         if not shapes:
-            return float(logsumexp(evidence.of_noise(square)))
+            return float(logsumexp(evidence.noise_density(square)))
         along = [(z @ one.vectors)[None] ** 2 for one in shapes]
-        return float(log_mean(evidence.of_shapes(along, [s.shares for s in shapes], square)[0]))
+        return float(
+            log_mean(evidence.shapes_density(along, [s.shares for s in shapes], square)[0])
+        )
 
     def fit(
         self, form: Form, setting: float, components: tuple[int, ...]
@@ -188,7 +192,10 @@ class _Functions:
         sizes, sigmas : (c,) arrays, amplitude of a sine, or how far another form goes
         taking : components that take part; the most significant one if none does
         """
-        z, left = self.residuals.z, self._left(form, np.array([setting]))[0][0][:, [*components]]
+        z, left = (
+            self.residuals.z,
+            self._residual_functions(form, np.array([setting]))[0][0][:, [*components]],
+        )
         m, count, k = left.shape
         inverse = np.linalg.pinv(left.reshape(m, -1), rcond=RULES.visible)
         values = inverse @ z
@@ -250,12 +257,12 @@ class Form:
     words: str
     basis: Callable[[float, Array], Array]
     settings: Array = field(default_factory=lambda: np.zeros(1))
-    shown: Callable[[float], str] = str
+    setting_text: Callable[[float], str] = str
     is_sine: bool = False
 
-    def said(self, setting: float) -> str:
+    def text(self, setting: float) -> str:
         """Say it with a setting."""
-        return self.words.format(self.shown(setting))
+        return self.words.format(self.setting_text(setting))
 
 
 def forms(coordinate: str, c: Array) -> Iterator[Form]:

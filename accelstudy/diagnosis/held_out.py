@@ -23,8 +23,8 @@ from accelstudy.diagnosis.decision.noise import exceeds_stated, judged_noise
 from accelstudy.diagnosis.decision.posterior import Alternatives, Case, Posterior
 from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Seen
-from accelstudy.diagnosis.evidence.detection import log_ratio, simulated, total_odds
+from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Projection
+from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio, total_odds
 from accelstudy.diagnosis.prediction import (
     Group,
     HeldOutGap,
@@ -87,10 +87,10 @@ def gap_of(case: Case, finding: Finding, seeds: Sequence[np.random.SeedSequence]
     if finding.verdict == "gross_error":
         return gap
     with stage("held-out positions"):
-        return _predicted(case, finding, gap, [np.random.default_rng(seed) for seed in seeds])
+        return _predict(case, finding, gap, [np.random.default_rng(seed) for seed in seeds])
 
 
-def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]) -> Gap:
+def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Generator]) -> Gap:
     """Choose and fit on a part of the positions, and predict the rest."""
     problem, first, place = case.problem, case.problem.base.solution, finding.place
     n, c = len(first.misclosures), first.approach.n_conditions
@@ -110,7 +110,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
         return replace(gap, reason="the fitted positions do not determine the model")
     part = Alternatives(pose(replace(problem.base, solution=base)))
     chosen, others = _chosen_alike(part, finding)
-    refit = _refitted(part, chosen, place)
+    refit = _refit(part, chosen, place)
     if isinstance(refit, str):
         return replace(gap, reason=refit)
     known = problem.evidence.level.known
@@ -121,7 +121,7 @@ def _predicted(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
     split = LinearSplit(problem.frame, fitted, held)
-    beyond = case.detection.beyond(RULES.level(known))
+    beyond = case.detection.threshold(RULES.level(known))
     test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[2]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
@@ -147,7 +147,7 @@ def _chosen_alike(part: Alternatives, finding: Finding) -> tuple[Sequence[Cause]
     if len(chosen) > 1:
         sets = [one for one in part.sets if len(one.best) == len(chosen)]
         best = max(sets, key=lambda one: one.log_weight, default=None)
-        same = [one for one in credible if best and _same(one.classes, best.names)]
+        same = [one for one in credible if best and _match(one.classes, best.names)]
         if best is None or not same:
             return chosen, True
         return best.causes, False
@@ -160,7 +160,7 @@ def _chosen_alike(part: Alternatives, finding: Finding) -> tuple[Sequence[Cause]
     return [Cause(name, wanted[name], part.singles.best[name])], False
 
 
-def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
+def _match(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     """Whether names are each of another one of some classes."""
     return len(classes) == len(names) and any(
         all(name in alike for name, alike in zip(order, classes, strict=True))
@@ -168,7 +168,7 @@ def _same(classes: Sequence[Sequence[str]], names: Sequence[str]) -> bool:
     )
 
 
-def _refitted(part: Alternatives, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
+def _refit(part: Alternatives, chosen: Sequence[Cause], place: Place | None) -> Solution | str:
     """Fit to a part with what was chosen, and a function of a place; or say why that cannot be."""
     alternatives = []
     for cause in chosen:
@@ -199,7 +199,7 @@ def _prefers(
     """Whether held-out positions by themselves prefer some names to the other explanations."""
     assert finding.posterior is not None
     errors = problem.residuals.errors[None]
-    missed = split.beside(errors)[1]
+    missed = split.base_residuals(errors)[1]
     variance = 1.0 if part.evidence.level.known else part.residuals.variance
     logs, of_group = [], []
     for one in finding.posterior.reported[: RULES.held_out_rivals + 1]:
@@ -244,17 +244,17 @@ def threshold(
     """
     problem, label = whole.problem, labels(whole.classes)
     residuals, field = problem.residuals, problem.field
-    drawn = list[Shapes](field.named)
+    drawn = list[Shapes](field.named_shapes)
     if place is not None:
         if problem.unknown is None or part.unknown is None:
             return RULES.z_significant
         drawn = [problem.unknown.at([place])]
         if not len(drawn[0].dims):
             return RULES.z_significant
-    added = simulated(drawn, len(residuals.design), RULES.threshold_sets, rng)
+    added = draw_effects(drawn, len(residuals.design), RULES.threshold_sets, rng)
     noise = rng.standard_normal(added.shape) + residuals.project(added.T).T
     z = residuals.project(noise.T).T
-    seen = field.seen(z)
+    seen = field.project(z)
     odds = field.odds(problem.evidence, seen)
     claimed = (
         claimed_place(problem, seen, place) if place else claimed_names(odds, field.names, label)
@@ -305,15 +305,15 @@ def chosen_names(
     part: Problem, split: LinearSplit, noise: Array, label: Mapping[str, int]
 ) -> tuple[Ints, Array]:
     """Class that the fitted positions choose of noise (b, m), and the corrections that it makes."""
-    field, z = part.named, split.residuals(part.residuals, noise)
-    seen, names = field.seen(z), field.names
+    field, z = part.named_field, split.residuals(part.residuals, noise)
+    seen, names = field.project(z), field.names
     candidate = np.argmax(field.densities(part.evidence, seen), axis=1)
 
     def groups() -> Iterator[Group]:
         for k in np.unique(candidate):
             if names[k] == OUTLIER:
                 continue
-            shapes, rows = field.named[k], np.flatnonzero(candidate == k)
+            shapes, rows = field.named_shapes[k], np.flatnonzero(candidate == k)
             logs = shapes.logs(part.evidence, seen.parts[k][rows], seen.squares[rows])
             places, which = np.unique(np.argmax(logs, axis=1), return_inverse=True)
             tried = split.frame.columns([shapes[int(place)] for place in places])
@@ -324,15 +324,15 @@ def chosen_names(
     return found, split.corrections(noise, groups())
 
 
-def claimed_place(problem: Problem, seen: Seen, place: Place) -> Ints:
+def claimed_place(problem: Problem, seen: Projection, place: Place) -> Ints:
     """Whether a function of a place would be learned of residuals, (b,): 0, or −1 if not."""
     field, evidence, unknown = problem.field, problem.evidence, problem.unknown
     assert unknown is not None
     prior = np.log(problem.prior_unknown)
     densities = field.densities(evidence, seen)
-    densities[:, :-1] -= np.log(len(field.named))
+    densities[:, :-1] -= np.log(len(field.named_shapes))
     densities[:, -1] += prior
-    of_place = unknown.of_place(evidence, seen.parts[-1], seen.squares)[place]
+    of_place = unknown.place_densities(evidence, seen.parts[-1], seen.squares)[place]
     return np.where(np.exp(of_place + prior - log_sum(densities)) >= RULES.sure, 0, -1)
 
 
@@ -342,7 +342,7 @@ def chosen_place(
     """Whether the fitted positions choose a place for noise (b, m), 0, and its corrections."""
     unknown, z = part.unknown, split.residuals(part.residuals, noise)
     assert unknown is not None
-    each = unknown.of_place(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
+    each = unknown.place_densities(part.evidence, unknown.parts(z), np.sum(z**2, axis=1))
     most = np.max([*each.values()], axis=0)
     found = np.where(each.get(place, np.full(len(z), -np.inf)) >= most, 0, -1)
     shapes = weigh_place(place, part.frame, part.residuals, z, part.evidence)

@@ -18,7 +18,7 @@ from accelstudy.adjustment import Adjustment, Observations, calibrate
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import MGON
-from accelstudy.diagnosis.consequences import in_use
+from accelstudy.diagnosis.consequences import forces_in_use
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import leveling_error
@@ -96,10 +96,10 @@ def close_loop(diagnosis: Diagnosis, replicates: int = REPLICATES, seed: int = 1
     simulated sessions of a kind have no solution.
     """
     d = diagnosis
-    if d.extended is d.model or d.leveling is None:
+    if d.extended_model is d.model or d.leveling is None:
         return None
     fits, hold = {"base": d.base, "extended": d.final.solution}, d.frame.hold
-    kept = np.flatnonzero(d.kept)
+    kept = np.flatnonzero(d.used_positions)
     noise = Noise(
         sigma_force=d.sigma_position,
         sigma_angle=d.campaign.sigma_angle or 0.0,
@@ -152,7 +152,7 @@ def _session_table(
     result, g = _calibrated(estimated, observed), simulated.gravity
     truth = simulated.parameters[: simulated.model.n_parameters]
     estimates = result.parameters[result.converged, : estimated.model.n_parameters]
-    f_b, used = in_use(hold, g)
+    f_b, used = forces_in_use(hold, g)
     error = leveling_error(simulated.model, truth, estimated.model, estimates, f_b, g, used)
     tilt = np.full(len(result.converged), np.nan)
     tilt[result.converged] = np.sqrt(np.mean(error.per_replicate**2, axis=1))

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.design.information import Information
-from accelstudy.diagnosis.space.frame import Frame, signature
+from accelstudy.diagnosis.space.frame import SessionFit, signature
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import HoldConditions
@@ -76,7 +76,9 @@ class NextPosition:
     yaw: float | None = None
 
 
-def next_positions(frame: Frame, first: Explanation, second: Explanation) -> list[NextPosition]:
+def next_positions(
+    frame: SessionFit, first: Explanation, second: Explanation
+) -> list[NextPosition]:
     """Positions that separate two explanations of the same residuals best.
 
     Both are fitted to all positions, each together with the parameters of the model. The candidates
@@ -96,7 +98,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
     effects = [one.effect for one in (*first, *second) if one.effect is not None]
     needed = {c for e in effects for c in compose(e.spec, (e.spec,)).hold_columns}
     g = frame.solution.gravity
-    repeated = frame.forces[_apart(frame.forces, g)]
+    repeated = frame.forces[_distinct(frame.forces, g)]
     attitudes = np.concatenate([repeated, -g * get_scheme(CANDIDATE_SCHEME).directions])
     forces, hold = _grid(frame, attitudes, needed, frame.forces[-1])
     rivals = [_fitted(frame, one) for one in (first, second)]
@@ -137,7 +139,7 @@ def next_positions(frame: Frame, first: Explanation, second: Explanation) -> lis
 
 
 def _position(
-    frame: Frame, hold: HoldConditions, i: int, needed: set[str], **more: Any
+    frame: SessionFit, hold: HoldConditions, i: int, needed: set[str], **more: Any
 ) -> NextPosition:
     """Position of the candidates, with what matters of its conditions."""
 
@@ -166,7 +168,7 @@ VALUES = 121
 """Values of the coordinate over which the variance of a function is taken."""
 
 
-def positions_to_learn(frame: Frame, learned: Learned) -> list[NextPosition]:
+def positions_to_learn(frame: SessionFit, learned: Learned) -> list[NextPosition]:
     """Positions that show most of a learned function, one after the other.
 
     Parameters
@@ -209,7 +211,7 @@ def _mean_squares(learned: Learned) -> Array:
     return np.asarray(np.array(shown) @ np.array(shown).T / VALUES)
 
 
-def _apart(forces: Array, gravity: float) -> list[int]:
+def _distinct(forces: Array, gravity: float) -> list[int]:
     """Return the first places whose attitudes clearly differ."""
     chosen: list[int] = []
     for i in range(len(forces)):
@@ -220,7 +222,7 @@ def _apart(forces: Array, gravity: float) -> list[int]:
 
 
 def _grid(
-    frame: Frame,
+    frame: SessionFit,
     attitudes: Array,
     needed: set[str],
     before: Array,
@@ -278,7 +280,7 @@ def _growth(fit: Fit, rows: Array, seen: Array) -> Array:
     return np.asarray(np.sum(missed * np.linalg.solve(noise, missed), axis=(1, 2)))
 
 
-def _fitted(frame: Frame, explanation: Explanation) -> Fit:
+def _fitted(frame: SessionFit, explanation: Explanation) -> Fit:
     """Fit an explanation to all positions, together with the parameters of the model."""
     shown = [-columns for one in explanation for columns in frame.columns([one])]
     residuals = frame.residuals
@@ -286,7 +288,7 @@ def _fitted(frame: Frame, explanation: Explanation) -> Fit:
 
 
 def _rows(
-    frame: Frame, forces: Array, hold: HoldConditions, explanation: Explanation = ()
+    frame: SessionFit, forces: Array, hold: HoldConditions, explanation: Explanation = ()
 ) -> Array:
     """Rows of unit weight of candidates, (k, c, p), by the parameters of the model and effects.
 
@@ -311,5 +313,5 @@ def _rows(
     for one in explanation:
         assert one.effect is not None
         shown = signature(one.effect, forces, angles, solution.gravity, hold)
-        columns.append(-space.whitened(shown) @ one.directions)
+        columns.append(-space.whiten(shown) @ one.directions)
     return np.concatenate(columns, axis=1)[: k * c].reshape(k, c, -1)

@@ -64,7 +64,7 @@ def diagnose(
     approach = approach or usual_approach(campaign)
     recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
-        campaign = recognised.mended
+        campaign = recognised.corrected
     null, split, resampling, threshold = (
         # A stream for each, so that none changes what another one draws.
         np.random.SeedSequence(seed, spawn_key=(key,))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment import Observations
 from accelstudy.adjustment.quality import Solution
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.effects import HoldConditions
 
@@ -130,7 +130,7 @@ def held_out_gap(
     """
     if variance is None:
         variance = base.omega / base.redundancy
-    first, second = (_predicted(solution, rest) for solution in (base, extended))
+    first, second = (_predict(solution, rest) for solution in (base, extended))
     d = first.white - second.white
     slope = d @ first.slope
     size = float(d @ d + slope @ base.cofactors @ slope)
@@ -183,7 +183,7 @@ class _Prediction(NamedTuple):
     misses: tuple[float, ...]
 
 
-def _predicted(fit: Solution, observed: Observations) -> _Prediction:
+def _predict(fit: Solution, observed: Observations) -> _Prediction:
     """Predict positions by a fit to others."""
     at = Residuals.at(fit.model, fit.approach, observed, fit.parameters)
     n, c = at.whitening.shape[:2]
@@ -203,7 +203,7 @@ class LinearSplit:
     fitted, held : (f,) and (h,) int arrays
     """
 
-    frame: Frame
+    frame: SessionFit
     fitted: NDArray[np.int_]
     held: NDArray[np.int_]
 
@@ -229,7 +229,7 @@ class LinearSplit:
         a = self.designs[0]
         return np.asarray(np.linalg.inv(a.T @ a), dtype=float)
 
-    def beside(self, errors: Array) -> tuple[Array, Array]:
+    def base_residuals(self, errors: Array) -> tuple[Array, Array]:
         """What the base model leaves of the fitted part, and of the held-out part it predicts.
 
         Parameters
@@ -259,7 +259,7 @@ class LinearSplit:
         The noise is known, or that of what is left of the fitted part. Z is 0 where a correction
         does not show, and so says nothing.
         """
-        left, missed = self.beside(errors)
+        left, missed = self.base_residuals(errors)
         variance = np.ones(len(left))
         if not known:
             variance = np.sum(left**2, axis=1) / (left.shape[1] - len(self.cofactors))
@@ -276,10 +276,10 @@ class LinearSplit:
         errors : (b, m) array, of all positions
         groups : Groups, of some of these each
         """
-        left, rows = self.beside(errors)[0], self.rows[1]
+        left, rows = self.base_residuals(errors)[0], self.rows[1]
         change = np.zeros((len(errors), len(rows)))
         for some, columns, prior in groups:
-            fitted, rest = self.beside(columns.T)
+            fitted, rest = self.base_residuals(columns.T)
             if prior:
                 inner = fitted @ fitted.T + prior * np.eye(len(fitted))
                 fit = fitted.T @ np.linalg.inv(inner)

@@ -17,7 +17,7 @@ from accelstudy.approaches import Approach
 from accelstudy.basics.progress import stage
 from accelstudy.campaign.calibration.assessment import OUTLIER_LEVEL
 from accelstudy.campaign.calibration.fit import JudgedNoise
-from accelstudy.campaign.gross_errors.recognition import Recognised
+from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
 from accelstudy.diagnosis.decision.learned import shares_of_places
@@ -34,8 +34,8 @@ from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.decision.verdict import (
     Finding,
     Reason,
-    coloured,
-    unrecorded,
+    p_coloured,
+    reason_of_unrecorded,
 )
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.detection import Detection
@@ -45,7 +45,7 @@ from accelstudy.diagnosis.next_positions import NextPosition, next_positions, po
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape, shape_of
 from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
@@ -74,7 +74,7 @@ class Rival(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedCause:
     """An effect, noise effect or gross error that was found.
 
     Attributes
@@ -126,13 +126,13 @@ class Diagnosis:
     case : Case, the campaign, with a recognised gross error mended, and the evidence
     finding : Finding
     gap : Gap, how far the disagreement shrinks by what was added
-    recognised : Recognised or None, a gross error of unit, axes or order
+    recognised : Recognition or None, a gross error of unit, axes or order
     """
 
     case: Case
     finding: Finding
     gap: Gap
-    recognised: Recognised | None = None
+    recognised: Recognition | None = None
 
     @property
     def campaign(self) -> Campaign:
@@ -155,12 +155,12 @@ class Diagnosis:
         return self.problem.base.solution
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> SessionFit:
         """Of the base fit with unequal axes weighted."""
         return self.problem.frame
 
     @property
-    def final(self) -> Frame:
+    def final(self) -> SessionFit:
         """Of the fit with what was found, or of the base fit."""
         return self.finding.frame
 
@@ -175,7 +175,7 @@ class Diagnosis:
         return self.base.model
 
     @property
-    def extended(self) -> SensorModel:
+    def extended_model(self) -> SensorModel:
         """With the effects that were found; the model itself if there are none."""
         return self.final.solution.model
 
@@ -196,12 +196,12 @@ class Diagnosis:
         """Why the verdict is what it is."""
         if self.recognised is not None:
             return Reason.of("recognised", reason=self.recognised.reason)
-        return unrecorded(self.case, self.finding) or self.finding.reason
+        return reason_of_unrecorded(self.case, self.finding) or self.finding.reason
 
     @cached_property
-    def coloured(self) -> float:
+    def p_coloured(self) -> float:
         """Probability of coloured noise that may be an effect of an absent column."""
-        return coloured(self.case, self.finding)
+        return p_coloured(self.case, self.finding)
 
     @property
     def code(self) -> str:
@@ -219,16 +219,16 @@ class Diagnosis:
         return self.finding.statement.certain
 
     @cached_property
-    def found(self) -> tuple[Named, ...]:
+    def found(self) -> tuple[NamedCause, ...]:
         """All that was found; of the unknown, what is certain all the same."""
-        gross = () if self.recognised is None else self.recognised.named
-        named = [Named(name, name, at, (name,), None, None) for name, at in gross]
+        gross = () if self.recognised is None else self.recognised.names
+        named = [NamedCause(name, name, at, (name,), None, None) for name, at in gross]
         if self.finding.verdict == "noise_model":
             return (*named, self._noise())
         return (*named, *self._chosen())
 
     @property
-    def effects(self) -> tuple[Named, ...]:
+    def effects(self) -> tuple[NamedCause, ...]:
         """What the verdict names; nothing if that is unknown."""
         return () if self.verdict == "unknown" else self.found
 
@@ -238,23 +238,23 @@ class Diagnosis:
         return self.finding.place if self.recognised is None else None
 
     @cached_property
-    def kept(self) -> NDArray[np.bool_]:
+    def used_positions(self) -> NDArray[np.bool_]:
         """Which positions, (n,), the final fit uses: all but those that were found to be bumped."""
         bumped = [named.position for named in self.found if named.position is not None]
         return ~np.isin(self.campaign.positions, bumped)
 
-    def _noise(self) -> Named:
+    def _noise(self) -> NamedCause:
         """What is wrong with the noise."""
         worst, posterior = worst_of(self.noise_tests), self.finding.posterior
         assert posterior is not None
-        name = next(one.names[0] for one in posterior.reported if one.of_noise)
+        name = next(one.names[0] for one in posterior.reported if one.is_noise)
         # Of larger residuals the level says least; what they are, the evidence says.
-        if worst is not None and not (worst.name == LEVEL and posterior.of_noise >= RULES.sure):
+        if worst is not None and not (worst.name == LEVEL and posterior.p_noise >= RULES.sure):
             name = worst.name
         p = self.detection.p_value if worst is None else worst.p_value
-        return Named(name, name, None, (name,), p, posterior.of_noise)
+        return NamedCause(name, name, None, (name,), p, posterior.p_noise)
 
-    def _chosen(self) -> list[Named]:
+    def _chosen(self) -> list[NamedCause]:
         """What was chosen, with its estimates."""
         solution, chosen = self.final.solution, self.finding.chosen
         cofactors = with_settings(self.problem.examined, solution, [one.shape for one in chosen])
@@ -266,29 +266,31 @@ class Diagnosis:
 
     def _named(
         self, cause: Cause, values: dict[str, tuple[float, float]], searched: Iterator[float]
-    ) -> Named:
+    ) -> NamedCause:
         """Describe a cause by the values of all parameters, and sigmas of the log settings."""
         best, members, examined = cause.shape, cause.members, self.problem.examined
         p = self.detection.p_family[UNKNOWN if best.name == LEARNED else best.name]
         if best.place is not None:
             at = int(self.campaign.positions[best.place])
-            return Named(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
+            return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
         assert best.effect is not None
-        assert best.shown is not None
+        assert best.distinguishable is not None
         # What is beside a large effect was found in what its refit leaves.
         here = None if best.name == LEARNED else examined.hypothesis(best.effect)
         near = () if here is None else examined.nearest(here)
         like = () if here is None else examined.imitators(here)
         smooth = [s for s in best.effect.takes if s.name == best.smooth]
         of_logs = zip(smooth, searched, strict=False)
-        return Named(
+        return NamedCause(
             best.name,
             best.effect.spec,
             None,
             members,
             p,
             cause.posterior,
-            tuple(Estimate(q.name, *values[q.name], q.unit) for q in best.shown.parameters),
+            tuple(
+                Estimate(q.name, *values[q.name], q.unit) for q in best.distinguishable.parameters
+            ),
             tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
             tuple(other for other in like if other not in members),
             tuple(Rival(n, c) for n, c in near if c >= RULES.rival and n not in members),
@@ -388,7 +390,7 @@ class Diagnosis:
     @property
     def better_for_leveling(self) -> str | None:
         """Model that leaves the smaller tilt error, "base" or "extended"; None if there is one."""
-        if self.leveling is None or self.extended is self.model:
+        if self.leveling is None or self.extended_model is self.model:
             return None
         before, after = self.leveling
         return "base" if after > RULES.larger_tilt * before else "extended"
@@ -396,7 +398,11 @@ class Diagnosis:
     @cached_property
     def changes(self) -> tuple[Change, ...]:
         """Changes of the parameters of the base model; none if a position was left out."""
-        effects = [one.shape.shown for one in self.finding.chosen if one.shape.shown is not None]
+        effects = [
+            one.shape.distinguishable
+            for one in self.finding.chosen
+            if one.shape.distinguishable is not None
+        ]
         if not effects or len(effects) < len(self.finding.chosen):
             return ()
         final, variance = self.final.solution, self.noise.variance
@@ -425,7 +431,7 @@ class Diagnosis:
                 return tuple(positions_to_learn(self.final, learned))
         if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
-        rivals = [one.best for one in finding.credible_set if one.of_effects]
+        rivals = [one.best for one in finding.credible_set if one.is_effects]
         if len(rivals) < 2:
             return ()
         with stage("next positions"):
@@ -444,6 +450,6 @@ class Diagnosis:
     @cached_property
     def implausible(self) -> list[str]:
         """Parameters of the final fit that no sensor has."""
-        final, u = self.final.solution, self.extended.n_parameters
+        final, u = self.final.solution, self.extended_model.n_parameters
         sigma = np.sqrt(np.diag(final.cofactors)[:u] * self.noise.variance)
-        return implausible_parameters(self.extended.effects, final.parameters[:u], sigma)
+        return implausible_parameters(self.extended_model.effects, final.parameters[:u], sigma)

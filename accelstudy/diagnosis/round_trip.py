@@ -18,7 +18,7 @@ from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.config_names import ModelName
-from accelstudy.files.validation import Configuration, Seed, Sessions, checked
+from accelstudy.files.validation import Configuration, Seed, Sessions, validate
 from accelstudy.sensors.models import get_model
 
 
@@ -56,7 +56,7 @@ class RoundTrip(Configuration):
 
 def parse_round_trip(content: Mapping[str, Any], source: str = "config") -> RoundTrip:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
-    return checked(RoundTrip, content, source)
+    return validate(RoundTrip, content, source)
 
 
 def write_simulated(settings: CampaignSettings, folder: str | Path, truth: str | Path) -> None:

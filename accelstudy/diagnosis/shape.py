@@ -11,8 +11,8 @@ from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.learned import space_of
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.formulas import Ranking, argument, ranked
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.formulas import Ranking, argument, rank_formulas
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.shapes import function_rows
 from accelstudy.effects.learned import Learned
 
@@ -73,7 +73,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, Learned)
     beside = space_of(others, len(problem.residuals.z))
-    ranking = ranked(problem.frame, problem.evidence, effect, finding.place, beside)
+    ranking = rank_formulas(problem.frame, problem.evidence, effect, finding.place, beside)
     at = argument(frame, effect)
     grid = np.linspace(at.min(), at.max(), POINTS)
     names = list(solution.model.parameter_names)
@@ -82,7 +82,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     values, sigmas = effect.function(grid, parameters, variance * cofactors)
     here = [effect.function(at[:, min(i, at.shape[1] - 1)], parameters, cofactors)[0][:, i]
             for i in range(values.shape[1])]  # fmt: skip
-    left, spreads = _left(frame, effect, variance)
+    left, spreads = _residual_function(frame, effect, variance)
     if effect.coordinate == "previous":
         # It acts where something moved: not in the first position.
         steps = np.column_stack([frame.hold.column(f"step_{axis}") for axis in "xyz"])
@@ -104,7 +104,7 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     )
 
 
-def _left(frame: Frame, effect: Learned, variance: float) -> tuple[Array, Array]:
+def _residual_function(frame: SessionFit, effect: Learned, variance: float) -> tuple[Array, Array]:
     """What each position leaves of h by its residuals, and the noise of that, (n, c) each."""
     n, conditions = frame.residuals.whitening.shape[:2]
     rows = function_rows(frame, effect.target, np.ones((n, 1, 1)))

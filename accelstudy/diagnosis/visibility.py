@@ -18,7 +18,7 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit, examine
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER, Hypothesis, cosines
 from accelstudy.effects import Effect, get_effect
 from accelstudy.schemes import Scheme
@@ -76,7 +76,7 @@ class Visibility:
         return get_effect(self.name).parameters[0].unit
 
 
-def signature_columns(frame: Frame, hypothesis: Hypothesis) -> Array:
+def signature_columns(frame: SessionFit, hypothesis: Hypothesis) -> Array:
     """Signature of each parameter of an effect in the residual space, (m, k)."""
     assert hypothesis.effect is not None
     return frame.residuals.project(frame.rows(hypothesis.effect))

@@ -163,14 +163,14 @@ def symbol(parameter: str) -> str:
     return _parameter(parameter)[1].symbol
 
 
-def shown(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:
+def in_shown_unit(values: ArrayLike, unit: str) -> tuple[NDArray[np.float64], str]:
     """Convert values in the unit of a table into what people see; the values and their unit."""
     if unit != recorded_unit("rad"):
         return np.asarray(values, dtype=float), unit_label(unit)
     return to_display(to_si(values, unit, "rad"), "rad"), display_unit("rad")
 
 
-def in_order(groups: Iterable[str]) -> list[str]:
+def sort_groups(groups: Iterable[str]) -> list[str]:
     """Groups in the order of `GROUPS`, those that are not in it last."""
     found = set(groups)
     return [name for name in GROUPS if name in found] + sorted(found - set(GROUPS))

@@ -16,14 +16,14 @@ from accelstudy.effects.base import (
     register,
 )
 from accelstudy.effects.hold_conditions import HoldConditions
-from accelstudy.effects.lag import Course, course_of_log
+from accelstudy.effects.lag import TemperatureCourse, course_of_log
 
 __all__ = [
-    "Course",
     "Effect",
     "HoldConditions",
     "Parameter",
     "Setting",
+    "TemperatureCourse",
     "course_of_log",
     "effect_names",
     "effects_without",

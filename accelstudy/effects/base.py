@@ -161,7 +161,7 @@ class Effect(WithSettings):
         """Shapes between two candidates, which were skipped because there are many positions."""
         return ()
 
-    def only(self, kept: tuple[int, ...]) -> Effect:
+    def with_parameters(self, kept: tuple[int, ...]) -> Effect:
         """Return the effect with some of its parameters; the others are zero."""
         return _part(type(self), kept)(**self.settings)  # type: ignore[arg-type]
 
@@ -262,7 +262,7 @@ def get_effect(spec: str) -> Effect:
     for name in wanted:
         if name not in names:
             raise UnknownNameError(f"parameter of the effect {effect.name!r}", name, names)
-    return effect.only(tuple(i for i, name in enumerate(names) if name in wanted))
+    return effect.with_parameters(tuple(i for i, name in enumerate(names) if name in wanted))
 
 
 def expressions(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
-from accelstudy.effects.lag import Course
+from accelstudy.effects.lag import TemperatureCourse
 
 REFERENCE_TEMPERATURE = 20.0
 """°C, at which the bias and the scale are what their own parameters say."""
@@ -50,7 +50,7 @@ class HoldConditions:
     step_y: NDArray[np.float64] | None = None
     step_z: NDArray[np.float64] | None = None
     order: NDArray[np.float64] | None = None
-    course: Course | None = None
+    course: TemperatureCourse | None = None
     full_range: float | None = None
 
     def take(self, positions: NDArray[np.int_]) -> HoldConditions:
@@ -102,7 +102,7 @@ class HoldConditions:
         assert course is not None
         return temperature + course.behind(time, tau)
 
-    def _whole_course(self) -> Course | None:
+    def _whole_course(self) -> TemperatureCourse | None:
         if self.course is not None or self.time is None or self.temperature is None:
             return self.course
-        return Course(np.asarray(self.time), np.asarray(self.temperature))
+        return TemperatureCourse(np.asarray(self.time), np.asarray(self.temperature))

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Course:
+class TemperatureCourse:
     """A temperature that is known at some times, linear between them and constant after the last.
 
     Attributes
@@ -47,8 +47,8 @@ class Course:
         return np.asarray((np.array(behind)[i] + rise[i]) * np.exp(-since / tau) - rise[i])
 
 
-def course_of_log(time: Array, temperature: Array) -> Course | None:
+def course_of_log(time: Array, temperature: Array) -> TemperatureCourse | None:
     """Course by the readings (n,) of a thermometer, one per second; None if there is none."""
     known = np.isfinite(temperature) & np.isfinite(time)
     _, kept = np.unique(np.floor(time[known]), return_index=True)
-    return Course(time[known][kept], temperature[known][kept]) if len(kept) else None
+    return TemperatureCourse(time[known][kept], temperature[known][kept]) if len(kept) else None

@@ -81,7 +81,9 @@ class Learned(Effect):
         """Return the kind with some coordinate and target, and as many functions as it needs."""
         coordinate = words.get("coordinate", cls.coordinate)
         target = words.get("target", cls.target)
-        return kind_of(coordinate, target, *_needed(coordinate, settings.get("length", LENGTH)))
+        return learned_kind(
+            coordinate, target, *_needed(coordinate, settings.get("length", LENGTH))
+        )
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -221,7 +223,7 @@ def _needed(coordinate: str, length: float) -> tuple[int, float]:
 
 
 @cache
-def kind_of(coordinate: str, target: str, count: int, edge: float) -> type[Learned]:
+def learned_kind(coordinate: str, target: str, count: int, edge: float) -> type[Learned]:
     """Kind of a coordinate, a target, and a number of functions, which vanish at an edge.
 
     Raises
@@ -268,4 +270,4 @@ def _takes(coordinate: str, unit: str) -> tuple[Setting, ...]:
     return (Setting("low", of, -1.0), Setting("high", of, 1.0), *lag, length, amplitude)
 
 
-unlisted(kind_of(Learned.coordinate, Learned.target, *_needed(Learned.coordinate, LENGTH)))
+unlisted(learned_kind(Learned.coordinate, Learned.target, *_needed(Learned.coordinate, LENGTH)))

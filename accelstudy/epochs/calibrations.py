@@ -24,9 +24,9 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate
-from accelstudy.campaign.calibration.applying import KNOWN, USUAL, SensorCalibration
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.sensor_calibration import KNOWN, USUAL, SensorCalibration
 from accelstudy.campaign.session import Campaign
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, new_figure, symbol
@@ -95,12 +95,12 @@ class Calibrations(Result):
 
     @property
     @abstractmethod
-    def said(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """What was found, in sentences; the verdict comes first."""
 
     @property
     @abstractmethod
-    def found(self) -> Sequence[tuple[str, ...]]:
+    def statements(self) -> Sequence[tuple[str, ...]]:
         """What each parameter does, in words."""
 
     def _write(self, folder: Path, figures: Mapping[str, Callable[[], Figure]]) -> None:
@@ -111,7 +111,7 @@ class Calibrations(Result):
             self.verdict,
             doc=self.content,
             h=self,
-            lines=self.said,
+            lines=self.sentences,
             figures=save_all(figures, folder / "figures"),
         )
         write_json(folder / self.kind.marker, self.content)
@@ -131,7 +131,7 @@ class Calibrations(Result):
         figure = new_figure(FULL, 12 + 36 * rows)
         panels = figure.subplots(rows, PANELS, sharex=True, squeeze=False).ravel()
         for k, (ax, parameter) in enumerate(zip(panels, self.parameters, strict=False)):
-            unit, found = parameter.unit, self.found[k]
+            unit, found = parameter.unit, self.statements[k]
             values, halves = (
                 to_display(v[:, k], unit) for v in (self.estimates, 1.96 * self.sigmas)
             )

@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.document import json_content
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.style import INK, group_colour, group_of, symbol
 from accelstudy.epochs.calibrations import (
     STATES,
@@ -28,7 +28,7 @@ from accelstudy.epochs.calibrations import (
 from accelstudy.epochs.congruence import LEVEL, Differences
 from accelstudy.files.outputs import COMPARISON
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 
 MIN_DIFFERENCE = 1e-12
 """rad, difference that is rounding alone."""
@@ -62,9 +62,11 @@ class Comparison(Calibrations):
         return Differences(self.estimates[1] - self.estimates[0], tuple(self.covariances), dof)
 
     @cached_property
-    def found(self) -> list[tuple[str, ...]]:
+    def statements(self) -> list[tuple[str, ...]]:
         """Whether each parameter changed, in words."""
-        return [("changed",) * (i in self.change.changed) for i in range(len(self.parameters))]
+        return [
+            ("changed",) * (i in self.change.fewest_changes) for i in range(len(self.parameters))
+        ]
 
     def instead_of(self, place: int) -> list[str]:
         """Names of parameters that may have changed instead of one that did."""
@@ -86,16 +88,16 @@ class Comparison(Calibrations):
         return np.sqrt([plain, by_chance])
 
     @cached_property
-    def said(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """Whether the sensor changed, in what, and what it matters; the verdict comes first."""
         changes = [
             change_text(
                 self.parameters[i], float(self.change.differences[i]), float(self.change.sigmas[i])
             )
-            for i in self.change.changed
+            for i in self.change.fewest_changes
         ]
         least = largest_texts(self.parameters, self.change.detectable)
-        return lines("epochs/wording.txt.j2", "comparison", self, changes, least)
+        return render_lines("epochs/wording.txt.j2", "comparison", self, changes, least)
 
     @cached_property
     def content(self) -> dict[str, Any]:
@@ -122,8 +124,8 @@ class Comparison(Calibrations):
                     "sigma": change.sigmas[i],
                     "detectable": change.detectable[i],
                     "unit": parameter.unit,
-                    "changed": i in change.changed,
-                    "or": self.instead_of(i) if i in change.changed else [],
+                    "changed": i in change.fewest_changes,
+                    "or": self.instead_of(i) if i in change.fewest_changes else [],
                 }
                 for i, parameter in enumerate(self.parameters)
             ],
@@ -137,7 +139,7 @@ class Comparison(Calibrations):
                 "pitch_by_chance_mgon": pitch_by_chance,
                 "max_tilt_gon": self.tilt_range / GON,
             },
-            "verdict": " ".join(self.said),
+            "verdict": " ".join(self.sentences),
         })  # fmt: skip
         return content
 
@@ -161,7 +163,7 @@ class Comparison(Calibrations):
         ax.axhline(0, color=INK, linewidth=0.8)
         for i, parameter in enumerate(self.parameters):
             colour = group_colour(group_of(parameter.name))
-            filled = colour if self.found[i] else "white"
+            filled = colour if self.statements[i] else "white"
             size = self.change.differences[i] / self.change.sigmas[i]
             ax.errorbar(i, size, 1.96, fmt="o", color=colour, markerfacecolor=filled, capsize=2.5)
         ax.set_xticks(range(len(self.parameters)), [symbol(p.name) for p in self.parameters])

@@ -104,7 +104,7 @@ class Differences:
         statistic = float(np.sum(squares)) / p
         parts = np.array([shares, 1 - shares])
         nu = dof_of_squares(parts.sum(axis=1), parts @ parts.T, self.dof)
-        return Test(statistic, (p, nu), float(tail(statistic, p, nu)))
+        return Test(statistic, (p, nu), float(f_tail(statistic, p, nu)))
 
     @cached_property
     def _split(self) -> tuple[Array, Array]:
@@ -119,7 +119,7 @@ class Differences:
         return (directions.T @ (self.differences / size)) ** 2, np.clip(shares, 0.0, 1.0)
 
     @cached_property
-    def changed(self) -> tuple[int, ...]:
+    def fewest_changes(self) -> tuple[int, ...]:
         """Fewest parameters that changed: all others are congruent, at one level for all.
 
         The one that explains most is added until the others are congruent. One that is no longer
@@ -135,7 +135,7 @@ class Differences:
 
     def instead_of(self, one: int) -> tuple[int, ...]:
         """Parameters that may have changed instead of one of `changed`."""
-        others = [i for i in range(len(self.differences)) if i not in self.changed]
+        others = [i for i in range(len(self.differences)) if i not in self.fewest_changes]
         kept = [[*(i for i in others if i != other), one] for other in others]
         tests = [self.of(sorted(each)).test for each in kept]
         return tuple(other for other, test in zip(others, tests, strict=True) if test.congruent)
@@ -224,7 +224,7 @@ def _ratios(dof: tuple[float, ...]) -> Array:
     return ratios
 
 
-def tail(statistic: float, p: int, nu: float) -> float:
+def f_tail(statistic: float, p: int, nu: float) -> float:
     """Probability of a larger F(p, ν), which is χ²/p where ν is infinite."""
     if np.isinf(nu):
         return float(stats.chi2.sf(p * statistic, p))

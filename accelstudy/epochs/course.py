@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize, stats
 
 from accelstudy.adjustment.random_effects import RandomEffects
-from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, noncentrality, tail
+from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, f_tail, noncentrality
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class Rate(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ParameterCourse:
     """A parameter over time.
 
     Attributes
@@ -160,7 +160,7 @@ class Course:
 
     def _exceeds(self, fit: RandomEffects, level: float) -> float:
         """Probability that noise alone leaves such squares."""
-        return tail(fit.squares(0.0) / fit.dof, fit.dof, self._other_dof(fit, level))
+        return f_tail(fit.squares(0.0) / fit.dof, fit.dof, self._other_dof(fit, level))
 
     def _other_dof(self, fit: RandomEffects, level: float) -> float:
         """Second degrees of freedom ν: squares of noise alone are f F(f, ν)."""

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.dates import read_date
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.units import GON, MGON, to_display
-from accelstudy.basics.wording import counted
-from accelstudy.campaign.calibration.applying import SensorCalibration
+from accelstudy.basics.wording import plural
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.style import FULL, group_colour, group_of
 from accelstudy.epochs.calibrations import (
     STATES,
@@ -28,11 +28,11 @@ from accelstudy.epochs.calibrations import (
     size_text,
 )
 from accelstudy.epochs.congruence import LEVEL
-from accelstudy.epochs.course import YEAR, Course
+from accelstudy.epochs.course import YEAR, ParameterCourse
 from accelstudy.epochs.interval import LINE_POINTS, SHOWN_YEARS, Interval, interval_figure
 from accelstudy.files.outputs import HISTORY
 from accelstudy.files.parquet import write_frame
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 
 MIN_CALIBRATIONS = 3
 """Calibrations of which a line leaves a degree of freedom."""
@@ -92,11 +92,11 @@ class History(Calibrations):
         self.name = self.sensor or self.calibrations[0].content["campaign"]
 
     @cached_property
-    def courses(self) -> tuple[Course, ...]:
+    def courses(self) -> tuple[ParameterCourse, ...]:
         """Each parameter over time."""
         years = [(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates]
         each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
-        return tuple(Course(np.array(years), *parameter, self.dof) for parameter in each)
+        return tuple(ParameterCourse(np.array(years), *parameter, self.dof) for parameter in each)
 
     @property
     def level(self) -> float:
@@ -104,20 +104,23 @@ class History(Calibrations):
         return LEVEL / len(self.parameters)
 
     @cached_property
-    def found(self) -> tuple[tuple[str, ...], ...]:
+    def statements(self) -> tuple[tuple[str, ...], ...]:
         """What each parameter does over time, in words, at one level for all."""
         return tuple(course.found(self.level) for course in self.courses)
 
     @cached_property
-    def said(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """What drifts and what scatters; the verdict comes first."""
-        each, level = list(zip(self.courses, self.parameters, self.found, strict=True)), self.level
+        each, level = (
+            list(zip(self.courses, self.parameters, self.statements, strict=True)),
+            self.level,
+        )
         drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
         least = (
             [course.detectable_rate(level) for course in self.courses],
             [course.detectable_scatter(level) for course in self.courses],
         )
-        return lines(
+        return render_lines(
             "epochs/wording.txt.j2",
             "history",
             self,
@@ -152,7 +155,7 @@ class History(Calibrations):
                 for one, date in zip(self.calibrations, self.dates, strict=True)
             ],
             "effects": [effect.spec for effect in self.model.effects],
-            "state": STATES[not any(self.found)],
+            "state": STATES[not any(self.statements)],
             "level": LEVEL,
             "parameters": [
                 {
@@ -178,7 +181,7 @@ class History(Calibrations):
                     },
                 }
                 for course, parameter, found in zip(
-                    self.courses, self.parameters, self.found, strict=True
+                    self.courses, self.parameters, self.statements, strict=True
                 )
             ],
             "interval": interval
@@ -190,7 +193,7 @@ class History(Calibrations):
                 "confidence": interval.confidence,
                 "errors": [{"years": t, "mgon": interval.error(t) / MGON} for t in SHOWN_YEARS],
             },
-            "verdict": " ".join(self.said),
+            "verdict": " ".join(self.sentences),
         }
 
     @cached_property
@@ -244,7 +247,7 @@ class History(Calibrations):
         half = to_display(course.rate.sigmas_95 * np.sqrt(variance), unit)
         seen = ax.get_ylim()
         ax.fill_between(between, line - half, line + half, color=colour, alpha=0.15, linewidth=0)
-        ax.plot(between, line, "-" if "drifts" in self.found[k] else ":", color=colour)
+        ax.plot(between, line, "-" if "drifts" in self.statements[k] else ":", color=colour)
         # The band of a few calibrations would dwarf them.
         ax.set_ylim(seen[0] - 0.3 * np.ptp(seen), seen[1] + 0.3 * np.ptp(seen))
         locator = AutoDateLocator(minticks=2, maxticks=5)  # type: ignore[no-untyped-call]
@@ -259,7 +262,7 @@ class History(Calibrations):
         ax.legend(ncols=4)
 
 
-def dated(
+def dates_of(
     calibrations: Sequence[SensorCalibration],
     dates: Sequence[str | datetime],
     names: Sequence[str],
@@ -279,8 +282,8 @@ def dated(
     """
     if dates and len(dates) != len(calibrations):
         raise InputError(
-            f"{key('dates')}: {counted(len(dates), 'date')} for "
-            f"{counted(len(calibrations), 'calibration')}; give one for each, in their order, as "
+            f"{key('dates')}: {plural(len(dates), 'date')} for "
+            f"{plural(len(calibrations), 'calibration')}; give one for each, in their order, as "
             "2026-03-01"
         )
     first: dict[bytes, str] = {}

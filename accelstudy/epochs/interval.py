@@ -91,7 +91,7 @@ class Interval:
         g, forces = last.gravity, cap_forces(self.tilt_range, ATTITUDES, last.gravity)
         hold, values = session_like(last, -forces / g).hold, last.parameters
         form = tilt_error(last.model, values, last.model, values, forces, g, hold).quadratic
-        at_once, per_year = self._drawn(np.einsum("auu->u", form))
+        at_once, per_year = self._draw(np.einsum("auu->u", form))
         first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
         return (
             np.einsum("kaw,kw->ka", first, at_once),
@@ -99,7 +99,7 @@ class Interval:
             np.einsum("kaw,kw->ka", second, per_year),
         )
 
-    def _drawn(self, weights: Array) -> tuple[Array, Array]:
+    def _draw(self, weights: Array) -> tuple[Array, Array]:
         """Error of the last calibration at once, and its growth per year, (DRAWS, u) each.
 
         Parameters

@@ -21,7 +21,7 @@ _PREFIX, _SUFFIX = ".accelstudy-", ".part"
 
 
 @dataclass(frozen=True)
-class Kind:
+class OutputKind:
     """What a command writes to a folder.
 
     Attributes
@@ -47,36 +47,40 @@ class Kind:
         return files
 
 
-BATCH_JOB = Kind(
+BATCH_JOB = OutputKind(
     "job of a batch",
     "status.json",
     ("calibration.json", "positions.parquet", "report.html"),
     ("figures", "campaign"),
 )
-DIAGNOSIS = Kind(
+DIAGNOSIS = OutputKind(
     "diagnosis",
     "diagnosis.json",
     ("calibration.json", "loop.parquet", "model.yaml", "positions.parquet", "report.html"),
     ("figures",),
 )
-CALIBRATION = Kind(
+CALIBRATION = OutputKind(
     "calibration", "calibration.json", ("positions.parquet", "report.html"), ("figures",)
 )
-CAMPAIGN = Kind(
+CAMPAIGN = OutputKind(
     "campaign",
     "campaign.yaml",
     ("positions.csv", "positions.parquet", "segmentation.svg", "segmentation.png"),
     replaced=False,
 )
-COMPARISON = Kind("comparison of calibrations", "comparison.json", ("report.html",), ("figures",))
-HISTORY = Kind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
-LOT = Kind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
+COMPARISON = OutputKind(
+    "comparison of calibrations", "comparison.json", ("report.html",), ("figures",)
+)
+HISTORY = OutputKind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
+LOT = OutputKind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
 _PLAN_FILES = ("plan.md", "positions.yaml", "study.yaml", "plan.svg", "plan.png")
-PLAN = Kind("plan", "plan.parquet", _PLAN_FILES)
+PLAN = OutputKind("plan", "plan.parquet", _PLAN_FILES)
 _TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
-SIMULATION = Kind("simulation", "simulation.json", tuple(f"{name}.parquet" for name in _TABLES))
-ADVICE = Kind("advice", "advice.json")
-STUDY = Kind(
+SIMULATION = OutputKind(
+    "simulation", "simulation.json", tuple(f"{name}.parquet" for name in _TABLES)
+)
+ADVICE = OutputKind("advice", "advice.json")
+STUDY = OutputKind(
     "study",
     "Snakefile",
     ("README.md", "config/config.yaml", "sensor.yaml"),
@@ -92,7 +96,7 @@ _WITH_MARKERS = (
 
 @contextmanager
 def result_folder(
-    out: str | Path, kind: Kind, inputs: Iterable[str | Path] = (), force: bool = False
+    out: str | Path, kind: OutputKind, inputs: Iterable[str | Path] = (), force: bool = False
 ) -> Iterator[Path]:
     """Yield a new folder to write to; its files are moved to `out` together if all went well.
 
@@ -257,7 +261,7 @@ def _check_apart(out: Path, inputs: Iterable[str | Path]) -> None:
             raise InputError(f"{out}: holds the input {source}; give another folder")
 
 
-def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
+def _check_folder(out: Path, kind: OutputKind, force: bool) -> bool:
     """Check that a folder may be written to; tell whether it is an earlier result of this kind."""
     if not out.is_dir():
         if out.exists():
@@ -279,7 +283,7 @@ def _check_folder(out: Path, kind: Kind, force: bool) -> bool:
     return earlier is kind
 
 
-def _publish(new: Path, out: Path, kind: Kind, is_earlier_result: bool) -> None:
+def _publish(new: Path, out: Path, kind: OutputKind, is_earlier_result: bool) -> None:
     """Move new files to `out`, in place of those of an earlier run."""
     if not out.is_dir():
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from accelstudy.basics.errors import InputError, printable_line, shown
+from accelstudy.basics.errors import InputError, brief, printable_line
 from accelstudy.basics.names import check_file_name
 from accelstudy.basics.wording import one_line
 
@@ -99,7 +99,7 @@ def check_version(content: object, path: str | Path) -> None:
     version = content.get("schema_version") if isinstance(content, Mapping) else None
     if isinstance(version, int) and version > 1:
         raise InputError(
-            f"{path}: schema_version: {shown(version)} is of a newer version of accelstudy; to "
+            f"{path}: schema_version: {brief(version)} is of a newer version of accelstudy; to "
             "read this file, get that version: pip install --upgrade accelstudy"
         )
 

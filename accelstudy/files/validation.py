@@ -23,7 +23,7 @@ from pydantic_core import ErrorDetails, core_schema
 
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import check_path_name
 from accelstudy.basics.plugins import load_plugins
 
@@ -49,32 +49,32 @@ Tilt = Annotated[float, Field(gt=0, lt=100), Number]
 Pitch = Annotated[float, Field(gt=-100, lt=100), Number]
 
 
-def within(range_: Range) -> tuple[Any, ...]:
+def bounds_of(range_: Range) -> tuple[Any, ...]:
     """Annotations that keep a number within a range, in the schema too."""
     ends = {"minimum": 0 if range_.zero else range_.least, "maximum": range_.most}
     finite = Field(json_schema_extra=dict(ends))
     return Number, AfterValidator(range_.check), finite
 
 
-Gravity = Annotated[float, *within(bounds.GRAVITY)]
-GravityError = Annotated[float, *within(bounds.GRAVITY_ERROR)]
-SigmaForce = Annotated[float, *within(bounds.SIGMA_FORCE)]
-SigmaGravity = Annotated[float, *within(bounds.SIGMA_GRAVITY)]
-SigmaAngle = Annotated[float, *within(bounds.SIGMA_ANGLE)]
-ParameterValue = Annotated[float, *within(bounds.PARAMETER)]
-ParameterSigma = Annotated[float, *within(bounds.SIGMA_PARAMETER)]
-Angle = Annotated[float, *within(bounds.ANGLE)]
-Temperature = Annotated[float, *within(bounds.TEMPERATURE)]
-Vibration = Annotated[float, *within(bounds.VIBRATION)]
-Interval = Annotated[float, *within(bounds.INTERVAL)]
-Duration = Annotated[float, *within(bounds.DURATION)]
-Rate = Annotated[float, *within(bounds.RATE)]
-Replicates = Annotated[int, *within(bounds.REPLICATES)]
-Sessions = Annotated[int, *within(bounds.SESSIONS)]
-Attitudes = Annotated[int, *within(bounds.ATTITUDES)]
-BaseSamples = Annotated[int, *within(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
-Resamples = Annotated[int, *within(bounds.RESAMPLES)]
-Seed = Annotated[int, *within(bounds.SEED)]
+Gravity = Annotated[float, *bounds_of(bounds.GRAVITY)]
+GravityError = Annotated[float, *bounds_of(bounds.GRAVITY_ERROR)]
+SigmaForce = Annotated[float, *bounds_of(bounds.SIGMA_FORCE)]
+SigmaGravity = Annotated[float, *bounds_of(bounds.SIGMA_GRAVITY)]
+SigmaAngle = Annotated[float, *bounds_of(bounds.SIGMA_ANGLE)]
+ParameterValue = Annotated[float, *bounds_of(bounds.PARAMETER)]
+ParameterSigma = Annotated[float, *bounds_of(bounds.SIGMA_PARAMETER)]
+Angle = Annotated[float, *bounds_of(bounds.ANGLE)]
+Temperature = Annotated[float, *bounds_of(bounds.TEMPERATURE)]
+Vibration = Annotated[float, *bounds_of(bounds.VIBRATION)]
+Interval = Annotated[float, *bounds_of(bounds.INTERVAL)]
+Duration = Annotated[float, *bounds_of(bounds.DURATION)]
+Rate = Annotated[float, *bounds_of(bounds.RATE)]
+Replicates = Annotated[int, *bounds_of(bounds.REPLICATES)]
+Sessions = Annotated[int, *bounds_of(bounds.SESSIONS)]
+Attitudes = Annotated[int, *bounds_of(bounds.ATTITUDES)]
+BaseSamples = Annotated[int, *bounds_of(bounds.BASE_SAMPLES), AfterValidator(_power_of_two)]
+Resamples = Annotated[int, *bounds_of(bounds.RESAMPLES)]
+Seed = Annotated[int, *bounds_of(bounds.SEED)]
 
 
 class _OneOrMore:
@@ -137,7 +137,7 @@ WORDS = {
 """What would be right, by the type of pydantic's error; two types have a text of their own."""
 
 
-class Block(BaseModel):
+class ConfigSection(BaseModel):
     """A part of the configuration; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
@@ -153,7 +153,7 @@ class Block(BaseModel):
         return content
 
 
-class Configuration(Block):
+class Configuration(ConfigSection):
     """A whole configuration, whose plug-ins are loaded before its other keys are read."""
 
     plugins: Annotated[
@@ -173,7 +173,7 @@ class Configuration(Block):
         return content
 
 
-def checked(
+def validate(
     model: type[Model],
     content: Mapping[str, Any],
     source: str | Path,
@@ -234,7 +234,7 @@ def _first_error(
         # Where several kinds of values are right, there is an error for each of them.
         wants = [_wanted(e) for e, p in zip(errors, places, strict=True) if p == place]
         wanted = " or ".join([wants[0], *(text.removeprefix("must be ") for text in wants[1:])])
-        value = "" if first["type"] == "missing" else f", not {shown(first['input'])}"
+        value = "" if first["type"] == "missing" else f", not {brief(first['input'])}"
         text = ": ".join(filter(None, [key, f"{wanted}{value}"]))
     others = len({*places} - {place})
     more = f" (and {others} more)" if others else ""

@@ -67,13 +67,13 @@ def lists(named: Any) -> dict[str, list[str]]:
 @contextmanager
 def job(snakemake: Any) -> Iterator[dict[str, Any]]:
     """Run the body of a rule's script; yields the provenance of its outputs."""
-    with logged(snakemake):
+    with script_log(snakemake):
         seed = snakemake.params.get("seed", snakemake.config.get("seed"))
         yield {"config_hash": config_hash(snakemake.config), "seed": seed}
 
 
 @contextmanager
-def logged(snakemake: Any) -> Iterator[None]:
+def script_log(snakemake: Any) -> Iterator[None]:
     """Run the body of a script of any workflow, with angles in the unit of its rule, if any."""
     gc.freeze()  # Python would look among all modules whenever it looks for cycles
     # On a full disk the log ends early, but the error of the job is still reported.

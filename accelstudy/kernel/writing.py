@@ -38,7 +38,7 @@ from accelstudy.kernel.lanes import (
 )
 from accelstudy.kernel.lanes import sqrt as root
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.made import kept_under
+from accelstudy.symbolic.formula_cache import kept_under
 from accelstudy.symbolic.tracing import Traced, symbols, traced
 
 NAME = "calibrate"

@@ -42,7 +42,7 @@ def usual_norm(forces: ArrayLike) -> float:
     return float(np.median(np.linalg.norm(forces, axis=1)))
 
 
-def wrapped(angle: ArrayLike) -> Array:
+def wrap_angle(angle: ArrayLike) -> Array:
     """Return the angles in [−π, π) that point the same way, in rad; arrays of any shape."""
     return np.asarray((np.asarray(angle, dtype=float) + np.pi) % (2 * np.pi) - np.pi)
 

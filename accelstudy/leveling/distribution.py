@@ -90,7 +90,7 @@ class Tilt:
         factor, freedom = self._chi_squared
         return np.sqrt(factor * scipy.special.chdtri(freedom, 1 - probability))
 
-    def of_both(self, probability: float) -> float:
+    def quantile_of_both(self, probability: float) -> float:
         """Error that roll and pitch both stay below in this share of the calibrations, rad.
 
         The mean squares of the two angles are taken to be independent: their correlation is 0.1 at

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.effects import HoldConditions
-from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrapped
+from accelstudy.leveling.angles import angles_of, roll_pitch, tilt_slope, wrap_angle
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -129,7 +129,7 @@ def tilt_error(
     reference = np.where(estimated.stays, reference, 0.0)
     output = simulated.sense(f_b, np.where(simulated.stays, truth, 0.0), g, hold)
     corrected = estimated.correct(output, reference, g, hold)
-    offset = wrapped(angles_of(corrected) - angles_of(f_b))
+    offset = wrap_angle(angles_of(corrected) - angles_of(f_b))
     slope = tilt_slope(estimated, reference, output, corrected, g, hold)
     slope = np.where(estimated.stays, slope, 0.0)
     return TiltError(

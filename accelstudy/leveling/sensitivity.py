@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.leveling.angles import angles_of, specific_force, wrapped
+from accelstudy.leveling.angles import angles_of, specific_force, wrap_angle
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -123,7 +123,7 @@ def _total_effects(values: Array, shares: Array) -> tuple[Array, Array]:
     return total, Z95 * resampled.std(axis=1, ddof=1)
 
 
-def leveled(
+def sample_leveling(
     attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
 ) -> Callable[[Array], Array]:
     """Return leveling near an attitude as a function of its uncertain inputs.
@@ -145,7 +145,7 @@ def leveled(
         force = inputs[:, :3]
         if model is not None:
             force = model.correct(force[:, None, :], inputs[:, 3:], g)[:, 0]
-        return wrapped(angles_of(force) - attitude)
+        return wrap_angle(angles_of(force) - attitude)
 
     return offset
 
@@ -189,7 +189,7 @@ def leveling_sensitivity(
         f_s = np.array(specific_force(attitude[0], attitude[1], g))
         if model is not None:
             f_s = model.sense(f_s[None], x, g)[0]
-        of_inputs, mean = leveled(attitude, model, g), np.concatenate([f_s, x])
+        of_inputs, mean = sample_leveling(attitude, model, g), np.concatenate([f_s, x])
         effects.append(total_effects(of_inputs, mean, sigma, base_samples, resamples, seed))
     total, ci95, sd = (np.array(each) for each in zip(*effects, strict=True))
     return effects_table(roll_gon, pitch_gon, names, sd, {"total_effect": total, "ci95": ci95})

@@ -100,7 +100,7 @@ def leveling_shares(
     return effects_table(roll_gon, pitch_gon, names, np.sqrt(variance), effects)
 
 
-def overtaken(table: pd.DataFrame) -> pd.DataFrame:
+def order_changes(table: pd.DataFrame) -> pd.DataFrame:
     """Find the pairs of inputs whose order the correlations change.
 
     An input overtakes another if its Shapley effect is the larger of the two and its total effect

@@ -19,7 +19,7 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.lots.noise import SensorNoise
+from accelstudy.lots.noise import NoisePrior
 from accelstudy.lots.sizes import ShapeEquations
 from accelstudy.sensors.sensor import SensorModel
 
@@ -90,7 +90,7 @@ class Sensor:
     model: SensorModel | None
     approach: Approach
     seed: int = 1
-    noise: SensorNoise | None = None
+    noise: NoisePrior | None = None
 
     @property
     def measured(self) -> Campaign:
@@ -131,11 +131,13 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
     logs |= {one.names[0]: one.log_weight for one in case.noises}
     if noise is not None and noise.said:
         doubted = Level((1.0,), (RULES.freedom_doubted,), known=True)
-        logs[LEVEL_OF_NOISE] = float(Evidence(doubted, evidence.redundancy).of_noise(square)[0])
+        logs[LEVEL_OF_NOISE] = float(
+            Evidence(doubted, evidence.redundancy).noise_density(square)[0]
+        )
     if unknown is not None:
         logs |= {
             f"{UNKNOWN}({coordinate} → {target})": log
-            for (coordinate, target), log in unknown.by_place(evidence, z).items()
+            for (coordinate, target), log in unknown.place_densities_of(evidence, z).items()
         }
     pairs = {}
     for pair in weigh_sets(singles.shapes, residuals, evidence, most=2):
@@ -169,7 +171,7 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
     )
 
 
-def _by_chance(problem: Problem, chance: Chance, noise: SensorNoise | None) -> Array:
+def _by_chance(problem: Problem, chance: Chance, noise: NoisePrior | None) -> Array:
     """Log odds of what is tested in noise alone, whose level is that of a sensor of the lot."""
     field, evidence = problem.field, problem.evidence
     of_levels = np.random.SeedSequence(chance.seed.entropy, spawn_key=(*chance.seed.spawn_key, 1))
@@ -179,7 +181,7 @@ def _by_chance(problem: Problem, chance: Chance, noise: SensorNoise | None) -> A
         if noise is not None:
             half = noise.freedom / 2
             errors = errors * np.sqrt(half / rng.gamma(half, size=(len(errors), 1)))
-        return field.odds(evidence, field.seen(errors))
+        return field.odds(evidence, field.project(errors))
 
     if not field.names:
         return np.zeros((DRAWS, 0))
@@ -211,7 +213,7 @@ def _same(sensors: Iterable[SensorEvidence], one: str, other: str) -> bool:
     return 2 * alike > len(shown)
 
 
-def shown(name: str) -> str:
+def name_words(name: str) -> str:
     """Name in words."""
     if not name.startswith(UNKNOWN):
         return words(name)

@@ -22,7 +22,7 @@ from accelstudy.diagnosis.decision.problem import BaseFit
 from accelstudy.diagnosis.evidence.noise_tests import NOISES
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
-from accelstudy.lots.noise import SensorNoise, noises_of_lot
+from accelstudy.lots.noise import NoisePrior, noises_of_lot
 from accelstudy.lots.passes import LEVEL, ODD, LotEffect, Mapped, Pass, SensorState
 from accelstudy.lots.sizes import Names
 from accelstudy.sensors.models import compose, composition_name
@@ -177,7 +177,7 @@ def _again(passes: Sequence[Pass], whole: SensorModel, mapped: Mapped) -> Pass |
     ]
 
     def fitted(i: int, sigma: float | None = None) -> BaseFit | None:
-        noise = None if sigma is None else SensorNoise(sigma, RULES.freedom_given)
+        noise = None if sigma is None else NoisePrior(sigma, RULES.freedom_given)
         with suppress(InputError):
             return replace(own[i], noise=noise).fit()
         return None

@@ -11,7 +11,7 @@ import numpy as np
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
-from accelstudy.lots.noise import LEAST_SIGMA, SensorNoise
+from accelstudy.lots.noise import LEAST_SIGMA, NoisePrior
 
 COLUMNS = ("angles", "yaw", "time", "temperature", "vibration")
 """What a position has beside its forces."""
@@ -54,7 +54,7 @@ def mean_sensor(sensors: Sequence[Sensor], said: Sequence[SensorEvidence]) -> Se
     mean = replace(
         first, name="mean of the lot", sd=None, n_samples=None, sigma_force=sigma, **columns
     )
-    noise = SensorNoise(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
+    noise = NoisePrior(sigma, min(float(freedom), RULES.freedom_given), doubt=0.0)
     return replace(sensors[0], campaign=mean, noise=noise)
 
 

@@ -46,7 +46,7 @@ STATED, WITHIN, NOTHING = "stated", "within holds", "nothing"
 
 
 @dataclass(frozen=True)
-class SensorNoise:
+class NoisePrior:
     """The noise of a sensor by that of the lot: its variance is σ² times inverse-gamma(ν/2, ν/2).
 
     Attributes
@@ -134,7 +134,7 @@ class Agreement:
 
 def noises_of_lot(
     fits: Sequence[BaseFit | None], refit: Callable[[int, float], BaseFit | None]
-) -> list[SensorNoise | None]:
+) -> list[NoisePrior | None]:
     """Noise of each sensor, by what all those tell whose campaigns say it in the same way.
 
     Parameters
@@ -147,7 +147,7 @@ def noises_of_lot(
     list
         None for sensors that speak for themselves, as their noise has nothing in common.
     """
-    noises: list[SensorNoise | None] = [None] * len(fits)
+    noises: list[NoisePrior | None] = [None] * len(fits)
     for source in (STATED, WITHIN, NOTHING):
         group = {i: fit for i, fit in enumerate(fits) if fit and stated_sigma(fit)[0] == source}
         if len(group) < MIN_SENSORS:
@@ -156,7 +156,7 @@ def noises_of_lot(
         if agreement.freedom > RULES.freedom_doubted:
             for i, u in zip(group, said.tolist(), strict=True):
                 sigma = agreement.factor * u
-                noises[i] = SensorNoise(sigma, agreement.freedom, said=source != NOTHING)
+                noises[i] = NoisePrior(sigma, agreement.freedom, said=source != NOTHING)
     return noises
 
 

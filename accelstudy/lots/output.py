@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import accelstudy
 from accelstudy.approaches import Approach, get_approach
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show
@@ -57,12 +57,12 @@ from accelstudy.leveling.error import (
     holds_in_use,
     tilt_error,
 )
-from accelstudy.lots.evidence import shown
+from accelstudy.lots.evidence import name_words
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
 from accelstudy.lots.parameters import TypeParameter
 from accelstudy.lots.passes import LEVEL, LotEffect
 from accelstudy.lots.type_file import write_type
-from accelstudy.pages import lines, write_page
+from accelstudy.pages import render_lines, write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.models import compose, get_model
 from accelstudy.sensors.sensor import SensorModel
@@ -228,16 +228,16 @@ class Lot(Result):
         return self.diagnosis.state
 
     @cached_property
-    def said(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """What the model lacks, what it is worth, which sensors are odd; the verdict is first."""
         d = self.diagnosis
         first = d.effects[0].names if d.effects else ()
-        return lines(
+        return render_lines(
             "lots/wording.txt.j2",
             "verdict",
             self,
             d,
-            lambda names: comma_list([*map(shown, names)], "or"),
+            lambda names: comma_list([*map(name_words, names)], "or"),
             closest=[_either(names[:3]) for names in d.close],
             alternatives=[
                 f"{_either(names[:3])} ({probability(p)})" for names, p in d.alternatives
@@ -287,7 +287,7 @@ class Lot(Result):
                 "pitch_mgon": float(tilt[1] / MGON),
                 "max_tilt_gon": MAX_TILT_GON,
             },
-            "verdict": " ".join(self.said),
+            "verdict": " ".join(self.sentences),
         })  # fmt: skip
         return content
 
@@ -323,7 +323,7 @@ class Lot(Result):
         steps = []
         if write_type(self, folder):
             of_type = place / TYPE_FILE
-            command = suggested.calibrate("CAMPAIGN", of_type, self.approach.name, of_type)
+            command = suggestions.calibrate("CAMPAIGN", of_type, self.approach.name, of_type)
             steps.append(("Calibrate the next sensor of the type, with what these tell", command))
         write_page(
             folder / "report.html",
@@ -331,7 +331,7 @@ class Lot(Result):
             self.verdict,
             doc=self.content,
             state=self.state,
-            lines=self.said,
+            lines=self.sentences,
             either=_either,
             figures=save_all({"sensors": self.figure}, folder / "figures"),
             next_steps=steps,
@@ -404,7 +404,7 @@ def own_names(given: Sequence[str], others: Collection[str]) -> list[str]:
 
 def _either(names: Sequence[str]) -> str:
     """Names that mean the same, in words."""
-    return " or ".join(map(shown, names))
+    return " or ".join(map(name_words, names))
 
 
 def _parameters_of(spec: str | None) -> Sequence[str]:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import Effect, get_effect
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Equations(NamedTuple):
     squares: Array
 
     @classmethod
-    def of(cls, frame: Frame, columns: Array) -> Equations:
+    def of(cls, frame: SessionFit, columns: Array) -> Equations:
         """Equations of derivatives (m, s, k), whitened, before the model is estimated."""
         residuals = frame.residuals
         d = residuals.project(columns.reshape(len(columns), -1)).reshape(columns.shape)
@@ -114,9 +114,9 @@ class ShapeEquations(NamedTuple):
     each: Equations
 
     @classmethod
-    def of(cls, frame: Frame, effects: Sequence[Effect], variance: float) -> ShapeEquations:
+    def of(cls, frame: SessionFit, effects: Sequence[Effect], variance: float) -> ShapeEquations:
         """Equations of shapes of an effect, by a campaign with this variance of unit weight."""
-        columns = frame.residuals.whitened(frame.signatures(effects))
+        columns = frame.residuals.whiten(frame.signatures(effects))
         each = Equations.of(frame, columns.reshape(len(columns), len(effects), -1))
         return cls(
             tuple(effect.spec for effect in effects),
@@ -157,7 +157,7 @@ def sensor_equations(sensor: Sensor, specs: Sequence[str]) -> SensorEquations:
     if sensor.model is None:
         k = sum(len(effect.parameters) for effect in effects)
         return SensorEquations(Equations(np.zeros((k, k)), np.zeros(k), np.zeros(k)))
-    frame = Frame.of(sensor.fit().solution)
+    frame = SessionFit.of(sensor.fit().solution)
     residuals, columns = frame.residuals, []
     for effect in effects:
         try:
@@ -197,7 +197,7 @@ def weigh_pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
     redundancy = sum(each.redundancy for each in used)
     evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), redundancy)
     square = sum(each.square for each in used)
-    nothing = float(evidence.of_noise(square)[0])
+    nothing = float(evidence.noise_density(square)[0])
     joint = {}
     for name in sorted({name for each in used for name in each.shown}):
         shown, logs = [each.shown[name] for each in used if name in each.shown], {}
@@ -209,7 +209,7 @@ def weigh_pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
             directions, values = pooled.visible()
             if dim := len(values):
                 part = float(np.sum((pooled.right @ directions) ** 2 / values))
-                logs[spec] = float(evidence.of_spaces(np.array([part]), [dim], square)[0])
+                logs[spec] = float(evidence.spaces_density(np.array([part]), [dim], square)[0])
         if logs:
             odds = float(log_mean(np.array([*logs.values()]))) - nothing
             joint[name] = PooledEffect(odds, max(logs, key=lambda spec: logs[spec]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from accelstudy.basics.plugins import as_a_key
+from accelstudy.basics.plugins import file_key
 from accelstudy.campaign.sensor_type import TYPE_FILE, TypeFile, TypicalParameter
 from accelstudy.data_sheets import DataSheet
 from accelstudy.files.outputs import whole_file
@@ -56,7 +56,7 @@ def write_type(lot: Lot, folder: Path) -> bool:
         if name in wanted
     }
     content = {
-        **as_a_key(),
+        **file_key(),
         **_sheet(lot, parameters).content,
         **TypeFile(
             schema_version=1,

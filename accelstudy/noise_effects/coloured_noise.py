@@ -12,12 +12,12 @@ from accelstudy.effects import HoldConditions
 from accelstudy.noise_effects.base import Array, NoiseEffect, register
 
 
-def memory(lag: ArrayLike, tau: float) -> Array:
+def autocorrelation(lag: ArrayLike, tau: float) -> Array:
     """Autocorrelation φ = exp(−Δt/τ) of the process over lags; 1 where τ is infinite."""
     return np.asarray(np.exp(-np.asarray(lag, dtype=float) / tau))
 
 
-def renewed(phi: Array) -> Array:
+def innovation_variance(phi: Array) -> Array:
     """Variance of the new part that keeps a process of autocorrelation φ stationary."""
     return np.asarray(1 - phi**2)
 
@@ -47,7 +47,9 @@ class ColouredNoise(NoiseEffect):
         share, tau = self.settings["share"], self.settings["tau"]
         time = np.arange(float(noise.shape[1])) if hold.time is None else hold.time
         coloured = rng.standard_normal(noise.shape)
-        lasting = memory(np.diff(time), tau)
-        for k, (phi, new) in enumerate(zip(lasting, np.sqrt(renewed(lasting)), strict=True), 1):
+        lasting = autocorrelation(np.diff(time), tau)
+        for k, (phi, new) in enumerate(
+            zip(lasting, np.sqrt(innovation_variance(lasting)), strict=True), 1
+        ):
             coloured[:, k] = phi * coloured[:, k - 1] + new * coloured[:, k]
         return noise + sigma * math.sqrt(share / (1 - share)) * coloured

@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Undefined
 from accelstudy.basics import units, wording
 from accelstudy.basics.progress import failure
 from accelstudy.files.outputs import whole_file
-from accelstudy.pages.glossary import explained
+from accelstudy.pages.glossary import explain_terms
 from accelstudy.sensors.frames import axes_note
 
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")  # no page may have them
@@ -41,7 +41,7 @@ BADGES = {
     "slip in the paper": ("! slip in the paper", "noise"),
 }
 """Word and colour class of each verdict; none rests on the colour alone."""
-WORDS = ("amount", "counted", "number", "p_value", "short_list", "words")
+WORDS = ("amount", "plural", "number", "p_value", "short_list", "words")
 """Functions of `accelstudy.basics.wording` that templates use as filters of the same name."""
 
 
@@ -63,7 +63,7 @@ def render(template: str, **content: Any) -> str:
         "attitude_unit": units.attitude_unit(),
         "angle_note": units.angle_note(),
     }
-    page = explained(_environment(True).get_template(template).render(of_angles | content))
+    page = explain_terms(_environment(True).get_template(template).render(of_angles | content))
     return _CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode("ascii"), page)
 
 
@@ -88,12 +88,12 @@ def write_page(path: Path, template: str, fallback: str, **content: Any) -> None
         part.write_text(page, encoding="utf-8")
 
 
-def text(template: str, **content: Any) -> str:
+def render_text(template: str, **content: Any) -> str:
     """Render a file of plain text."""
     return _environment(False).get_template(template).render(content) + "\n"
 
 
-def lines(template: str, part: str, *content: Any, **named: Any) -> list[str]:
+def render_lines(template: str, part: str, *content: Any, **named: Any) -> list[str]:
     """Say something in plain text, one sentence or row a line.
 
     Parameters

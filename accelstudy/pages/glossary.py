@@ -64,7 +64,7 @@ _WORD = re.compile(
 _APART = re.compile(r"(<(svg|style|script|select|title|pre|code|a)\b.*?</\2>|<[^>]*>)", re.DOTALL)
 
 
-def explained(page: str) -> str:
+def explain_terms(page: str) -> str:
     """Explain the terms of a page: at their first use by hovering, and all of them at its foot.
 
     Figures, links and commands stay unchanged. A page without the mark `FOOT` gets no list.

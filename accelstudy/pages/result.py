@@ -8,10 +8,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from accelstudy.basics.given import path_of
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL, MM, STYLE
-from accelstudy.files.outputs import Kind, result_folder
+from accelstudy.files.outputs import OutputKind, result_folder
 from accelstudy.pages.notebook import notebook_html
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Result(ABC):
     """
 
     name: str
-    kind: ClassVar[Kind]
+    kind: ClassVar[OutputKind]
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
     size = FULL, 62.0

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from accelstudy.basics.progress import track
-from accelstudy.planning.candidates import Candidate, by_time, candidates
-from accelstudy.planning.optimised import Kind, cheapest
+from accelstudy.planning.best_positions import CalibrationKind, cheapest
+from accelstudy.planning.candidates import Candidate, candidates, sort_by_time
 from accelstudy.planning.question import ROBOT, Question
-from accelstudy.planning.simulated import simulate, study_of
+from accelstudy.planning.simulated import simulate_candidates, study_of
 
 MAX_SHOWN = 8
 """Candidates in the table."""
@@ -50,7 +50,7 @@ class Answer:
     instead: Candidate | None = None
 
     @property
-    def checked(self) -> list[Candidate]:
+    def simulated(self) -> list[Candidate]:
         """Candidates in the table that are simulated, the recommended one first.
 
         That is by hand if that reaches the target, else with the robot.
@@ -62,7 +62,7 @@ class Answer:
     @property
     def first(self) -> Candidate:
         """The recommended candidate."""
-        return self.checked[0]
+        return self.simulated[0]
 
     def best(self, equipment: str = "") -> Candidate | None:
         """The most accurate candidate, of all or with one equipment, however long it takes."""
@@ -72,17 +72,17 @@ class Answer:
     @property
     def study(self) -> dict[str, object]:
         """Configuration of the study whose cells are the simulated candidates."""
-        return study_of(self.question, self.checked, self.seed, self.replicates)
+        return study_of(self.question, self.simulated, self.seed, self.replicates)
 
 
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
     compared = _with_most_positions(question, candidates(question))
-    plan = Answer(question, seed, replicates, compared, beside=_beside(question))
+    plan = Answer(question, seed, replicates, compared, beside=_with_calibrated_sensor(question))
     kinds: dict[tuple[str, str], list[Candidate]] = {}
     for c in plan.compared:
         kinds.setdefault((c.equipment.name, c.model.name), []).append(c)
-    quickest = by_time(filter(None, (cheapest(question, kind) for kind in kinds.values())))
+    quickest = sort_by_time(filter(None, (cheapest(question, kind) for kind in kinds.values())))
     # The first of each equipment comes before all others.
     front = {c.equipment.name: c for c in reversed(quickest)}.values()
     in_order = sorted(quickest, key=lambda c: c not in front)
@@ -92,13 +92,13 @@ def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
         new = candidate.equipment not in checked
         if len(checked) >= MAX_SIMULATED and not new:
             ranked.append(candidate)
-        elif good := _confirmed(plan, candidate, and_no_fewer=new):
+        elif good := _confirm(plan, candidate, and_no_fewer=new):
             ranked.append(good)
     if not any(c.simulated for c in ranked):
         return replace(plan, instead=_with_a_robot(question))
     known = [next((r for r in ranked if r == c), c) for c in plan.compared]
     known += [r for r in ranked if r not in known]
-    plan = replace(plan, compared=known, ranked=_shown(ranked))
+    plan = replace(plan, compared=known, ranked=_table_rows(ranked))
     return replace(plan, stricter=_stricter(plan))
 
 
@@ -116,14 +116,14 @@ def _with_most_positions(question: Question, known: Sequence[Candidate]) -> list
         possible = [c for c in known if c.equipment == equipment]
         best = _most_accurate(question, possible)
         if best is not None and not any(question.reached_by(c.tilt) for c in possible):
-            kind = Kind.of(question, best)
+            kind = CalibrationKind.of(question, best)
             more.append(kind.best(kind.most))
     return [*known, *filter(None, more)]
 
 
-def _shown(ranked: list[Candidate]) -> list[Candidate]:
+def _table_rows(ranked: list[Candidate]) -> list[Candidate]:
     """Rows of the table, by time: the simulated candidates, and the quickest of the others."""
-    ranked = by_time(ranked)
+    ranked = sort_by_time(ranked)
     others = [c for c in ranked if c.simulated is None]
     left_out = others[max(0, MAX_SHOWN - len(ranked) + len(others)) :]
     return [c for c in ranked if c not in left_out]
@@ -137,7 +137,7 @@ def _with_a_robot(question: Question) -> Candidate | None:
     return cheapest(robot, candidates(robot))
 
 
-def _beside(question: Question) -> Candidate | None:
+def _with_calibrated_sensor(question: Question) -> Candidate | None:
     """Calibration with a sensor beside it, by linear theory; see `Answer`."""
     if question.beside is None:
         return None
@@ -152,10 +152,10 @@ def _stricter(plan: Answer) -> Candidate | None:
     same = replace(plan.question, equipment=(plan.first.equipment,), confidence=other)
     alike = [c for c in plan.compared if c.equipment in same.equipment]
     stricter = cheapest(same, _with_most_positions(same, alike))
-    return stricter and _confirmed(replace(plan, question=same), stricter)
+    return stricter and _confirm(replace(plan, question=same), stricter)
 
 
-def _confirmed(plan: Answer, candidate: Candidate, and_no_fewer: bool = True) -> Candidate | None:
+def _confirm(plan: Answer, candidate: Candidate, and_no_fewer: bool = True) -> Candidate | None:
     """The candidate, or one with a few more positions, that reaches the target in simulation.
 
     Parameters
@@ -170,7 +170,7 @@ def _confirmed(plan: Answer, candidate: Candidate, and_no_fewer: bool = True) ->
         if tried is None:
             break
         config = study_of(question, [tried], plan.seed, plan.replicates)
-        (simulated,) = simulate(question, config)
+        (simulated,) = simulate_candidates(question, config)
         if question.accuracy(simulated) <= question.target:
             reached = replace(tried, simulated=simulated)
             if missed is not None or not and_no_fewer:
@@ -181,5 +181,5 @@ def _confirmed(plan: Answer, candidate: Candidate, and_no_fewer: bool = True) ->
             if reached is not None:
                 break
             n += 1
-        tried = Kind.of(question, candidate).best(n)
+        tried = CalibrationKind.of(question, candidate).best(n)
     return None if reached is None else replace(reached, fewer=missed)

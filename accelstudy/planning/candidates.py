@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.approaches import get_approach
-from accelstudy.basics.given import tidy
+from accelstudy.basics.arguments import tidy
 from accelstudy.basics.progress import track
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.information import Information, position_rows
@@ -28,7 +28,7 @@ from accelstudy.simulation.hold_plan import HoldPlan
 from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
-    from accelstudy.planning.simulated import Simulated
+    from accelstudy.planning.simulated import SimulatedTilt
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ ROTATIONS = {"cross_axis_misalignment", "mounting_rotation"}
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
-positions are needed; `accelstudy.planning.optimised` seeks the fewest."""
+positions are needed; `accelstudy.planning.best_positions` seeks the fewest."""
 LEAST_REDUNDANCY = 0.25
 """Least share of redundant conditions; with fewer a wrong position would not be noticed."""
 
@@ -73,9 +73,9 @@ class Candidate:
     redundancy : int
     request : Request that finds its positions again, as `accelstudy design` does; None of a scheme
         that has a name
-    simulated : Simulated or None
-    fewer : Simulated or None, of the best positions of which there is one less, and which miss the
-        target
+    simulated : SimulatedTilt or None
+    fewer : SimulatedTilt or None, of the best positions of which there is one less, and which miss
+        the target
     """
 
     equipment: Equipment
@@ -86,8 +86,8 @@ class Candidate:
     tilt: Tilt = field(compare=False)
     redundancy: int
     request: Request | None = None
-    simulated: Simulated | None = field(default=None, compare=False)
-    fewer: Simulated | None = field(default=None, compare=False)
+    simulated: SimulatedTilt | None = field(default=None, compare=False)
+    fewer: SimulatedTilt | None = field(default=None, compare=False)
 
     @property
     def seconds(self) -> float:
@@ -95,7 +95,7 @@ class Candidate:
         return self.equipment.seconds(self.scheme.n_positions, self.hold)
 
 
-def by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
+def sort_by_time(unsorted: Iterable[Candidate]) -> list[Candidate]:
     """Candidates by the time they take, and by what they leave after it."""
     return sorted(unsorted, key=lambda c: (c.seconds, c.tilt.rms.max(), c.model.n_parameters))
 
@@ -119,7 +119,7 @@ def shortest(question: Question) -> Candidate | None:
     free = replace(question, most_seconds=math.inf, most_positions=SIZES[-1])
     first: dict[str, Candidate] = {}
     for scheme in schemes_for(free.most_positions, free.schemes):
-        for candidate in by_time(in_scheme(free, scheme)):
+        for candidate in sort_by_time(in_scheme(free, scheme)):
             first.setdefault(candidate.equipment.name, candidate)
         if len(first) == len(question.equipment):
             break
@@ -202,7 +202,7 @@ def information_of(
     rows = position_rows(model, approach, noise, directions, hold=hold, errors=errors)
     shared = rows.shape[-1] - model.n_parameters
     rows = np.roll(rows, shared, axis=-1)  # errors of the reference come first
-    return Information.of(rows, np.eye(shared, rows.shape[-1])).beside(shared)
+    return Information.of(rows, np.eye(shared, rows.shape[-1])).marginal(shared)
 
 
 def tilt_of(

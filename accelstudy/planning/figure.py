@@ -15,7 +15,7 @@ from accelstudy.drawing.style import (
     log_ticks,
 )
 from accelstudy.planning.answer import Answer
-from accelstudy.planning.candidates import by_time
+from accelstudy.planning.candidates import sort_by_time
 
 LABELS = {"gravity": "by hand, gravity alone", "robot": "with a robot"}
 IN_SIGHT = 8.0
@@ -25,7 +25,7 @@ IN_SIGHT = 8.0
 def draw_plan(ax: Axes, answer: Answer) -> None:
     """Draw all candidates, the front of the best, and the simulated candidates of the table."""
     question, target = answer.question, float(to_display(answer.question.target, "rad"))
-    share, ordered = question.confidence, by_time(answer.compared)
+    share, ordered = question.confidence, sort_by_time(answer.compared)
     left = to_display(np.array([question.accuracy(c.tilt) for c in ordered]), "rad")
     minutes = np.array([c.seconds / 60 for c in ordered])
     for equipment in question.equipment:

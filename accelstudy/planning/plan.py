@@ -11,11 +11,11 @@ import numpy as np
 import yaml
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.plugins import as_a_key
+from accelstudy.basics.plugins import file_key
 from accelstudy.basics.progress import begin, say, show
-from accelstudy.basics.suggested import study_again
+from accelstudy.basics.suggestions import study_again
 from accelstudy.basics.units import MGON
-from accelstudy.data_sheets import of_sigma
+from accelstudy.data_sheets import sheet_of_sigma
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
 from accelstudy.leveling.distribution import NOISE
@@ -65,7 +65,7 @@ class Plan(Result):
         if (sensor is None) == (sigma is None):
             both = ", not both" if sensor else ""
             raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
-        sheet = question.get_sensor(sensor) if sigma is None else of_sigma(sigma)
+        sheet = question.get_sensor(sensor) if sigma is None else sheet_of_sigma(sigma)
         beside = None
         if given["reference"] is not None:
             planned = question.planned_reference(str(given["reference"]), sheet)
@@ -151,7 +151,7 @@ class Plan(Result):
         provenance = {"config_hash": None, "seed": self.answer.seed}
         write_table(folder / "plan.parquet", self.compared, provenance)
         head = STUDY_HEAD.format(command=study_again(place / "study.yaml"))
-        study = {**as_a_key(), **self.answer.study}
+        study = {**file_key(), **self.answer.study}
         content = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
         (folder / "study.yaml").write_text(head + content, encoding="utf-8")
         (folder / "plan.md").write_text(self._page(), encoding="utf-8")
@@ -212,7 +212,7 @@ def _row(answer: Answer, c: Candidate) -> dict[str, Any]:
     found, of_both = dict.fromkeys(("rms", "rms_error", "rms_q95"), np.full(2, np.nan)), np.nan
     if c.simulated is not None:
         values = c.simulated.rms, c.simulated.error, c.simulated.quantile(0.95)
-        found, of_both = dict(zip(found, values, strict=True)), c.simulated.of_both(0.95)
+        found, of_both = dict(zip(found, values, strict=True)), c.simulated.quantile_of_both(0.95)
     return {
         "equipment": c.equipment.name,
         "model": c.model.name,

@@ -21,7 +21,7 @@ from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
-    from accelstudy.planning.simulated import Simulated
+    from accelstudy.planning.simulated import SimulatedTilt
 
 HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
@@ -141,11 +141,11 @@ class Question:
         """Whether the sensor is assumed to be linear."""
         return "nonlinearity" in self.sheet.assumed
 
-    def accuracy(self, tilt: Tilt | Simulated) -> float:
+    def accuracy(self, tilt: Tilt | SimulatedTilt) -> float:
         """Tilt accuracy by the measure that is asked for, rad."""
         if self.confidence is None:
             return float(tilt.rms.max())
-        return tilt.of_both(self.confidence)
+        return tilt.quantile_of_both(self.confidence)
 
     def reached_by(self, tilt: Tilt) -> bool:
         """Whether the tilt accuracy that is asked for is reached."""
@@ -154,7 +154,7 @@ class Question:
             return False
         return self.accuracy(tilt) <= self.target
 
-    def written(self, scheme: Scheme) -> str:
+    def scheme_text(self, scheme: Scheme) -> str:
         """Name of a scheme in commands and configurations: a name, or the path of its file."""
         for text in self.schemes:
             if is_scheme_file(text) and get_scheme(text).name == scheme.name:

@@ -51,12 +51,12 @@ class Spoiler:
     verdict: str
 
     @property
-    def usual(self) -> tuple[float, float]:
+    def usual_sizes(self) -> tuple[float, float]:
         """Sizes in good and in cheap equipment, SI."""
         return get_effect(self.effect).typical
 
 
-def unit_of(effect: str) -> str:
+def effect_unit(effect: str) -> str:
     """SI unit of the parameters of an effect."""
     return get_effect(effect).parameters[0].unit
 
@@ -136,7 +136,7 @@ def _tilt(question: Question, candidate: Candidate, sizes: Mapping[str, float]) 
     return tilt
 
 
-def in_use(
+def errors_in_use(
     question: Question, seconds: float = 1.0, hours: float = 8.0, kelvin: float = 10.0
 ) -> InUse:
     """Tilt errors in use that add to that of the calibration."""
@@ -155,7 +155,7 @@ def in_use(
     if any(change is not None for change in changes):
         drift = tilt(bias=sheet.bias_change(hours * 3600))
     if sheet.bias_per_kelvin is not None or sheet.scale_per_kelvin is not None:
-        bias, scale = sheet.warmed(kelvin)
+        bias, scale = sheet.temperature_sigmas(kelvin)
         warmth = tilt(bias=bias, scale=scale)
     if sheet.repeatability is not None:
         restart = tilt(bias=sheet.bias_change(0.0, restarted=True))

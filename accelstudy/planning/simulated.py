@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.given import tidy
+from accelstudy.basics.arguments import tidy
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, recorded_unit, to_recorded
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import ATTITUDES
@@ -32,7 +32,7 @@ BASE_EFFECTS = ("bias", "scale", "nonorthogonality")
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedTilt:
     """The errors of roll and of pitch that simulated calibrations left.
 
     Attributes
@@ -58,7 +58,7 @@ class Simulated:
         """Error of each angle by itself that this share of the calibrations stayed below, (2,)."""
         return np.array([float(self._bound(name, probability).value) for name in ANGLES])
 
-    def of_both(self, probability: float) -> float:
+    def quantile_of_both(self, probability: float) -> float:
         """Error that roll and pitch both stayed below in this share of the calibrations, rad."""
         return float(self._bound(BOTH, probability).value)
 
@@ -105,7 +105,7 @@ def study_of(
         "grids": [
             {
                 "models": candidate.model.name,
-                "schemes": question.written(candidate.scheme),
+                "schemes": question.scheme_text(candidate.scheme),
                 "approaches": candidate.equipment.name,
                 "replicates": replicates,
                 **({} if candidate.sigma == sigma else {"sensor_sigma_mps2": candidate.sigma}),
@@ -115,7 +115,7 @@ def study_of(
     }
 
 
-def simulate(question: Question, config: dict[str, Any]) -> list[Simulated]:
+def simulate_candidates(question: Question, config: dict[str, Any]) -> list[SimulatedTilt]:
     """Simulate the cells of a study of `study_of`, in the order of its candidates.
 
     The same cells give the same numbers in the workflow. There are quantiles at some usual shares,
@@ -125,7 +125,7 @@ def simulate(question: Question, config: dict[str, Any]) -> list[Simulated]:
     levels = np.sort([*shares])
     cells = [parse_study({**config, "grids": [grid]}).cells[0] for grid in config["grids"]]
     by_name = {
-        name: Simulated(name, simulated_statistics(cell, study.seed, levels))
+        name: SimulatedTilt(name, simulated_statistics(cell, study.seed, levels))
         for name, cell in {cell.name: cell for cell in cells}.items()
     }
     return [by_name[cell.name] for cell in cells]

@@ -12,16 +12,16 @@ import numpy as np
 
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import (  # noqa: F401
     PLAIN,
-    in_use,
+    effect_unit,
+    errors_in_use,
     limits,
     spoilers,
-    unit_of,
 )
 from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
@@ -34,13 +34,13 @@ HERE = sys.modules[__name__]
 
 def part_lines(part: str, answer: Answer) -> list[str]:
     """Lines of a part of a plan: what to do (answer), how_to, reasons or assumptions."""
-    return lines(SENTENCES, part, answer, HERE)
+    return render_lines(SENTENCES, part, answer, HERE)
 
 
 def assumed_sizes(question: Question) -> list[str]:
     """Effects that are taken to have a usual size, as nothing is known of it, in words."""
     sizes = {
-        effect: quantity_text(question.sizes[effect], unit_of(effect))
+        effect: quantity_text(question.sizes[effect], effect_unit(effect))
         for effect in question.assumed
     }
     return [f"{PLAIN[effect]} ({size})" for effect, size in sizes.items()]
@@ -84,7 +84,7 @@ def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
         f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
         *cells,
-        f"{about}{amount(source.of_both(OTHER_CONFIDENCE), 'rad')}",
+        f"{about}{amount(source.quantile_of_both(OTHER_CONFIDENCE), 'rad')}",
         limits(answer.question, candidate),
     ]
 
@@ -103,7 +103,7 @@ def positions_command(question: Question, candidate: Candidate) -> str:
     """The command that shows, or finds again, the positions of a candidate."""
     request = candidate.request
     if request is None:
-        return f"accelstudy scheme {shlex.quote(question.written(candidate.scheme))}"
+        return f"accelstudy scheme {shlex.quote(question.scheme_text(candidate.scheme))}"
     options = {
         "positions": str(request.positions),
         "approach": request.approach,

@@ -17,7 +17,7 @@ def first_best(values: ArrayLike, tied: float = CRITERION_TOLERANCE) -> int:
     return int(np.flatnonzero(values <= np.fmin.reduce(values) + tied)[0])
 
 
-def in_order(values: ArrayLike, tied: float = CRITERION_TOLERANCE) -> NDArray[np.int_]:
+def stable_order(values: ArrayLike, tied: float = CRITERION_TOLERANCE) -> NDArray[np.int_]:
     """Indices from the smallest value to the largest; those of equal values as they stand."""
     values = np.asarray(values)
     order = np.argsort(values, kind="stable")

@@ -23,7 +23,7 @@ def fibonacci(n: int) -> Array:
     """
     index = np.arange(n)
     x = 1 - (2 * index + 1) / n
-    return shuffled(spiral(x, GOLDEN_ANGLE * index))
+    return shuffle(spiral(x, GOLDEN_ANGLE * index))
 
 
 def spiral(x: Array, azimuth: Array) -> Array:
@@ -32,7 +32,7 @@ def spiral(x: Array, azimuth: Array) -> Array:
     return np.column_stack([x, radius * np.sin(azimuth), radius * np.cos(azimuth)])
 
 
-def shuffled(directions: Array) -> Array:
+def shuffle(directions: Array) -> Array:
     """Put directions in an order that follows no axis, the same at any time.
 
     It is the order of the multiples of √2 modulo 1, which are evenly spread themselves.

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.adjustment.quality import noncentrality
 from accelstudy.basics import bounds
+from accelstudy.basics.arguments import path_of, tidy
 from accelstudy.basics.errors import InputError, key
-from accelstudy.basics.given import path_of, tidy
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show, stage
 from accelstudy.basics.units import (
@@ -33,7 +33,7 @@ from accelstudy.basics.units import (
     to_recorded,
 )
 from accelstudy.basics.wording import amount
-from accelstudy.design.search import rounded
+from accelstudy.design.search import round_directions
 from accelstudy.design.spaces import Mountings, attitudes
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
@@ -102,7 +102,7 @@ class Design(Result):
     def content(self) -> dict[str, Any]:
         """State, verdict, how the positions were found, and the positions."""
         positions = self.to_frame().to_dict("records")
-        found = {"design": self.made, "positions": positions}
+        found = {"design": self.provenance, "positions": positions}
         return {"state": self.state, "verdict": self.verdict, **found}
 
     @property
@@ -126,7 +126,7 @@ class Design(Result):
         return self.request.task.rms_tilt(self.directions)
 
     @property
-    def placed(self) -> Array | None:
+    def rms_by_hand(self) -> Array | None:
         """Rms of roll and of pitch, (2,), if a hand misses the attitudes; None without a hand."""
         if self.request.attitudes != "hand":
             return None
@@ -152,7 +152,7 @@ class Design(Result):
         }
 
     @property
-    def made(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """How it was made and how good it is, as plain data in the units of files."""
         request, noise = self.request, self.request.noise
         with angles_in("gon"):
@@ -235,7 +235,7 @@ class Design(Result):
             f"\nExpected rms of leveling for tilts up to {tilt}, with {given}{effects}:"
         )
         yield f"  these {self.name}{after}: {_both(self.rms)}"
-        if (placed := self.placed) is not None:
+        if (placed := self.rms_by_hand) is not None:
             yield f"  if a hand misses them by 5° (sd per axis): {_both(placed)}"
         rms = request.task.rms_tilt(reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
@@ -275,7 +275,7 @@ class Design(Result):
         kind = self.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {self.request.seed}"
-        write_design(file, name, title, source, self.directions, self.made, extra)
+        write_design(file, name, title, source, self.directions, self.provenance, extra)
 
 
 @contextmanager
@@ -343,7 +343,7 @@ def write_design(
         "source": source,
         "design": dict(made),
         "positions": positions,
-        "directions": rounded(directions).tolist(),
+        "directions": round_directions(directions).tolist(),
     }
     head = (
         "# Positions for a calibration, in the order in which to take them. Any configuration and\n"

@@ -14,7 +14,15 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
 from accelstudy.design.criteria import CRITERIA, DISCRIMINATE, ROBUST, Criterion, get_criterion
 from accelstudy.design.search import STARTS, Search
-from accelstudy.design.spaces import Constraints, Mountings, Space, Sphere, by_eye, cube, listed_in
+from accelstudy.design.spaces import (
+    Constraints,
+    Mountings,
+    Space,
+    Sphere,
+    attitudes_by_eye,
+    cube,
+    read_attitudes,
+)
 from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -92,14 +100,14 @@ class Request:
         named = {effect.name: effect.parameters for effect in model.effects}
         named |= {parameter.name: (parameter,) for parameter in model.parameters}
         for text in self.prior:
-            name, size = _named(text, "prior")
+            name, size = _split_size(text, "prior")
             if name not in named:
                 raise UnknownNameError(f"effect or parameter of {self.model!r}", name, [*named])
             for parameter in named[name]:
                 prior[parameter.name] = _positive(text, size, parameter.unit, "prior")
         neglected: dict[str, float] = dict.fromkeys(self._rivals, 0.0)
         for text in self.neglect:
-            name, size = _named(text, "neglect", needs_size=False)
+            name, size = _split_size(text, "neglect", needs_size=False)
             effect = get_effect(name)
             unit = effect.parameters[0].unit
             neglected[effect.spec] = (
@@ -146,9 +154,9 @@ class Request:
         if self.attitudes == "cube":
             return cube()
         if self.attitudes == "hand":
-            return by_eye(HAND_STEP)
+            return attitudes_by_eye(HAND_STEP)
         if self.attitudes.endswith(".csv") or "/" in self.attitudes:
-            return listed_in(Path(self.attitudes))
+            return read_attitudes(Path(self.attitudes))
         raise UnknownNameError("attitudes", self.attitudes, (*SPACES, "a path ending in .csv"))
 
     @cached_property
@@ -163,7 +171,7 @@ class Request:
         return Search(self.task, self.chosen, *at)
 
 
-def _named(text: str, key: str, needs_size: bool = True) -> tuple[str, str]:
+def _split_size(text: str, key: str, needs_size: bool = True) -> tuple[str, str]:
     """Split "name=size"; an effect may have settings of its own, with equal signs."""
     name, equal, size = text.rpartition("=")
     if equal and ")" not in size:

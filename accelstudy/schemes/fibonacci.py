@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from accelstudy.positions.points import GOLDEN_ANGLE, fibonacci, shuffled, spiral
+from accelstudy.positions.points import GOLDEN_ANGLE, fibonacci, shuffle, spiral
 from accelstudy.positions.scheme import Array
 from accelstudy.schemes.registry import register
 
@@ -31,4 +31,4 @@ def antipodal_free(n: int) -> Array:
     index = np.arange(n)
     x = 1 - (index + 0.5) / n
     sign = np.where(index % 2, -1.0, 1.0)[:, None]
-    return shuffled(sign * spiral(x, GOLDEN_ANGLE * index))
+    return shuffle(sign * spiral(x, GOLDEN_ANGLE * index))

@@ -29,7 +29,7 @@ class Conversion:
     scale: Array
     offset: Array
 
-    def of_axis(self, axis: int) -> Conversion:
+    def axis(self, axis: int) -> Conversion:
         """Conversion of the numbers of one axis alone."""
         scale, offset = (np.broadcast_to(each, 3)[[axis]] for each in (self.scale, self.offset))
         return Conversion(scale, offset)

@@ -69,14 +69,14 @@ class Frame:
 
     def to_frd(self, vectors: ArrayLike) -> Array:
         """Components in frd of vectors (..., 3) in this frame."""
-        return self.rearranged(np.asarray(vectors, dtype=float)) * self.signs
+        return self.to_frd_order(np.asarray(vectors, dtype=float)) * self.signs
 
     def from_frd(self, vectors: ArrayLike) -> Array:
         """Components in this frame of vectors (..., 3) in frd."""
         values = np.asarray(vectors, dtype=float) * self.signs
         return values[..., np.argsort(self.order)]
 
-    def rearranged(self, values: NDArray[Any]) -> NDArray[Any]:
+    def to_frd_order(self, values: NDArray[Any]) -> NDArray[Any]:
         """Put values of the axes, such as their sds, (..., 3), in the order of frd."""
         return values[..., self.order]
 

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 from accelstudy.basics.errors import InputError, UnknownNameError
-from accelstudy.basics.plugins import HOW, only_named
+from accelstudy.basics.plugins import HOW, explain_missing
 from accelstudy.effects import Effect, effect_names, get_effect, is_effect
 from accelstudy.files.reading import read_layer
 from accelstudy.sensors.sensor import SensorModel
@@ -157,7 +157,7 @@ def _model_of_file(path: str, name: str | None) -> SensorModel:
     effects = [effects] if isinstance(effects, str) else effects
     if not isinstance(effects, list) or not effects or not all(isinstance(e, str) for e in effects):
         raise InputError(f"{path}: {key}: must be a list of effects")
-    with only_named(content, path):
+    with explain_missing(content, path):
         try:
             return _composed(effects, str(name or key.removeprefix("models.")))
         except InputError as error:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.effects import Effect, HoldConditions
 from accelstudy.effects.hold_symbols import HoldSymbols
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.made import kept_under, key_of
+from accelstudy.symbolic.formula_cache import kept_under, key_of
 from accelstudy.symbolic.tracing import (
     Traced,
     TracedFunction,

@@ -175,7 +175,7 @@ def advise(
     rms = chooser.rms(known)
     if fit is not None and stated:
         rms = tilt_left(fit, promise.tilt_range).total
-    enough = bool(promise.reached(rms)) and not wrong
+    enough = bool(promise.is_kept(rms)) and not wrong
 
     last = None
     if campaign.n_positions:
@@ -225,8 +225,8 @@ def _knowledge(
     problem = CalibrationProblem.of(model, approach, campaign_observations(campaign))
     adjustment, x = None if fit is None else fit.adjustment, problem.direct.copy()
     if prior is not None:
-        problem = prior.beside(problem)
-        adjustment, x = problem.adjusted(), problem.direct
+        problem = prior.augment(problem)
+        adjustment, x = problem.adjust(), problem.direct
     elif campaign.n_positions:
         x[0, : model.n_parameters] = initial_values(model, campaign.forces, campaign.gravity)
     if adjustment is not None and adjustment.converged[0]:

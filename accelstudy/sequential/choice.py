@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON
 from accelstudy.design.information import Information
-from accelstudy.design.spaces import Constraints, by_eye, cube, listed_in
+from accelstudy.design.spaces import Constraints, attitudes_by_eye, cube, read_attitudes
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import Promise
@@ -39,7 +39,7 @@ SAME_ATTITUDE = 5 * GON
 once would repeat its errors too."""
 
 
-def candidates(
+def candidate_positions(
     name: str,
     pole_distance: float | None = None,
     max_roll: float | None = None,
@@ -62,9 +62,9 @@ def candidates(
     if name == "cube":
         directions = cube().directions(0)
     elif name == "grid":
-        directions = by_eye(GRID_STEP).directions(0)
+        directions = attitudes_by_eye(GRID_STEP).directions(0)
     elif name.endswith(".csv"):
-        directions = listed_in(Path(name)).directions(0)
+        directions = read_attitudes(Path(name)).directions(0)
     else:
         raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
     roll, pitch = (None if most is None else (-most, most) for most in (max_roll, max_pitch))
@@ -172,6 +172,6 @@ class Chooser:
             omega = variance * max(redundancy, 0) if determined else np.nan
             known = Knowledge(information, omega, redundancy)
             rms = self.rms(known)
-            if self.promise.reached(rms):
+            if self.promise.is_kept(rms):
                 return n
         return None

@@ -37,7 +37,7 @@ class Prior:
         """
         return cls(np.asarray(mean, dtype=float), Information.of_covariance(covariance))
 
-    def beside(self, problem: CalibrationProblem) -> CalibrationProblem:
+    def augment(self, problem: CalibrationProblem) -> CalibrationProblem:
         """The problem of sessions together with what is known; they may have no positions yet."""
         of_model = slice(len(self.mean))
         # Observed gravity, and 0 ± 1 of errors that angles share, are known beforehand, too.

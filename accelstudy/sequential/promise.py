@@ -73,7 +73,7 @@ class Promise:
             hold = holds_in_use(hold, len(hold.order), f_b)
         return tilt_error(model, at, model, at, f_b, gravity, hold)
 
-    def reached(self, rms: Array) -> NDArray[np.bool_]:
+    def is_kept(self, rms: Array) -> NDArray[np.bool_]:
         """Whether the rms of roll and of pitch, (..., 2), both keep the promise."""
         return np.asarray(np.all(rms <= self.accuracy, axis=-1))
 
@@ -82,7 +82,7 @@ class Promise:
 
         rms : (..., 2) array, of roll and pitch so far
         """
-        missing = (rms > self.accuracy) | self.reached(rms)[..., None]
+        missing = (rms > self.accuracy) | self.is_kept(rms)[..., None]
         share = missing / missing.sum(axis=-1, keepdims=True)
         return np.einsum("...a,auw->...uw", share, error.quadratic)
 

@@ -12,11 +12,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import (
     campaign_of,
     columns_of,
+    find_table,
     ignored_in,
     parse_table,
     read_campaign,
     read_header,
-    table_of,
 )
 from accelstudy.campaign.header import HEADER, Header
 from accelstudy.campaign.session import Campaign
@@ -60,7 +60,7 @@ def read_running(folder: str | Path, settled: bool = False) -> Running:
             f"{folder}: no such folder; a running session has one with {HEADER}, and its positions "
             "in positions.csv"
         )
-    header, path = read_header(folder), table_of(folder)
+    header, path = read_header(folder), find_table(folder)
     if path is not None and path.suffix != ".csv":
         return Running(read_campaign(folder), "")
     try:
@@ -147,7 +147,7 @@ class Watch:
 
 def _files(folder: Path) -> list[Path]:
     """Files of a campaign that exist."""
-    found = [folder / HEADER, table_of(folder)] if folder.is_dir() else []
+    found = [folder / HEADER, find_table(folder)] if folder.is_dir() else []
     return [path for path in found if path is not None and path.is_file()]
 
 

@@ -29,9 +29,11 @@ CHANGING = {"time": "times", "temperature": "temperatures", "vibration": "vibrat
 """Conditions other than the attitude on which effects depend."""
 
 
-def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promise) -> list[str]:
+def advice_lines(
+    advice: Advice, campaign: Campaign, model: SensorModel, promise: Promise
+) -> list[str]:
     """Write the advice, most important last."""
-    return pages.lines(
+    return pages.render_lines(
         SENTENCES,
         "lines",
         advice,
@@ -46,7 +48,7 @@ def lines(advice: Advice, campaign: Campaign, model: SensorModel, promise: Promi
 
 def heading(advice: Advice, campaign: Campaign, model: SensorModel, approach: str) -> str:
     """Heading of the advice."""
-    (line,) = pages.lines(SENTENCES, "heading", advice, campaign, model, approach)
+    (line,) = pages.render_lines(SENTENCES, "heading", advice, campaign, model, approach)
     return line
 
 

@@ -112,7 +112,7 @@ class Session:
         that are not used are drawn all the same where other draws follow them. The adjustment does
         not know of the noise effects.
         """
-        return self.disturbed(self.errors(noise, replicates, rng, angles), noise, rng)
+        return self.disturb(self.errors(noise, replicates, rng, angles), noise, rng)
 
     def errors(
         self, noise: Noise, replicates: int, rng: np.random.Generator, angles: bool = True
@@ -125,7 +125,7 @@ class Session:
         angle = noise.sigma_angle * rng.standard_normal((replicates, n, 2))
         return Errors(force, angle, noise.sigma_gravity * rng.standard_normal(replicates))
 
-    def disturbed(self, errors: Errors, noise: Noise, rng: np.random.Generator) -> Observations:
+    def disturb(self, errors: Errors, noise: Noise, rng: np.random.Generator) -> Observations:
         """Observations with given normal errors, on which the noise effects act."""
         force = errors.force
         effects = [get_noise_effect(spec) for spec in noise.effects]
@@ -165,7 +165,7 @@ class Session:
         for block in blocks:
             rng, rest = rng_of(block), replicates - block * size
             errors = self.errors(noise, size, rng, angles)
-            yield errors.first(rest), self.disturbed(errors, noise, rng).first(rest)
+            yield errors.first(rest), self.disturb(errors, noise, rng).first(rest)
 
 
 def with_angle_errors(

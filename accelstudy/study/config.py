@@ -30,13 +30,13 @@ from pydantic_core import core_schema
 
 from accelstudy.approaches import Approach, approach_names, get_approach
 from accelstudy.basics import bounds
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY, to_si
 from accelstudy.effects import Effect, get_effect
 from accelstudy.files import validation as kinds
 from accelstudy.files.reading import overlay, read_layer
-from accelstudy.files.validation import Block, Configuration, OneOrMore, checked
+from accelstudy.files.validation import ConfigSection, Configuration, OneOrMore, validate
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
@@ -78,7 +78,7 @@ def parse_study(content: Mapping[str, Any], source: str = "config") -> Study:
     InputError
         One line that names the source, the key, what is wrong and what would be right.
     """
-    study = checked(Study, content, source)
+    study = validate(Study, content, source)
     with _at(source):
         study.check()
     return study
@@ -179,7 +179,7 @@ _NAME = "[A-Za-z0-9][A-Za-z0-9_-]*"
 def _name(name: str) -> str:
     if not re.fullmatch(_NAME, name) or len(name) > MAX_NAME_BYTES:
         raise InputError(
-            f"{shown(name)} is not a valid name: use letters, digits, _ and -, "
+            f"{brief(name)} is not a valid name: use letters, digits, _ and -, "
             f"at most {MAX_NAME_BYTES} of them, and begin with a letter or a digit"
         )
     return name
@@ -209,7 +209,7 @@ Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _
 # --- the blocks ----------------------------------------------------------------------------------
 
 
-class SensorNoise(Block):
+class SensorNoise(ConfigSection):
     """White noise of the accelerometer."""
 
     sigma_mps2: kinds.SigmaForce = Field(0.002, description="standard deviation per axis, m/s²")
@@ -226,13 +226,13 @@ class SensorNoise(Block):
         return sigma_of_mean(sigma_mps2, self.rate_hz, self.duration_s)
 
 
-class RobotNoise(Block):
+class RobotNoise(ConfigSection):
     """Noise of the robot's angles."""
 
     sigma_mgon: kinds.SigmaAngle = Field(3.2, description="standard deviation of roll and of pitch")
 
 
-class GravityNoise(Block):
+class GravityNoise(ConfigSection):
     """What is known of local gravity."""
 
     sigma_mps2: kinds.SigmaGravity = Field(
@@ -241,7 +241,7 @@ class GravityNoise(Block):
     error_mps2: kinds.GravityError = Field(0.0, description="systematic error of the value used")
 
 
-class NoiseConfig(Block):
+class NoiseConfig(ConfigSection):
     """The stochastic model of all cells, except where a grid gives other values."""
 
     sensor: SensorNoise = SensorNoise()
@@ -264,7 +264,7 @@ class NoiseConfig(Block):
         }
 
 
-class HoldPlanConfig(Block):
+class HoldPlanConfig(ConfigSection):
     """Conditions of the holds, on which some effects depend."""
 
     interval_s: kinds.Interval | None = Field(None, description="time between holds")
@@ -280,7 +280,7 @@ class HoldPlanConfig(Block):
     yaw: Literal["none", "random"] = Field("none", description="yaw of the robot: zero, or drawn")
 
 
-class Quantity(Block):
+class Quantity(ConfigSection):
     """True values of the parameters of one effect."""
 
     value: OneOrMore[kinds.Finite] = Field(description="one number per parameter of the effect")
@@ -298,7 +298,7 @@ class Quantity(Block):
         return {p.name: float(to_si(value, self.unit, p.unit)) for value, p in pairs}
 
 
-class Grid(Block):
+class Grid(ConfigSection):
     """Cells: every combination of what is listed. A single value may stand for a list of one."""
 
     models: Models = Field(
@@ -335,14 +335,14 @@ class Grid(Block):
         return self
 
 
-class Presets(Block):
+class Presets(ConfigSection):
     """The rows of the paper's Table 1, each with its own model and scheme."""
 
     replicates: kinds.Replicates = Field(description="simulated calibrations per row and approach")
     approaches: Approaches
 
 
-class LevelingConfig(Block):
+class LevelingConfig(ConfigSection):
     """Where the tilt error that a calibration leaves is evaluated."""
 
     max_tilt_gon: kinds.Tilt = Field(
@@ -353,7 +353,7 @@ class LevelingConfig(Block):
     )
 
 
-class SensitivityConfig(Block):
+class SensitivityConfig(ConfigSection):
     """Variance-based sensitivity analysis of leveling (figures 4 to 6)."""
 
     base_samples: kinds.BaseSamples = Field(1024, description="Sobol base samples, a power of two")
@@ -557,7 +557,7 @@ class Study(Configuration):
             settings = dict(zip(usual, noise, strict=True))
             if not approach.uses_angles:  # the same cell whatever the robot's accuracy
                 settings["robot_sigma_mgon"] = usual["robot_sigma_mgon"]
-            changed = [f"{k}={_shown(v)}" for k, v in settings.items() if v != usual[k]]
+            changed = [f"{k}={_number_text(v)}" for k, v in settings.items() if v != usual[k]]
             effects = tuple(_specs(model.effects))
             simulated = tuple(_specs((self.simulated_effects or model).effects))
             file = held(scheme.name)
@@ -614,7 +614,7 @@ class Study(Configuration):
         return values
 
 
-def _shown(value: float) -> str:
+def _number_text(value: float) -> str:
     """Show a number briefly, but never two numbers alike."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)

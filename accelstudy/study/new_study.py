@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from accelstudy.basics.plugins import as_a_key
+from accelstudy.basics.plugins import file_key
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
@@ -110,7 +110,7 @@ def new_study(
         for target, source in sources.items():
             text = jinja.get_template(source).render(**words, effects=effects, mgon=MGON)
             (new / target).write_text(text, encoding="utf-8")
-        if named := as_a_key():  # the workflow runs in the new folder
+        if named := file_key():  # the workflow runs in the new folder
             named = {k: {os.path.abspath(p): d for p, d in v.items()} for k, v in named.items()}
             with (new / "config" / "config.yaml").open("a", encoding="utf-8") as file:
                 file.write(f"\n{yaml.safe_dump(named)}")

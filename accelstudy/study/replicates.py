@@ -107,7 +107,7 @@ def simulate(cell: Cell, seed: int) -> Replicates:
             shift, of_block = theory.errors(noise, errors.gravity)
             estimates.append(theory.reference + shift)
             omega.append(of_block)
-    together = Block.joined(simulated)
+    together = Block.concatenate(simulated)
     if theory is None:
         return Replicates.plain(together)
     return Replicates.of(together, theory, np.concatenate(estimates), np.concatenate(omega))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from accelstudy.study.cell import Cell
-from accelstudy.study.claims.quantities import Evidence
+from accelstudy.study.claims.quantities import ClaimData
 from accelstudy.study.claims.verdicts import judge
 from accelstudy.study.config import Study, read_study
 from accelstudy.study.replicates import Replicates, estimates_table
@@ -52,6 +52,6 @@ def study_tables(study: Study) -> dict[str, pd.DataFrame]:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        evidence = Evidence(study, tables, pd.concat(estimates))
+        evidence = ClaimData(study, tables, pd.concat(estimates))
         tables |= {"claims": judge(evidence), "claims_by_scheme": evidence.by_scheme}
     return tables

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.symbolic.algebra import sp
-from accelstudy.symbolic.made import kept_under, key_of
+from accelstudy.symbolic.formula_cache import kept_under, key_of
 
 
 class _Symbolic:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy import Calibration, Campaign, Diagnosis, Log
-    from accelstudy.campaign.calibration.leveling import Leveled
+    from accelstudy.campaign.calibration.leveling import LeveledLog
 
 
 @verb
@@ -45,9 +45,9 @@ def calibrate(
     --------
         accelstudy calibrate my-campaign --out calibrated
     """
-    from accelstudy.api.calibrations import Calibration, fit_of, place_of
+    from accelstudy.api.calibrations import Calibration, campaign_path, fit_of
 
-    return Calibration(None, fit_of(campaign, model, approach, prior), place_of(campaign))
+    return Calibration(None, fit_of(campaign, model, approach, prior), campaign_path(campaign))
 
 
 @verb
@@ -65,11 +65,11 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
         If there is no such file, or it is not a calibration.
     """
     from accelstudy.api.calibrations import Calibration
-    from accelstudy.campaign.calibration import applying
+    from accelstudy.campaign.calibration import sensor_calibration
 
-    file = applying.file_of(path, "path")
-    content = applying.read_calibration_content(file)
-    applying.calibration_of(content, f"{file}: {applying.NO_CALIBRATION}")
+    file = sensor_calibration.file_of(path, "path")
+    content = sensor_calibration.read_calibration_content(file)
+    sensor_calibration.calibration_of(content, f"{file}: {sensor_calibration.NO_CALIBRATION}")
     return Calibration({"warnings": [], **content})
 
 
@@ -181,11 +181,11 @@ def apply(
     return table
 
 
-def leveled(calibration: Any, log: Any, **given: Any) -> Leveled:
+def leveled(calibration: Any, log: Any, **given: Any) -> LeveledLog:
     """Level a log by the keywords of `apply`, checked."""
     from accelstudy.api.logs import log_of
-    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.campaign.calibration.leveling import level
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 
     read, sensor = log_of(log, given), sensor_of(calibration)
     return level(sensor, read.file, read.layout, given["sigma"], given["start"])
@@ -222,8 +222,8 @@ def export(calibration: Calibration | str | PathLike[str], *, form: str = "c") -
     --------
         accelstudy export calibrated/calibration.json --form c
     """
-    from accelstudy.campaign.calibration.applying import sensor_of
     from accelstudy.campaign.calibration.export import export as text_of
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
 
     return text_of(sensor_of(calibration), form)
 
@@ -259,7 +259,7 @@ def diagnose(
     --------
         accelstudy diagnose my-campaign --out diagnosed
     """
-    from accelstudy.api.calibrations import place_of, resolve
+    from accelstudy.api.calibrations import campaign_path, resolve
     from accelstudy.api.diagnoses import Diagnosis
     from accelstudy.diagnosis import pipeline
 
@@ -267,4 +267,4 @@ def diagnose(
     given = resolve(campaign, model, approach, prior, plausible=False)
     with stage("search for what is missing"):
         result = pipeline.diagnose(*given, seed=seed)
-    return Diagnosis(result, seed, replicates, place_of(campaign))
+    return Diagnosis(result, seed, replicates, campaign_path(campaign))

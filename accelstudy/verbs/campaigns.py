@@ -177,7 +177,7 @@ def read_campaign(folder: str | PathLike[str], *, plausible: bool = True) -> Cam
         Whether data that cannot be right, as of wrong units, is refused; `diagnose` tells what is
         wrong with it, too.
     """
-    from accelstudy.basics.given import path_of
+    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.format import read_campaign as read_folder
 
     return read_folder(path_of("folder", folder), plausible=plausible)
@@ -202,7 +202,7 @@ def write_campaign(
     plausible : bool
         Whether data that cannot be right is refused, as by `read_campaign`.
     """
-    from accelstudy.basics.given import path_of
+    from accelstudy.basics.arguments import path_of
     from accelstudy.campaign.format import write_campaign as write_folder
     from accelstudy.files.outputs import CAMPAIGN, result_folder
 
@@ -298,6 +298,6 @@ def simulate_campaign(
         accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
     settings = {**locals()}
-    from accelstudy.api.campaigns import simulated
+    from accelstudy.api.campaigns import simulate_from
 
-    return simulated({**settings, "name": name or "simulated"})
+    return simulate_from({**settings, "name": name or "simulated"})

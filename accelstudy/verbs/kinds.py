@@ -22,11 +22,11 @@ import click
 from click.shell_completion import CompletionItem
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arguments import as_sequence, check_type, path_of, quantity, whole_number
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, key, shown
-from accelstudy.basics.given import each, of_type, path_of, quantity, whole
+from accelstudy.basics.errors import InputError, brief, key
 from accelstudy.basics.names import check_file_name
-from accelstudy.basics.units import Given, unit_label
+from accelstudy.basics.units import InputQuantity, unit_label
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
@@ -70,10 +70,10 @@ class Names(Kind):
         """Name, or path of a file as text."""
         article, what = "an" if self.name[0] in "aeiou" else "a", self.name.replace("_", " ")
         value = str(value) if self.files and isinstance(value, PathLike) else value
-        of_type(name, value, str, expected=f"the name of {article} {what}")
+        check_type(name, value, str, expected=f"the name of {article} {what}")
         return str(value)
 
-    def known(self) -> Iterable[str]:
+    def known_names(self) -> Iterable[str]:
         """Names that there are."""
         module, names = self.place
         known = getattr(import_module(module), names)
@@ -84,7 +84,7 @@ class Names(Kind):
     ) -> list[CompletionItem]:
         """Names that begin with what was typed; files, if none does."""
         before, plus, last = incomplete.rpartition("+" if self.parts else "\0")
-        known = [*self.known(), *(self.parts.known() if plus and self.parts else ())]
+        known = [*self.known_names(), *(self.parts.known_names() if plus and self.parts else ())]
         items = [CompletionItem(f"{before}{plus}{one}") for one in known if one.startswith(last)]
         return items or ([CompletionItem(incomplete, type="file")] if self.files else [])
 
@@ -100,7 +100,7 @@ class Whole(click.IntRange):
 
     def read(self, name: str, value: Any) -> int:
         """Whole number within the range."""
-        return whole(name, value, self.allowed)
+        return whole_number(name, value, self.allowed)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the number, or what is none."""
@@ -122,22 +122,24 @@ class FilePath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def kind_of(said: Any) -> Any:
-    """Kind that stands in an annotation; a `Range` is one of whole numbers, `Given` a quantity."""
+def kind_of_annotation(said: Any) -> Any:
+    """Kind that an annotation names; a `Range` is one of whole numbers."""
     if isinstance(said, Range):
         return Whole(said)
-    if not isinstance(said, Given):
+    if not isinstance(said, InputQuantity):
         return said
     unit = unit_label(said.unit)
     words = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
     return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
 
 
-def typed(expected: str, *types: type, made: Callable[[Any], Any] | None = None, **of: str) -> Kind:
+def kind_of_types(
+    expected: str, *types: type, made: Callable[[Any], Any] | None = None, **of: str
+) -> Kind:
     """Return the kind of values of some types, of which `made` makes what the verb works with."""
 
     def read(name: str, value: Any) -> Any:
-        of_type(name, value, *types, expected=expected)
+        check_type(name, value, *types, expected=expected)
         return value if made is None else made(value)
 
     return Kind(read, **of)
@@ -146,7 +148,7 @@ def typed(expected: str, *types: type, made: Callable[[Any], Any] | None = None,
 def _share(name: str, value: Any) -> float | None:
     from accelstudy.planning.question import confidence_of
 
-    of_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
+    check_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
     return confidence_of(str(value).strip())
 
 
@@ -160,13 +162,13 @@ def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:
     """Numbers in a list, or as text such as the example; `count` of them, or any number."""
 
     def read(name: str, value: Any) -> tuple[float, ...]:
-        parts = value.split(separator) if isinstance(value, str) else each(value)
+        parts = value.split(separator) if isinstance(value, str) else as_sequence(value)
         try:
             read = tuple(map(float, parts))
         except (TypeError, ValueError):
             read = ()
         if len(read) != (count or len(read) or 1):
-            raise InputError(f"{name}: expected {example}, not {shown(value)}")
+            raise InputError(f"{name}: expected {example}, not {brief(value)}")
         return read
 
     return Kind(read, "str, or several float", "numbers")
@@ -178,23 +180,23 @@ def pairs(example: str) -> Kind:
     def read(name: str, value: Any) -> dict[str, Any]:
         if isinstance(value, Mapping):
             return dict(value)
-        of_type(name, value, str, expected=f"a mapping, or a text as {example}")
+        check_type(name, value, str, expected=f"a mapping, or a text as {example}")
         pairs = [part.split("=", 1) for part in value.split(",")]
         if any(len(pair) != 2 for pair in pairs):
-            raise InputError(f"{name}: expected {example} or the like, not {shown(value)}")
+            raise InputError(f"{name}: expected {example} or the like, not {brief(value)}")
         return {key.strip(): said.strip() for key, said in pairs}
 
     return Kind(read, "mapping or str", "columns")
 
 
-def si(unit: str, least: float, most: float) -> Given:
+def si(unit: str, least: float, most: float) -> InputQuantity:
     """Quantity of which a number without a unit is in SI, on the command line, too."""
-    return Given(unit, "", least, most, bare=True)
+    return InputQuantity(unit, "", least, most, bare=True)
 
 
-def angle(least: float, most: float) -> Given:
+def angle(least: float, most: float) -> InputQuantity:
     """Angle with its unit; a number is in rad."""
-    return Given("rad", "", least, most)
+    return InputQuantity("rad", "", least, most)
 
 
 Quantity = float | str
@@ -202,12 +204,14 @@ Quantity = float | str
 RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
 """Keywords of earlier versions, and what takes their place."""
 
-TEXT = typed("a text", str)
-FLAG = typed("True or False", bool, doc_type="bool")
-NUMBER = typed(
+TEXT = kind_of_types("a text", str)
+FLAG = kind_of_types("True or False", bool, doc_type="bool")
+NUMBER = kind_of_types(
     "a number, or a text with its unit", str, int, float, made=str, doc_type="float or str"
 )
-COLUMN = typed("the name of a column or its number", str, int, doc_type="str or int", name="column")
+COLUMN = kind_of_types(
+    "the name of a column or its number", str, int, doc_type="str or int", name="column"
+)
 PATH = FilePath(path_type=Path)
 SHARE_OR_RMS = Kind(_share, "float or str", "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
@@ -324,7 +328,15 @@ class Keyword:
         kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
         many, ends = "Sequence" in said, said.startswith("tuple")
         optional = default is None or "None" in said
-        return cls(parameter.name, kind_of(kind), many, ends, default, optional, "".join(meaning))
+        return cls(
+            parameter.name,
+            kind_of_annotation(kind),
+            many,
+            ends,
+            default,
+            optional,
+            "".join(meaning),
+        )
 
     @property
     def option(self) -> str:
@@ -343,9 +355,9 @@ class Keyword:
             return None
         if not (self.many or self.ends):
             return self.kind.read(key(self.name), value)
-        values = each(value)
+        values = as_sequence(value)
         if self.ends and len(values) != 2:
-            raise InputError(f"{key(self.name)}: expected two values, not {shown(value)}")
+            raise InputError(f"{key(self.name)}: expected two values, not {brief(value)}")
         return tuple(self.kind.read(key(self.name), one) for one in values)
 
 

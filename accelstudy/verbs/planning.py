@@ -7,9 +7,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.given import path_of
-from accelstudy.basics.units import GON, STANDARD_GRAVITY, Given
+from accelstudy.basics.units import GON, STANDARD_GRAVITY, InputQuantity
 from accelstudy.planning.quantities import MOST_POSITIONS, QUANTITIES, REPLICATES
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Names, Quantity, angle, verb
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Hold = Annotated[Quantity, QUANTITIES["hold"]]
 Sigma = Annotated[Quantity, QUANTITIES["sigma"]]
 RobotSigma = Annotated[Quantity, QUANTITIES["robot_sigma"]]
-Force = Annotated[Quantity, Given("m/s^2")]
+Force = Annotated[Quantity, InputQuantity("m/s^2")]
 HalfTurn = Annotated[Quantity, angle(-200 * GON, 200 * GON)]
 QuarterTurn = Annotated[Quantity, angle(-100 * GON, 100 * GON)]
 
@@ -116,7 +116,7 @@ def find_positions(
     approach: kinds.ApproachName = "robot",
     positions: Annotated[int, Range(1, 300)] = 24,
     sigma: Force = "2mm/s^2",
-    robot_sigma: Annotated[Quantity, Given("rad")] = "3.2mgon",
+    robot_sigma: Annotated[Quantity, InputQuantity("rad")] = "3.2mgon",
     gravity_sigma: Force = "0",
     criterion: str = "I",
     tilt_range: Annotated[Quantity, angle(GON / 10, 100 * GON)] = "50gon",

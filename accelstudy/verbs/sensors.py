@@ -9,9 +9,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from accelstudy.basics.arguments import as_sequence, check_once
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.given import check_once, each
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import verb
 
@@ -53,7 +53,7 @@ def compare(
     --------
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
-    from accelstudy.campaign.calibration.applying import sensor_of
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
     from accelstudy.epochs.comparison import Comparison
 
     pair = sensor_of(first, "first"), sensor_of(second, "second")
@@ -105,10 +105,10 @@ def history(
             winter/calibration.json --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out
             years
     """
-    from accelstudy.campaign.calibration.applying import sensor_of
-    from accelstudy.epochs.history import History, dated
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
+    from accelstudy.epochs.history import History, dates_of
 
-    calibrations = each(calibrations)
+    calibrations = as_sequence(calibrations)
     check_once(calibrations, "calibration")
     sensors = [sensor_of(one) for one in calibrations]
     names = [
@@ -118,7 +118,7 @@ def history(
     wanted = None
     if tilt_accuracy is not None:
         wanted = float(tilt_accuracy), float(tilt_range), float(confidence)  # in SI by `verb`
-    return History(sensors, dated(sensors, dates, names), wanted)
+    return History(sensors, dates_of(sensors, dates, names), wanted)
 
 
 @verb
@@ -160,7 +160,7 @@ def lot(
     from accelstudy.api.calibrations import as_campaign, chosen
     from accelstudy.lots.output import Lot
 
-    given = [folder for one in each(campaigns) for folder in folders_of(one)]
+    given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]
     check_once(given, "sensor")
     measured = [as_campaign(one) for one in given]
     return Lot.of(measured, *chosen(model, approach), seed, cores)
@@ -183,12 +183,12 @@ def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | P
 
 def _listed(path: Path) -> list[Path]:
     """Folders of the campaigns that the list of a batch names."""
-    from accelstudy.basics.plugins import only_named
+    from accelstudy.basics.plugins import explain_missing
     from accelstudy.campaign.batch.config import parse_batch
     from accelstudy.files.reading import read_layer
 
     content = read_layer(path)
-    with only_named(content, path):
+    with explain_missing(content, path):
         tasks = parse_batch({**content, "plugins": []}, str(path)).tasks()
     for task in tasks:
         if task.kind != "campaign":

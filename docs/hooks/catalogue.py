@@ -7,7 +7,7 @@ import re
 from markdown_text import code, page, plain, table
 
 import accelstudy
-from accelstudy.api.catalogues import plain as number
+from accelstudy.api.catalogues import plain_number as number
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import SensorCalibration, read_calibration
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, read_calibration
 from accelstudy.data_sheets import DataSheet, get_data_sheet
 from accelstudy.leveling.angles import jacobian as leveling_jacobian
 from accelstudy.leveling.angles import roll_pitch
@@ -197,7 +197,7 @@ def drift(situation):
 @source
 def temperature(situation):
     """Change of bias and scales with temperature."""
-    bias, scale = situation.sheet.warmed(situation.pole.temperature_change)
+    bias, scale = situation.sheet.temperature_sigmas(situation.pole.temperature_change)
     return _before_clipping(situation, *np.hypot(bias, scale * situation.forces.T))
 
 
@@ -346,7 +346,7 @@ def main(path, name):
     within = [np.quantile(np.hypot(errors[..., 0], errors[..., 1]), 0.95) for errors in drawn]
     for source, cells in (("Monte Carlo", rms), ("95 of 100 within", within)):
         print(f"{source:20s}" + "".join(f"{1e3 * cell:8.1f}" for cell in cells))
-    unknown = ", ".join(name for name in sheet.unknown if name in COUNTED)
+    unknown = ", ".join(name for name in sheet.unknown_quantities if name in COUNTED)
     print(f"Not in the data sheet {sheet.name}, and not counted: {unknown or 'nothing'}")
     curves = budget(pole, calibrated, sheet, np.linspace(0, 50, 51) * GON)
     draw(curves, pd.Series(rms, index=tilts / GON), "pole.png")

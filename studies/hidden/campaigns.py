@@ -17,7 +17,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import effects_without
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 from accelstudy.sensors.models import get_model
 from studies.hidden.baselines import METHODS, answers
 from studies.hidden.physics.generate import Truth
@@ -30,8 +30,8 @@ Config = HiddenConfig | RealNoiseConfig
 def parse_hidden(content: Mapping[str, Any], source: str = "config") -> Config:
     """Check a configuration of either study; raise `InputError` with one line."""
     if "logs" in content:
-        return checked(RealNoiseConfig, content, source)
-    return checked(HiddenConfig, content, source)
+        return validate(RealNoiseConfig, content, source)
+    return validate(HiddenConfig, content, source)
 
 
 def run(config: Config, job: str, path: str | Path) -> None:

@@ -16,7 +16,7 @@ from accelstudy.basics.errors import UnknownNameError
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import ModelName
-from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates
+from accelstudy.files.validation import ConfigSection, OneOrMore, PathName, Positive, Replicates
 from studies.hidden.physics.generate import Truth
 from studies.hidden.real_logs import PUT, Donor, LogCase, changed_log
 from studies.hidden.study import Study
@@ -24,7 +24,7 @@ from studies.hidden.study import Study
 FEWEST = 5  # redundancy of a log, below which nothing is put into it
 
 
-class Log(Block):
+class Log(ConfigSection):
     """A public log, and what is true of it as it is."""
 
     model: ModelName | None = Field(None, description="model, by default that of the study")

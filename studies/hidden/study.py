@@ -20,7 +20,14 @@ from accelstudy.campaign.session import Campaign
 from accelstudy.config_names import KnownModel
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.reading import config_hash
-from accelstudy.files.validation import Block, OneOrMore, PathName, Positive, Replicates, Seed
+from accelstudy.files.validation import (
+    ConfigSection,
+    OneOrMore,
+    PathName,
+    Positive,
+    Replicates,
+    Seed,
+)
 from studies.hidden.physics.designs import APPROACHES, DESIGNS
 from studies.hidden.physics.generate import Case, Truth, generate
 from studies.hidden.physics.gross import GROSS, visible_gross
@@ -81,20 +88,20 @@ SETS = ("nothing", *KINDS, *SEVERAL)  # blocks of campaigns
 Row = dict[str, Any]
 
 
-class Nothing(Block):
+class Nothing(ConfigSection):
     """Campaigns in which nothing is missing."""
 
     campaigns: Replicates = Field(description="in all")
 
 
-class Kinds(Block):
+class Kinds(ConfigSection):
     """Campaigns with one thing each that has no size: wrong noise, gross or invisible."""
 
     kinds: OneOrMore[str] = Field(["all"], description="names, or all")
     campaigns: Replicates = Field(description="of each kind")
 
 
-class Sized(Block):
+class Sized(ConfigSection):
     """Campaigns with one thing each, in several sizes."""
 
     kinds: OneOrMore[str] = Field(["all"], description="names, or all")
@@ -102,14 +109,14 @@ class Sized(Block):
     campaigns: Replicates = Field(description="of each kind and size")
 
 
-class Several(Block):
+class Several(ConfigSection):
     """Campaigns with two or three effects each."""
 
     sizes: OneOrMore[Positive] = Field(description="noncentralities λ, of each effect")
     campaigns: Replicates = Field(description="of each size, each with effects at random")
 
 
-class Study(Block):
+class Study(ConfigSection):
     """What both studies have: which campaigns they make, how, and how they are diagnosed."""
 
     study: PathName = Field(description="name; results go to results/<study>/")

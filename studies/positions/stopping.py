@@ -96,7 +96,7 @@ def simulate(
     cofactors = estimability(FIXED, MODEL, get_approach(approach), NOISE).cofactors
     error = Promise(np.inf, TILT_RANGE).tilt_error(MODEL)
     promise = Promise(multiple * float(error.rms_of_all(cofactors).max()), TILT_RANGE)
-    directions = choice.candidates(choice.DEFAULTS[approach])
+    directions = choice.candidate_positions(choice.DEFAULTS[approach])
     rows = position_rows(MODEL, get_approach(approach), NOISE, directions)
     sizes = choice.typical_sizes(MODEL, MODEL.n_parameters)
     chooser = choice.Chooser(directions, rows, error, promise, RULES[rule][0], sizes)
@@ -113,7 +113,7 @@ def simulate(
     while True:
         known, result = _known(approach, forces, angles)
         rms, n = np.array([chooser.rms(each) for each in known]), forces.shape[1]
-        kept = chooser.promise.reached(rms)
+        kept = chooser.promise.is_kept(rms)
         over = kept | (n == most_positions)
         if over.any():
             assert result is not None  # so many positions determine the model

@@ -48,7 +48,7 @@ def test_errors_are_the_derivative_of_the_calibration(name, noise):
     for factor in (1.0, 0.5):
         parts = (factor * e for e in (errors.force, errors.angle, errors.gravity))
         scaled = Errors(*parts)
-        found = calibrate(NINE, approach, ideal.disturbed(scaled, noise, rng))
+        found = calibrate(NINE, approach, ideal.disturb(scaled, noise, rng))
         expected, omega = errors_of(theory, approach, scaled)
         apart.append((found.parameters - theory.reference - expected) / theory.sigma)
         np.testing.assert_allclose(found.omega, omega, rtol=0.02, atol=1e-9)
@@ -86,7 +86,7 @@ def test_a_misfit_counts_in_omega():
     assert np.abs((theory.reference - TRUTH) / theory.sigma).max() > 3
     rng = np.random.default_rng(3)
     errors = ideal.errors(Noise(), 400, rng)
-    found = calibrate(NINE, approach, ideal.disturbed(errors, Noise(), rng))
+    found = calibrate(NINE, approach, ideal.disturb(errors, Noise(), rng))
     expected, omega = errors_of(theory, approach, errors)
     np.testing.assert_allclose(found.omega, omega, rtol=0.05)
     for i, column in enumerate((found.parameters - theory.reference).T):

@@ -28,7 +28,11 @@ from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.evidence import detection
-from accelstudy.diagnosis.evidence.noise_models import LENGTHS, quadratic_forms, restricted
+from accelstudy.diagnosis.evidence.noise_models import (
+    LENGTHS,
+    quadratic_forms,
+    restricted_likelihood,
+)
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
@@ -208,7 +212,7 @@ def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
         for axis in range(c if labels[i] != i else 0):
             change = np.zeros((n, c, 1))
             change[i, axis], change[labels[i], axis] = 1, -1
-            differences.append(residuals.stacked(np.linalg.solve(residuals.whitening, change)))
+            differences.append(residuals.stack(np.linalg.solve(residuals.whitening, change)))
     basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
     same = lack_of_fit(residuals, examined.frame.forces)
     errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
@@ -225,7 +229,10 @@ def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined
     z, r = basis.T @ residuals.z, residuals.redundancy
     g = np.einsum("ncr,nca->anr", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
     v = np.random.default_rng(2).standard_normal((4, n, 3))
-    forms, (determinants, squares) = quadratic_forms(v), restricted(residuals, (0.25, 16.0))
+    forms, (determinants, squares) = (
+        quadratic_forms(v),
+        restricted_likelihood(residuals, (0.25, 16.0)),
+    )
     for k, length in enumerate(LENGTHS):
         lag = np.abs(i[:, None] - i)
         kernel = np.exp(-lag / length) if length < np.inf else (np.minimum(i[:, None], i) + 1) / n

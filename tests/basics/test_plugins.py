@@ -21,7 +21,7 @@ from accelstudy.jobs import code_version
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import read_study
-from accelstudy.symbolic.made import key_of
+from accelstudy.symbolic.formula_cache import key_of
 
 EXAMPLES = ROOT / "examples"
 RIPPLE = EXAMPLES / "effect" / "ripple.py"
@@ -195,7 +195,7 @@ def test_a_configuration_may_have_digests(capsys):
     """As the files have them that this package writes; `config_hash` leaves them out."""
     with forgotten():
         plugins.load_files(["ripple.py"])
-        with_digests = plugins.as_a_key()["plugins"]
+        with_digests = plugins.file_key()["plugins"]
     assert [*with_digests] == ["ripple.py"]
     with forgotten():
         assert read_study(written(plugins=with_digests)).plugins == ["ripple.py"]

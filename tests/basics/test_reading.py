@@ -8,7 +8,7 @@ import pytest
 from calling import refused
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import read_calibration
+from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.files import reading
 from accelstudy.files.parquet import whole_parquet

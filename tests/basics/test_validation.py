@@ -10,14 +10,14 @@ from pydantic import BaseModel, Field, create_model
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.header import LogLayout
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.validation import ConfigSection, validate
 
 
-class Grid(Block):
+class Grid(ConfigSection):
     size: int = Field(ge=1)
 
 
-class Plan(Block):
+class Plan(ConfigSection):
     grid: Grid
     names: tuple[str, ...] = ()
 
@@ -35,7 +35,7 @@ def test_an_error_is_one_line_with_source_and_key(content, key, said):
     for section in ("", "case"):
         place = ".".join(filter(None, (section, key)))
         with refused(said, start=f"plan.yaml: {place}{': ' if place else ''}"):
-            checked(Plan, content, "plan.yaml", section)
+            validate(Plan, content, "plan.yaml", section)
 
 
 def models():
@@ -65,10 +65,10 @@ def test_all_errors_are_in_plain_words():
     said = set()
     for model in models():
         for name, field in model.model_fields.items():
-            alone = create_model(name, __base__=Block, **{name: (field.annotation, field)})
+            alone = create_model(name, __base__=ConfigSection, **{name: (field.annotation, field)})
             for content in ({}, 3, *({field.alias or name: value} for value in WRONG)):
                 try:
-                    checked(alone, content, "file")
+                    validate(alone, content, "file")
                 except InputError as error:
                     said.add(re.sub(r"[‘'\"].*?[’'\"]|\(known: .*", "", str(error)))
     assert len(said) > 1500
@@ -77,4 +77,4 @@ def test_all_errors_are_in_plain_words():
 
 def test_one_of_two_kinds_is_said_with_both():
     with refused(start="log: columns.fx: must be a whole number or a text, not 0.5"):
-        checked(LogLayout, {"columns": {"fx": 0.5}}, "log")
+        validate(LogLayout, {"columns": {"fx": 0.5}}, "log")

@@ -15,8 +15,8 @@ import accelstudy as acs
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import calibration_of, read_calibration
 from accelstudy.campaign.calibration.leveling import level
+from accelstudy.campaign.calibration.sensor_calibration import calibration_of, read_calibration
 from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing.sources import Source
 from accelstudy.effects import HoldConditions

@@ -19,7 +19,7 @@ from places import ROOT
 from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
 
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.batch.config import Task, parse_batch
+from accelstudy.campaign.batch.config import CampaignEntry, parse_batch
 from accelstudy.campaign.batch.overview import (
     CAMPAIGN_COLUMNS,
     PARAMETER_COLUMNS,
@@ -314,7 +314,7 @@ def test_settings_of_public_data_can_be_overlaid():
     task = task_of(**entry)
     assert (task.name, task.settings.name, task.settings.unit) == ("slow", "slow", "counts")
     assert task.settings.threshold_mps2 == 0.2
-    assert Task.model_validate(task.as_params()) == task
+    assert CampaignEntry.model_validate(task.as_params()) == task
 
 
 def test_a_job_leaves_to_the_format_of_a_log_what_nobody_said(tmp_path):
@@ -322,7 +322,9 @@ def test_a_job_leaves_to_the_format_of_a_log_what_nobody_said(tmp_path):
     path = write_log(tmp_path / "log")
     names = {f"f{axis}": f"linear_acceleration.{axis}" for axis in "xyz"}
     pd.read_parquet(path).rename(columns=names).to_parquet(path)
-    task = Task.model_validate(task_of(log=str(path), **{"import": {"rate_hz": 100}}).as_params())
+    task = CampaignEntry.model_validate(
+        task_of(log=str(path), **{"import": {"rate_hz": 100}}).as_params()
+    )
     run_task(task, tmp_path / "out")
     assert read_campaign(tmp_path / "out/campaign").log.frame == "flu"
 

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import affine_form
 from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import GAUGES, in_gauge
+from accelstudy.campaign.calibration.document import GAUGES, to_gauge
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
+from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.session import Campaign
@@ -56,12 +56,12 @@ angles = st.floats(-0.05, 0.05)
 def test_all_gauges_measure_the_same_norm(values):
     k = np.eye(3) + np.reshape(values, (3, 3))
     for gauge in GAUGES:
-        turned = in_gauge(k, gauge)
+        turned = to_gauge(k, gauge)
         np.testing.assert_allclose(turned.T @ turned, k.T @ k, rtol=0, atol=1e-12)
         assert np.all(np.diag(turned) > 0)
-    np.testing.assert_allclose(np.tril(in_gauge(k, "upper"), -1), 0, atol=1e-14)
-    np.testing.assert_allclose(np.triu(in_gauge(k, "lower"), 1), 0, atol=1e-14)
-    np.testing.assert_allclose(in_gauge(k, "symmetric"), in_gauge(k, "symmetric").T, atol=1e-12)
+    np.testing.assert_allclose(np.tril(to_gauge(k, "upper"), -1), 0, atol=1e-14)
+    np.testing.assert_allclose(np.triu(to_gauge(k, "lower"), 1), 0, atol=1e-14)
+    np.testing.assert_allclose(to_gauge(k, "symmetric"), to_gauge(k, "symmetric").T, atol=1e-12)
 
 
 def test_a_nonlinear_model_has_no_matrix():

@@ -71,7 +71,7 @@ def test_holds_that_are_left_out_stay_in_the_file_and_in_the_history(tmp_path):
     assert read.positions.tolist() == [1, 2, 4, 5, 6, 7]
     assert read.reasons == reasons
     assert read.exclusions[0] == {"position": 3, "reason": "moved"}
-    assert_same(read.whole, every)
+    assert_same(read.with_left_out, every)
     kept = read.positions - 1
     for name in ("step_x", "temperature", "yaw", "roll", "order"):
         np.testing.assert_allclose(

@@ -14,9 +14,9 @@ import pytest
 from calling import refusal, refused, succeed
 
 import accelstudy as acs
-from accelstudy.campaign.calibration.applying import SensorCalibration
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.export import export, losses
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.campaign.header import LogLayout
 from accelstudy.effects import HoldConditions, effect_names, get_effect
 from accelstudy.sensors.frames import parse_frame

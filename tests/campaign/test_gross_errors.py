@@ -32,7 +32,7 @@ def spoiled(spec, seed=1, campaign=CLEAN):
 
 
 def drawn(spec, seed, campaign=CLEAN):
-    return get_gross_error(spec).drawn(campaign, np.random.default_rng(seed))
+    return get_gross_error(spec).draw(campaign, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("name", gross_error_names())
@@ -174,8 +174,8 @@ def test_all_axes_and_units_are_recognised_and_undone(design, designs):
         found = recognise(spoiled(spec, campaign=right))
         assert found is not None, spec
         assert found.name == spec.partition("(")[0], spec
-        np.testing.assert_allclose(found.mended.forces, right.forces, rtol=1e-9, err_msg=spec)
-        np.testing.assert_allclose(found.mended.angles, right.angles, rtol=1e-9, err_msg=spec)
+        np.testing.assert_allclose(found.corrected.forces, right.forces, rtol=1e-9, err_msg=spec)
+        np.testing.assert_allclose(found.corrected.angles, right.angles, rtol=1e-9, err_msg=spec)
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -195,7 +195,7 @@ def test_exchanged_rows_are_recognised_and_put_back(design, designs):
         assert found.name == "row_order"
         assert found.reason.endswith(" and 40 more are exchanged") == (len(wrong) > 40)
         # Which of two repeats is which does not show, and is all the same.
-        assert np.abs(found.mended.forces - right.forces).max() < 0.06, (design, wrong)
+        assert np.abs(found.corrected.forces - right.forces).max() < 0.06, (design, wrong)
 
 
 COUNTS = {
@@ -221,11 +221,11 @@ def test_columns_of_counts_are_exchanged_before_their_scales_and_offsets(differ,
     )
     found = recognise(read)
     assert re.match("axes are swapped: . is read as .*, in the counts, before", found.reason)
-    np.testing.assert_allclose(found.mended.forces, forces, atol=1e-12)
+    np.testing.assert_allclose(found.corrected.forces, forces, atol=1e-12)
     # Readings in counts are converted, and then turned, as those of the campaign were.
-    again = found.mended.nominal.to_si(counts) @ found.matrix.T
+    again = found.corrected.nominal.to_si(counts) @ found.matrix.T
     np.testing.assert_allclose(again, forces, atol=1e-12)
-    fit = fit_campaign(found.mended, get_model("bias-scale-nonorthogonality"))
+    fit = fit_campaign(found.corrected, get_model("bias-scale-nonorthogonality"))
     np.testing.assert_allclose(
         fit.parameters[:6], [0.12, -0.08, 0.2, 0.004, -0.003, 0.006], atol=2e-3
     )
@@ -256,13 +256,15 @@ def test_several_gross_errors_are_undone_together(designs):
     for spec in ("axis_error(x=2, y=-1, z=3)", "unit_error(force=0.1019716212978)"):
         wrong = spoiled(spec, campaign=wrong)
     found = recognise(wrong)
-    assert {name for name, _ in found.named} == set(gross_error_names())
-    assert ("outlier_position", 21) in found.named
+    assert {name for name, _ in found.names} == set(gross_error_names())
+    assert ("outlier_position", 21) in found.names
     assert found.reasons["unit_error"] == "the forces are in g"
     assert found.reason.count(";") == len(found.reasons) - 1
-    np.testing.assert_allclose(found.mended.forces, np.delete(right.forces, 20, axis=0), atol=0.06)
+    np.testing.assert_allclose(
+        found.corrected.forces, np.delete(right.forces, 20, axis=0), atol=0.06
+    )
     mended = np.delete(wrong.forces, 20, axis=0) @ found.matrix.T
-    np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.mended.forces, axis=0))
+    np.testing.assert_allclose(np.sort(mended, axis=0), np.sort(found.corrected.forces, axis=0))
 
 
 @pytest.mark.parametrize(("approach", "size"), [("robot", 19.0), ("robot", 2.0), ("gravity", 9.0)])

@@ -13,7 +13,7 @@ import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.session import Campaign
-from accelstudy.data_sheets import of_sigma
+from accelstudy.data_sheets import sheet_of_sigma
 from accelstudy.planning.candidates import in_scheme
 from accelstudy.planning.question import BY_HAND, Question
 from accelstudy.schemes import get_scheme
@@ -57,7 +57,9 @@ def test_nine_positions_of_rank_eight(tmp_path, directions):
     scheme.write_text(
         yaml.safe_dump({"scheme": "nine", "directions": np.tile(directions, (2, 1)).tolist()})
     )
-    question = Question(10 * MGON, 30 * GON, of_sigma(0.002), (BY_HAND,), schemes=(str(scheme),))
+    question = Question(
+        10 * MGON, 30 * GON, sheet_of_sigma(0.002), (BY_HAND,), schemes=(str(scheme),)
+    )
     models = [get_model("bias-scale-nonorthogonality")]
     planned = [*in_scheme(question, get_scheme(str(scheme)), models)]
     assert all(each.tilt.rms.max() > 1 * GON for each in planned)

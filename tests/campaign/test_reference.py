@@ -17,7 +17,7 @@ from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.next_positions import _rows
 from accelstudy.diagnosis.space.examined import ExaminedFit
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import get_model
@@ -148,7 +148,7 @@ def test_the_next_position_shares_the_errors(campaign):
 
 def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
     solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
-    frame = Frame.of(solution)
+    frame = SessionFit.of(solution)
     found, expected = _rows(frame, frame.forces, frame.hold), solution.design[: 3 * 20]
     size = np.linalg.norm(expected, axis=0)
     normal = np.einsum("kcu,kcv->uv", found / size, found / size)
@@ -157,7 +157,7 @@ def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
 
 def test_a_reference_has_no_errors_of_a_robot(campaign):
     solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
-    examined = ExaminedFit.of(Frame.of(solution))
+    examined = ExaminedFit.of(SessionFit.of(solution))
     of_robot = {"encoder_scale", "encoder_offset", "base_tilt", "axis_nonperpendicularity"}
     assert of_robot < {*examined.untestable}
     assert {"quadratic_scale", "bias_drift"} & {*examined.candidates}

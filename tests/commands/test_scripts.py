@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from calling import refusal, succeed
 
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.schemes import get_scheme
 
 
@@ -25,7 +25,7 @@ def made(tmp_path_factory, monkeypatch):
     succeed("simulate-campaign", "--out", "rejected", "--effect", "quadratic_scale", "--size", 5)
 
 
-def suggestions(text):
+def commands_in(text):
     """Arguments of the commands that a text suggests, with files for what stands in capitals."""
     meant = {"LOG": "log.csv", "CAMPAIGN": "accepted"}
     lines = re.findall(r"(?:^|: )accelstudy (.+)$", text, re.MULTILINE)
@@ -34,10 +34,10 @@ def suggestions(text):
 
 def outs(campaigns):
     """Where the suggested commands write for campaigns."""
-    for command in (suggested.calibrate, suggested.diagnose):
+    for command in (suggestions.calibrate, suggestions.diagnose):
         yield from (shlex.split(command(each, "bias", "robot"))[-1] for each in campaigns)
     for each in campaigns:
-        yield shlex.split(suggested.apply(f"{each}/calibration.json"))[-1]
+        yield shlex.split(suggestions.apply(f"{each}/calibration.json"))[-1]
 
 
 def test_no_two_campaigns_share_what_is_suggested(tmp_path, monkeypatch):
@@ -61,8 +61,8 @@ def test_what_is_suggested_writes_into_no_campaign(tmp_path, monkeypatch, typed)
     name = "-campaign" if typed == "-campaign" else "campaign"
     source = tmp_path / ("elsewhere" if typed[0] in "-a" else "") / name
     succeed("simulate-campaign", f"--out={source}", "--scheme", "faces-6", "--force")
-    line = suggested.calibrate(typed.format(source), "bias", "gravity")
-    (arguments,) = suggestions(line)
+    line = suggestions.calibrate(typed.format(source), "bias", "gravity")
+    (arguments,) = commands_in(line)
     succeed(*arguments)
     assert len([*tmp_path.rglob("calibration.json")]) == 1
     assert not [*source.rglob("calibration.json")]
@@ -78,13 +78,13 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page():
         for side in ("left", "right")
     )
     reading = ("--columns", "fx=0,fy=1,fz=2", "--rate", "50")
-    (diagnose, apply) = suggestions(printed)
+    (diagnose, apply) = commands_in(printed)
     succeed(*apply, *reading)
     assert "a.xlsx: a spreadsheet" in refusal(*apply[:-1], "a.xlsx", *reading)
     done = succeed(*diagnose, "--replicates", "100", "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")
-    steps = suggestions("\n".join(map(unescape, re.findall("<pre>(.*?)</pre>", page))))
+    steps = commands_in("\n".join(map(unescape, re.findall("<pre>(.*?)</pre>", page))))
     assert [step[0] for step in steps] == ["apply", "export", "calibrate"]
     for command, *arguments in steps:
         succeed(command, *arguments, *(reading if command == "apply" else ()))

@@ -33,7 +33,7 @@ def test_information_of_sessions_adds_and_is_that_of_the_normal_equations():
 
 def test_parameters_that_are_unknown_beside_others():
     inside = covariance(ROWS, np.arange(8))[3:, 3:]
-    beside = Information.of(ROWS).beside(3)
+    beside = Information.of(ROWS).marginal(3)
     errors = beside.errors(range(5))
     columns = np.arange(3, 8)
     np.testing.assert_allclose(

@@ -19,13 +19,13 @@ from accelstudy.design.information import position_rows
 from accelstudy.design.search import Search
 from accelstudy.design.spaces import (
     Constraints,
-    Listed,
+    FiniteSet,
     Mountings,
     Sphere,
     attitudes,
-    by_eye,
+    attitudes_by_eye,
     cube,
-    listed_in,
+    read_attitudes,
 )
 from accelstudy.design.task import Task
 from accelstudy.effects import HoldConditions
@@ -209,7 +209,7 @@ def test_the_exchange_finds_the_best_of_all_choices():
         criterion = get_criterion(name, task)
         choices = combinations_with_replacement(range(8), 3)
         best = min(float(criterion.value(task.normal(points[list(c)]))) for c in choices)
-        found = Search(task, criterion, 3, Listed(points, "eight")).optimum(bounded=False)
+        found = Search(task, criterion, 3, FiniteSet(points, "eight")).optimum(bounded=False)
         assert found.value == pytest.approx(best, abs=1e-9)
 
 
@@ -261,7 +261,7 @@ LEVEL = (-60 * GON, 60 * GON)
 def test_constraints_are_kept_and_cost_efficiency(constraints, free):
     task, criterion = asked(BY_ROBOT, "I")
     found = Search(task, criterion, 12, constraints=constraints).optimum(starts=1)
-    assert constraints.met(found.directions)
+    assert constraints.are_met(found.directions)
     assert free.value < found.value < free.value + 0.2
     assert found.efficiency > 0.9
     roll, pitch = attitudes(found.directions).T
@@ -285,13 +285,13 @@ def test_few_mountings_turn_about_few_axes():
 def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     assert len(cube().directions(0)) == 26
     np.testing.assert_allclose(
-        np.unique(np.degrees(attitudes(by_eye(np.pi / 6).points)[:, 1]).round(6)),
+        np.unique(np.degrees(attitudes(attitudes_by_eye(np.pi / 6).points)[:, 1]).round(6)),
         np.arange(-90, 91, 30),
         atol=1e-6,
     )
     path = tmp_path / "mine.csv"
     path.write_text("roll_deg,pitch_deg\n0,0\n90,0\n0,-45\n", encoding="utf-8")
-    listed = listed_in(path)
+    listed = read_attitudes(path)
     np.testing.assert_allclose(
         sorted(attitudes(listed.points).tolist()),
         [[0, -np.pi / 4], [0, 0], [np.pi / 2, 0]],
@@ -299,7 +299,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     )
     task, criterion = asked(BY_ROBOT, "I")
     with pytest.raises(InputError, match=r"the allowed attitudes do not suffice: rank"):
-        Search(task, criterion, 9, Listed(listed.points[:2], "two")).optimum()
+        Search(task, criterion, 9, FiniteSet(listed.points[:2], "two")).optimum()
     for text, wrong in {
         "a,b\n1,2\n": "expected x, y, z; roll_gon, pitch_gon",
         "x,y,z\n1,0,0\n1,?,0\n": "row 2: x, y, z must be numbers",
@@ -308,7 +308,7 @@ def test_attitudes_of_a_cube_of_a_hand_and_of_a_file(tmp_path):
     }.items():
         path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=wrong):
-            listed_in(path)
+            read_attitudes(path)
 
 
 def test_what_cannot_be_is_said_in_one_line():
@@ -341,21 +341,21 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
     assert cosines[~same].max() < np.cos(1 * GON)
 
     apart, search = random_directions(12), Search(task, criterion, 13)
-    assert search.joined(apart) is apart
+    assert search.join(apart) is apart
     beside = np.cross(apart[0], apart[1])
     near = apart[0] + 0.01 * GON * beside / np.linalg.norm(beside)
     thirteen = np.vstack([apart, near / np.linalg.norm(near)])
-    joined = search.joined(thirteen)
+    joined = search.join(thirteen)
     np.testing.assert_array_equal(joined[0], joined[12])
     np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
     assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
     kept = Constraints(least_angle=0.001 * GON)
-    assert replace(search, constraints=kept).joined(thirteen) is thirteen
+    assert replace(search, constraints=kept).join(thirteen) is thirteen
 
     # In a row, the first and the last are near each other by way of the second alone.
     beside = np.cross(apart[0], apart[3])
     row = apart[0] + np.outer([0.0, 0.7 * GON, 1.4 * GON], beside / np.linalg.norm(beside))
     row /= np.linalg.norm(row, axis=1, keepdims=True)
     assert row[0] @ row[1] > np.cos(1 * GON) > row[0] @ row[2]
-    joined = search.joined(np.vstack([row, apart[1:]]))
+    joined = search.join(np.vstack([row, apart[1:]]))
     np.testing.assert_array_equal(joined[:3], np.tile(row[1], (3, 1)))

@@ -16,7 +16,7 @@ from accelstudy.basics.units import GON
 from accelstudy.design.criteria import get_criterion
 from accelstudy.design.search import Search
 from accelstudy.design.task import Task
-from accelstudy.positions.choice import first_best, in_order
+from accelstudy.positions.choice import first_best, stable_order
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 
@@ -61,4 +61,4 @@ def test_another_processor_finds_the_same_designs_and_estimates_but_for_rounding
 def test_what_is_equal_but_for_rounding_keeps_its_order():
     rounding = np.array([2.0, -1.0, 0.0, 1.0]) * 1e-15
     assert first_best([3.0, *(1.0 + rounding), np.nan]) == 1
-    assert in_order([3.0, *(1.0 + rounding), 0.5]).tolist() == [5, 1, 2, 3, 4, 0]
+    assert stable_order([3.0, *(1.0 + rounding), 0.5]).tolist() == [5, 1, 2, 3, 4, 0]

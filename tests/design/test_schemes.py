@@ -112,7 +112,7 @@ def test_a_name_is_registered_once():
 
 
 def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):
-    monkeypatch.setattr(registry._registry, "_items", dict(registry._registry._all))
+    monkeypatch.setattr(registry._registry, "_items", dict(registry._registry._all_items))
 
     @register("test-ring-N", title="ring from {0}", status="generated", source="a test")
     def ring(n):

@@ -48,7 +48,7 @@ def test_a_warm_up_is_certain_whatever_is_open_beside_it():
     assert found.verdict == "unknown"
     assert found.effects == ()
     assert [name.name for name in found.certain[0].names] == ["warm_up"]
-    assert "warm_up" in [effect.name for effect in found.extended.effects]
+    assert "warm_up" in [effect.name for effect in found.extended_model.effects]
     assert found.gap.before > 5 * found.gap.after
     assert found.gap.confirmed
     before, after = found.leveling
@@ -161,7 +161,7 @@ def test_exchanged_angles_of_the_robot_are_recognised():
     campaign, _ = session(24, np.random.default_rng(25), "robot")
     found = recognise(replace(campaign, angles=campaign.angles[:, ::-1].copy()))
     assert found.reason == "roll and pitch of the robot are exchanged"
-    np.testing.assert_array_equal(found.mended.angles, campaign.angles)
+    np.testing.assert_array_equal(found.corrected.angles, campaign.angles)
 
 
 def test_a_diagnosis_that_has_no_solution_does_not_advise_a_diagnosis():

@@ -11,7 +11,7 @@ from usual import GRAVITY, NINE, ROBOT, G
 from accelstudy.diagnosis.decision.noise import misfit
 from accelstudy.diagnosis.decision.posterior import Explanation, Posterior, credible_set
 from accelstudy.diagnosis.evidence.candidates import Cause
-from accelstudy.diagnosis.evidence.detection import log_ratio, simulated
+from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio
 from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.noise_tests import NOISES, most_evidence
 from accelstudy.diagnosis.evidence.size import (
@@ -26,7 +26,7 @@ from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 
 R = 40
-LEVELS = {"given": Level.given(), "not given": Level((1.0,), (0.5,), known=False)}
+LEVELS = {"given": Level.of_stated_sigma(), "not given": Level((1.0,), (0.5,), known=False)}
 
 
 def exact(level, z, kernel, sizes=SIZES, weights=SIZE_WEIGHTS):
@@ -46,7 +46,7 @@ def exact(level, z, kernel, sizes=SIZES, weights=SIZE_WEIGHTS):
 
 def against_noise(evidence, logs, z):
     """Log densities less that of noise alone."""
-    nothing = np.logaddexp.reduce(evidence.of_noise(np.sum(z**2, axis=-1)), axis=-1)
+    nothing = np.logaddexp.reduce(evidence.noise_density(np.sum(z**2, axis=-1)), axis=-1)
     return logs - nothing[..., None]
 
 
@@ -58,7 +58,7 @@ def test_densities_are_mixtures_of_t_distributions(known):
     z = np.array([[0.5], [1.0], [2.0]]) * rng.standard_normal((3, R)) + 6 * bases[1][:, 1]
     evidence = Evidence(LEVELS[known], R)
     parts = np.stack([np.sum((z @ b) ** 2, axis=1) for b in bases], axis=1)
-    found = evidence.of_spaces(parts, [1, 3, 6], np.sum(z**2, axis=1))
+    found = evidence.spaces_density(parts, [1, 3, 6], np.sum(z**2, axis=1))
     expected = [exact(LEVELS[known], z, b @ b.T / b.shape[1]) for b in bases]
     assert pytest.approx(np.array(expected), abs=0.01) == against_noise(evidence, found, z).T
 
@@ -76,7 +76,7 @@ def test_densities_are_those_of_gaussian_processes(known):
     evidence, along = Evidence(level, R), [(z @ basis) ** 2 for basis in bases]
     for some, digits in ((slice(None), 1e-3), (slice(1), 1e-9)):
         squares = np.sum(z[some] ** 2, axis=1)
-        found = evidence.of_shapes([a[some] for a in along], shares, squares)
+        found = evidence.shapes_density([a[some] for a in along], shares, squares)
         assert against_noise(evidence, found, z[some]) == pytest.approx(expected[some], abs=digits)
 
 
@@ -89,7 +89,7 @@ def test_noise_is_not_noise_with_an_effect(examined):
     """What is drawn with an effect is found, and its weight takes it out again."""
     residuals, rng = examined.frame.residuals, np.random.default_rng(3)
     candidates = [*examined.candidates.values()]
-    changed = simulated(candidates, len(residuals.design), 400, rng)
+    changed = draw_effects(candidates, len(residuals.design), 400, rng)
     noise = rng.standard_normal(changed.shape) + residuals.project(changed.T).T
     z = residuals.project(noise.T).T
     weights = np.exp(-log_ratio(candidates, [shapes.parts(z) for shapes in candidates]))
@@ -110,7 +110,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
             noise = Noise(sigma_angle=1e-6, effects=effects)
             residuals = design(shuffled("fibonacci-60"), approach, noise=noise, seed=seed)
             residuals = residuals.frame.residuals
-            evidence = Evidence(Level.unknown(), residuals.redundancy)
+            evidence = Evidence(Level.of_nothing_stated(), residuals.redundancy)
             axes = UnequalAxes.of(residuals, evidence, None)
             odds[effect].append(axes.log_evidence)
             assert np.prod(axes.ratios) == pytest.approx(1.0)
@@ -123,7 +123,7 @@ def test_axes_are_weighted_as_far_as_the_data_say(approach):
 def test_what_the_holds_show_of_the_axes_counts_where_residuals_say_little():
     """With equal residuals the ratios within the holds are believed by half or so."""
     residuals = design(shuffled("mclaren-24"), GRAVITY, seed=3).frame.residuals
-    evidence = Evidence(Level.unknown(), residuals.redundancy)
+    evidence = Evidence(Level.of_nothing_stated(), residuals.redundancy)
     alone = UnequalAxes.of(residuals, evidence, None).ratios
     shown = UnequalAxes.of(residuals, evidence, np.array([1.0, 1.0, 4.0])).ratios
     assert alone[2] / np.mean(alone[:2]) < shown[2] / np.mean(shown[:2]) < 5
@@ -178,7 +178,7 @@ def test_wrong_noise_of_all_kinds_is_one_explanation():
         weighed((("bias",), 0.4), (("axis_noise",), 0.2), (("heavy_tails",), 0.4 - 1e-9))
     )
     assert posterior.reported[0].names == ("heavy_tails",)
-    assert posterior.of_noise == pytest.approx(0.6)
+    assert posterior.p_noise == pytest.approx(0.6)
 
 
 def test_a_credible_set_is_the_smallest():
@@ -188,10 +188,10 @@ def test_a_credible_set_is_the_smallest():
 
 
 @pytest.mark.parametrize(("level", "spread", "of_repeats"), [
-    (Level.unknown(), 0.02, True),
-    (Level.given(), 0.02, False),
-    (Level.unknown(), 0.0, None),
-    (Level.given(), 0.0, None),
+    (Level.of_nothing_stated(), 0.02, True),
+    (Level.of_stated_sigma(), 0.02, False),
+    (Level.of_nothing_stated(), 0.0, None),
+    (Level.of_stated_sigma(), 0.0, None),
 ])  # fmt: skip
 def test_a_fit_that_misses_more_than_the_noise_is_no_explanation(level, spread, of_repeats):
     rng = np.random.default_rng(8)

@@ -15,14 +15,18 @@ from accelstudy.diagnosis.evidence.detection import Chance, detect
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.prediction import LinearSplit, held_out_gap, split_positions
-from accelstudy.diagnosis.report.words import said
+from accelstudy.diagnosis.report.words import render
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.simulation.sessions import Noise, session
 
 SETS = 25_000
 
 
-@pytest.fixture(scope="module", params=[Level.given(), Level.unknown()], ids=["given", "not given"])
+@pytest.fixture(
+    scope="module",
+    params=[Level.of_stated_sigma(), Level.of_nothing_stated()],
+    ids=["given", "not given"],
+)
 def parts(request):
     """Problems of all positions and of two thirds, and the split, with nothing missing."""
     ideal = session(NINE, np.zeros(NINE.n_parameters), shuffled("fibonacci-30"), G)
@@ -44,14 +48,14 @@ def test_a_name_that_noise_made_is_confirmed_in_5_percent(parts):
     problem, part, split = parts
     residuals, field, evidence = problem.residuals, problem.field, problem.evidence
     chance = Chance(np.random.SeedSequence(1), len(residuals.design))
-    beyond = detect(field, evidence, residuals, chance).beyond(RULES.level_effects)
+    beyond = detect(field, evidence, residuals, chance).threshold(RULES.level_effects)
     weighing, rng = Alternatives(problem), np.random.default_rng(3)
     needed = held_out.threshold(weighing, None, beyond, part, split, rng)
     assert needed > RULES.z_significant + 0.3
     rng = np.random.default_rng(4)
     noise = rng.standard_normal((SETS, len(residuals.design)))
     z = residuals.project(noise.T).T
-    odds = field.odds(evidence, field.seen(z))
+    odds = field.odds(evidence, field.project(z))
     of_any = np.logaddexp.reduce(odds, axis=1) - np.log(len(field.names))
     label = held_out.labels(weighing.classes)
     claimed = held_out.claimed_names(odds, field.names, label)
@@ -75,7 +79,7 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     rest = first.observed.take(split.held)
     gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
     errors = problem.residuals.errors[None]
-    missed = split.beside(errors)[1]
+    missed = split.base_residuals(errors)[1]
     (columns,) = problem.frame.columns([weighed(problem).best["quadratic_scale"]])
     change = split.corrections(errors, [(0, columns, 0.0)])
     assert np.mean(missed**2) == pytest.approx(gap.before, rel=0.02)
@@ -106,7 +110,7 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
     assert found.gap.confirmed
     assert set(found.gap.names) == GROUPS[case]
     assert found.gap.statement == ("name" if len(GROUPS[case]) == 1 else "effect")
-    (line,) = said("confirmation", found)
+    (line,) = render("confirmation", found)
     assert all(words(name) in line for name in GROUPS[case])
 
 
@@ -121,7 +125,7 @@ def test_no_name_is_confirmed_where_the_fit_leaves_more_than_the_stated_noise():
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
     assert found.gap.confirmed
     assert found.gap.statement == "effect"
-    (line,) = said("confirmation", found)
+    (line,) = render("confirmation", found)
     assert line.endswith("rather than a rival, since more is left than the stated noise.")
 
 

@@ -35,7 +35,7 @@ from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.figures import gap_figure
 from accelstudy.diagnosis.report.output import write_diagnosis
-from accelstudy.diagnosis.report.words import said, verdict_lines, warnings
+from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
 from accelstudy.diagnosis.result import Rival
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.rules import RULES
@@ -256,7 +256,7 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
 
 def test_a_further_effect_is_asked_for_as_such():
     for separates in (((), ("scale_asymmetry",)), (("scale_asymmetry",), ())):
-        assert said("question", separates) == ["whether scale asymmetry is missing as well"]
+        assert render("question", separates) == ["whether scale asymmetry is missing as well"]
 
 
 @pytest.mark.parametrize(("change", "path"), [

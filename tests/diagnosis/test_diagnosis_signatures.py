@@ -94,7 +94,7 @@ def test_what_an_effect_leaves_in_the_residuals(designs, name, approach):
     fitted = Residuals.of(solve(NINE, approach, observed)).z
     expected = columns @ p
     scale = np.linalg.norm(
-        examined.frame.residuals.whitened(
+        examined.frame.residuals.whiten(
             signature(effect, examined.frame.forces, examined.frame.angles, G, examined.frame.hold)
         )
         @ p

@@ -11,12 +11,12 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.evidence.size import Evidence
-from accelstudy.diagnosis.formulas import ranked
+from accelstudy.diagnosis.formulas import rank_formulas
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import shape_document
 from accelstudy.diagnosis.report.figures import AXES, shape_figure
 from accelstudy.diagnosis.report.words import advice, verdict_lines
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.effects import get_effect
 
 SIGMA, N = 2e-3, 40
@@ -73,8 +73,8 @@ def test_the_right_formula_comes_first():
             # Large enough that the parameters of the model cannot take up most of it.
             change *= np.sqrt(500 / np.sum(change**2)) * SIGMA
             base = fit_base(replace(campaign, forces=campaign.forces + change), NINE, ROBOT)
-            frame = Frame.of(base.solution)
-            ranking = ranked(
+            frame = SessionFit.of(base.solution)
+            ranking = rank_formulas(
                 frame,
                 Evidence(base.level, frame.residuals.redundancy),
                 get_effect(f"learned({words}, target=bias)"),
@@ -107,7 +107,7 @@ def learned():
 def test_the_table_is_the_function_of_the_model(learned):
     document = shape_document(learned.shape)
     effect = get_effect(learned.found[0].spec)
-    values = dict(zip(learned.extended.parameter_names, learned.final.solution.parameters,
+    values = dict(zip(learned.extended_model.parameter_names, learned.final.solution.parameters,
                       strict=False))  # fmt: skip
     grid, table = np.array(document["function"]["coordinate"]), document["function"]
     at = type("Hold", (), {"yaw": grid})

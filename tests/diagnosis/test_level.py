@@ -14,7 +14,7 @@ from accelstudy.campaign.calibration.wording import verdict_lines as calibrated_
 from accelstudy.diagnosis.decision.problem import BaseFit, Problem
 from accelstudy.diagnosis.evidence import detection
 from accelstudy.diagnosis.evidence.candidates import Field
-from accelstudy.diagnosis.evidence.detection import Chance, detect, tail, total_odds
+from accelstudy.diagnosis.evidence.detection import Chance, detect, tail_probability, total_odds
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
@@ -22,7 +22,7 @@ from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 
 GIVEN, NOT_GIVEN = 0.03, 0.04
 """How often noise alone may count as something missing, where sigma is given and where not."""
@@ -37,9 +37,9 @@ def designs():
 
 
 @pytest.mark.parametrize(("approach", "level", "wanted"), [
-    ("robot", Level.given(), GIVEN),
-    ("gravity", Level.unknown(), NOT_GIVEN),
-    ("gravity", Level.within_holds(), NOT_GIVEN),
+    ("robot", Level.of_stated_sigma(), GIVEN),
+    ("gravity", Level.of_nothing_stated(), NOT_GIVEN),
+    ("gravity", Level.of_holds(), NOT_GIVEN),
 ])  # fmt: skip
 def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level, wanted):
     """Each null simulation has a seed of its own, so that the rates scatter as they really do."""
@@ -53,8 +53,8 @@ def test_noise_alone_counts_as_often_as_the_level_says(designs, approach, level,
         errors = rng.standard_normal((SETS, len(residuals.design)))
         found = detect(field, evidence, replace(residuals, errors=errors[0]), chance)
         z = residuals.project(errors.T).T
-        odds = total_odds(field.odds(evidence, field.seen(z)))
-        p = np.array([tail(found.by_chance, found.weights, value) for value in odds])
+        odds = total_odds(field.odds(evidence, field.project(z)))
+        p = np.array([tail_probability(found.by_chance, found.weights, value) for value in odds])
         # Densities of many sets at once are rounded: one or two may move past the observed one.
         assert p[0] == pytest.approx(found.p_value, abs=0.005)
         rates.append(np.mean(p < RULES.level(level.known)))
@@ -93,7 +93,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:
             assert "weak" in verdict_lines(found)[0]
-            assert lines(TEMPLATE, "agreement", found)[0] in says
+            assert render_lines(TEMPLATE, "agreement", found)[0] in says
 
 
 def test_no_random_number_is_drawn_twice(monkeypatch):
@@ -104,7 +104,7 @@ def test_no_random_number_is_drawn_twice(monkeypatch):
     residuals = Residuals(design, np.zeros(n + priors), one, one, np.ones((n, 1)))
     chance = Chance(np.random.SeedSequence(1), n, sets)
     monkeypatch.setattr(
-        detection, "simulated", lambda _, m, count, rng: rng.standard_normal((count, m))
+        detection, "draw_effects", lambda _, m, count, rng: rng.standard_normal((count, m))
     )
     plain = np.concatenate(list(chance.errors(residuals)))
     changed = np.concatenate(list(chance.errors_with_effects(residuals, Field({}))))[sets // 2 :]

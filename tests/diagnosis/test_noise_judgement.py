@@ -137,7 +137,7 @@ def repeated(level, scatter=1.0, missed=0.0, seed=4):
 @pytest.mark.parametrize("missed", [0.0, 0.003])
 def test_lack_of_fit_is_the_analysis_of_variance(missed):
     """The mean of two repeats against the model, by what they differ: F with 9 and 18."""
-    problem = repeated(Level.given(), missed=missed)
+    problem = repeated(Level.of_stated_sigma(), missed=missed)
     e = problem.base.solution.misclosures[:, 0]
     pure = np.sum((e[:18] - e[18:]) ** 2) / 2
     f = (np.sum(e**2) - pure) / 9 / (pure / 18)
@@ -173,10 +173,10 @@ def test_repeats_by_hand_count_and_the_lack_of_fit_keeps_its_level():
 
 
 @pytest.mark.parametrize(("level", "scatter", "holds"), [
-    (Level.given(), 1.0, True),
-    (Level.given(), 2.0, False),
-    (Level.given(), 0.4, False),
-    (Level.unknown(), 1.0, False),
+    (Level.of_stated_sigma(), 1.0, True),
+    (Level.of_stated_sigma(), 2.0, False),
+    (Level.of_stated_sigma(), 0.4, False),
+    (Level.of_nothing_stated(), 1.0, False),
 ])  # fmt: skip
 def test_sigma_is_taken_where_it_is_given_and_not_refuted(level, scatter, holds):
     problem = repeated(level, scatter)

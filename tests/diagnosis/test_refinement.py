@@ -7,7 +7,7 @@ import pytest
 from diagnosis_helpers import design, shuffled, some_holds
 from usual import GRAVITY, ROBOT
 
-from accelstudy.diagnosis.evidence.candidates import refined, shaped
+from accelstudy.diagnosis.evidence.candidates import refine, reshape
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 
 SIZE = 8.0
@@ -23,7 +23,7 @@ def hidden(course, n=40, seed=1):
     def rows(values):
         """Three columns of unit weight for each of so many courses, (k, m, 3)."""
         change = residuals.by_observations[..., :3]
-        each = [residuals.stacked(change * one[:, None, None]) for one in values.T]
+        each = [residuals.stack(change * one[:, None, None]) for one in values.T]
         return np.array([residuals.project(one) for one in each])
 
     shown = rows(course[:, None])[0]
@@ -47,7 +47,7 @@ def test_a_time_constant_is_the_best_of_a_fine_search(tau):
     taus = np.geomspace(120, 2340, 1500)
     parts = explained(np.exp(-time[:, None] / taus))
     before = examined.candidates["warm_up"]
-    after = refined(examined, before)
+    after = refine(examined, before)
     z = examined.frame.residuals.z
     best = after.strongest(z)
     assert np.sum((z @ best.basis) ** 2) == pytest.approx(parts.max(), abs=0.1)
@@ -67,7 +67,7 @@ def test_of_very_many_times_of_a_jump_the_best_is_found():
     parts = explained((time[:, None] > middles).astype(float))
     before = examined.candidates["bias_jump"]
     assert len(before) < len(middles)
-    best = refined(examined, before).strongest(examined.frame.residuals.z)
+    best = refine(examined, before).strongest(examined.frame.residuals.z)
     assert best.effect.settings["t"] == middles[np.argmax(parts)]
     tried = {h.effect.settings["t"] for h in before}
     assert best.effect.settings["t"] not in tried
@@ -78,12 +78,12 @@ def test_a_shape_that_shows_less_is_none():
     examined = design(shuffled("fibonacci-30"), GRAVITY, some_holds(30))
     warm_up = examined.candidates["warm_up"][3]
     assert warm_up.dim == 3
-    assert shaped(examined, warm_up, 300.0).dim == 3
-    assert shaped(examined, warm_up, 1.0) is None
+    assert reshape(examined, warm_up, 300.0).dim == 3
+    assert reshape(examined, warm_up, 1.0) is None
 
 
 @pytest.mark.parametrize("name", ["scale_asymmetry", OUTLIER])
 def test_what_has_no_shapes_between_stays_as_it_is(name):
     examined, _ = hidden(np.ones(12) * np.arange(12), 12)
     shapes = examined.candidates[name]
-    assert refined(examined, shapes) is shapes
+    assert refine(examined, shapes) is shapes

@@ -31,7 +31,7 @@ def problem(request):
     chosen = CHOSEN[request.param.name]
     shapes = {name: examined.candidates[name] for name in chosen if name in examined.candidates}
     residuals = examined.frame.residuals
-    return shapes, residuals, Evidence(Level.given(), residuals.redundancy)
+    return shapes, residuals, Evidence(Level.of_stated_sigma(), residuals.redundancy)
 
 
 def log_density(hypotheses, residuals, evidence):
@@ -45,7 +45,7 @@ def log_density(hypotheses, residuals, evidence):
     if basis.shape[1] >= residuals.redundancy:
         return None
     part = np.array([np.sum((basis.T @ residuals.z) ** 2)])
-    return float(evidence.of_spaces(part, [basis.shape[1]], residuals.z @ residuals.z)[0])
+    return float(evidence.spaces_density(part, [basis.shape[1]], residuals.z @ residuals.z)[0])
 
 
 def pairs_of(shapes, residuals, evidence):

@@ -42,7 +42,7 @@ def shares(frame, shapes, change):
     """Share of what a change of the force (n, 3) shows that lies in a shape of each place."""
     residuals = frame.residuals
     row = residuals.by_observations[..., :3] @ change[..., None]
-    row = residuals.project(residuals.stacked(row))
+    row = residuals.project(residuals.stack(row))
     row /= np.linalg.norm(row)
     found = {}
     for place, vectors in zip(shapes.places, shapes.split(shapes.vectors), strict=True):
@@ -91,7 +91,7 @@ def test_a_course_of_time_has_the_covariance_of_its_kernel(frame, shapes):
         kernel = np.exp(-((t[:, None] - t) ** 2) / 2 / length**2)
         root = np.linalg.svd(kernel)[0] * np.sqrt(np.linalg.svd(kernel)[1])
         change = np.einsum("nk,ab->nakb", root, np.eye(3)).reshape(len(t), 3, -1)
-        rows = residuals.project(residuals.stacked(residuals.by_observations[..., :3] @ change))
+        rows = residuals.project(residuals.stack(residuals.by_observations[..., :3] @ change))
         expected = rows @ rows.T / np.sum(rows**2)
         assert np.linalg.norm(found - expected) < 0.15 * np.linalg.norm(expected)
 
@@ -100,7 +100,7 @@ def test_beside_an_effect_a_shape_is_what_the_effect_leaves(shapes):
     rng = np.random.default_rng(2)
     basis = np.linalg.qr(shapes.vectors @ rng.standard_normal((shapes.vectors.shape[1], 3)))[0]
     left = np.eye(len(basis)) - basis @ basis.T
-    beside = shapes.beside(basis)
+    beside = shapes.orthogonal_to(basis)
     assert len(beside.places) == len(shapes.places)
     for before, after in zip(covariances(shapes), covariances(beside), strict=True):
         expected = left @ before @ left

@@ -74,7 +74,7 @@ def test_a_course_that_a_thermometer_shows_is_an_effect():
     found = diagnose(replace(measured, temperature=20 + 3 * wandering(t)), NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
     assert found.code != "unrecorded"
-    assert found.coloured == 0
+    assert found.p_coloured == 0
 
 
 @pytest.mark.parametrize(("name", "course"), [

@@ -11,10 +11,10 @@ from session_helpers import NINE, SENSOR, document, write_document
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
-from accelstudy.campaign.calibration.applying import calibration_of
 from accelstudy.campaign.calibration.document import json_text
+from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.comparison import Comparison
-from accelstudy.leveling.angles import angles_of, wrapped
+from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import cap_forces
 
 CROSS = "cross_axis_misalignment: 0.004, 0.003, -0.002"
@@ -66,9 +66,9 @@ def test_the_change_of_roll_and_pitch_is_that_of_readings():
     c = compare(first, second)
     forces = cap_forces(50 * GON, 5000, second.gravity)
     readings = first.model.sense(forces, first.parameters)
-    apart = wrapped(angles_of(second.correct(readings)) - angles_of(forces))
+    apart = wrap_angle(angles_of(second.correct(readings)) - angles_of(forces))
     np.testing.assert_allclose(c.tilt[0], np.sqrt(np.mean(apart**2, axis=0)), rtol=0.01)
-    assert [c.parameters[i].name for i in c.change.changed] == ["b_y"]
+    assert [c.parameters[i].name for i in c.change.fewest_changes] == ["b_y"]
 
 
 def test_another_gravity_is_said_to_change_the_scales():

@@ -116,7 +116,7 @@ def test_the_parameter_that_changed_is_named_and_no_other():
     n = 200
     for true, said in ((none, ()), (one, (4,)), (two, (0, 4))):
         right = [
-            Differences(d, q, (np.inf, np.inf)).changed == said
+            Differences(d, q, (np.inf, np.inf)).fewest_changes == said
             for d in true + differences(rng, sum(q), n)
         ]
         assert np.mean(right) >= 1 - LEVEL - tolerance(LEVEL, n)
@@ -127,5 +127,5 @@ def test_parameters_that_cannot_be_told_apart_are_named_together():
     correlation[0, 1] = correlation[1, 0] = -0.999
     covariance = correlation / 2
     change = Differences(np.array([0.2, 0.0, 0.3]), (covariance, covariance), (np.inf, np.inf))
-    (found,) = change.changed
+    (found,) = change.fewest_changes
     assert change.instead_of(found) == (1 - found,)

@@ -13,7 +13,7 @@ import accelstudy
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL, POWER
-from accelstudy.epochs.course import Course
+from accelstudy.epochs.course import ParameterCourse
 
 N = 500
 STANDARD_ERRORS = 3.3
@@ -37,7 +37,7 @@ def drawn(seed, sigmas, *, n=N, rate=0.0, scatter=0.0, dof=STATED):
         variances = np.where(
             sure, 1.0, rng.chisquare(np.where(sure, 1.0, dof)) / np.where(sure, 1, dof)
         )
-        yield Course(DATES, values, sigmas**2 * variances, dof)
+        yield ParameterCourse(DATES, values, sigmas**2 * variances, dof)
 
 
 @pytest.mark.parametrize(("sigmas", "dof"), [
@@ -82,7 +82,7 @@ def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
     for _ in range(n):
         walk = 100 * np.sqrt(np.diff(years)) * rng.standard_normal(n_sessions - 1)
         values = rate * years + np.append(0, np.cumsum(walk)) + rng.standard_normal(n_sessions)
-        course = Course(years, values, ones, np.inf * ones)
+        course = ParameterCourse(years, values, ones, np.inf * ones)
         usual += course.rate.interval[0] < rate < course.rate.interval[1]
         wandering += course.wandering_rate.interval[0] < rate < course.wandering_rate.interval[1]
         if "drifts" in course.found(level):
@@ -92,7 +92,9 @@ def test_a_random_walk_has_an_interval_of_its_own(n_sessions):
     assert usual / n <= 0.8
     # That a drift may be none is said of nearly all that are named, and of no strong one.
     assert np.mean(named) >= 0.8
-    strong = Course(years, 1000 * years + rng.standard_normal(n_sessions), ones, np.inf * ones)
+    strong = ParameterCourse(
+        years, 1000 * years + rng.standard_normal(n_sessions), ones, np.inf * ones
+    )
     assert strong.wandering_rate.p_value < level
 
 
@@ -109,7 +111,7 @@ def test_all_tests_have_one_level(true):
         values = UNEQUAL[:, None] * (rng.standard_normal((6, 9)) @ root.T)
         shape = rng.standard_normal((6, 3)) if true == "scatters" else np.tile(DATES, (3, 1)).T
         values[:, :many] += 20 * shape[:, :many]
-        found = [{*Course(DATES, x, v, STATED).found(LEVEL / 9)}
+        found = [{*ParameterCourse(DATES, x, v, STATED).found(LEVEL / 9)}
                  for x, v in zip(values.T, variances.T, strict=True)]  # fmt: skip
         wrong += any(f - right for f in found[:many]) or any(found[many:])
     assert wrong / n <= LEVEL + tolerance(LEVEL, n)
@@ -117,7 +119,7 @@ def test_all_tests_have_one_level(true):
 
 @pytest.mark.parametrize(("sigmas", "dof"), [(UNEQUAL, STATED), (EQUAL, np.full(6, 15.0))])
 def test_what_is_detectable_is_found_as_often_as_is_said(sigmas, dof):
-    known = Course(DATES, DATES, sigmas**2, dof)
+    known = ParameterCourse(DATES, DATES, sigmas**2, dof)
     for size in (
         {"rate": known.detectable_rate(0.01)}, {"scatter": known.detectable_scatter(0.01)}
     ):  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from session_helpers import document
 
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import calibration_of
+from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.course import YEAR
 from accelstudy.epochs.history import History
 from accelstudy.epochs.interval import MAX_YEARS, Interval

@@ -67,7 +67,7 @@ def design(directions, approach=ROBOT, hold=None, model=NINE, noise=None, seed=N
 
 def posed(approach, observed, level=None):
     """The problem of a session, whose sigma is known or of a given level of knowledge."""
-    return pose(BaseFit(solve(NINE, approach, observed), level or Level.given(), None))
+    return pose(BaseFit(solve(NINE, approach, observed), level or Level.of_stated_sigma(), None))
 
 
 def explanation(text, log_weight=np.nan, posterior=np.nan, best=()):

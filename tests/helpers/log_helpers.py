@@ -11,7 +11,7 @@ from accelstudy.campaign.header import LogLayout
 from accelstudy.campaign.importing import detection
 from accelstudy.campaign.importing.recording import Recording, read_log
 from accelstudy.campaign.importing.settings import parse_settings
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 
 # --- a log of which the holds are known ----------------------------------------------------------
 
@@ -52,7 +52,7 @@ def write(folder, forces, time=None):
 
 def open_log(path, **layout):
     """Open a log as keys of its layout say."""
-    return Recording([read_log(path, checked(LogLayout, layout, "layout"))])
+    return Recording([read_log(path, validate(LogLayout, layout, "layout"))])
 
 
 def opened(folder, forces, time=None, **options):

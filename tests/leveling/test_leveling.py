@@ -15,7 +15,7 @@ from accelstudy.leveling.angles import (
     roll_pitch,
     sigma_roll_pitch,
     specific_force,
-    wrapped,
+    wrap_angle,
 )
 
 ROLLS = st.floats(-199 * GON, 199 * GON)
@@ -124,7 +124,7 @@ def test_the_pole_itself_is_too_close_whatever_the_sigmas_are():
 
 def test_angles_wrap_to_half_a_turn_either_way():
     angles = np.array([[0.0, 0.5], [np.pi - 1e-9, -np.pi], [3.5 * np.pi, -4.2]])
-    found = wrapped(angles)
+    found = wrap_angle(angles)
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angles), atol=1e-14)
     assert np.all((found >= -np.pi) & (found < np.pi))
-    assert wrapped(np.pi) == -np.pi
+    assert wrap_angle(np.pi) == -np.pi

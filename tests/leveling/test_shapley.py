@@ -9,9 +9,9 @@ from usual import GRAVITY, NINE, PAPER, G
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force
-from accelstudy.leveling.sensitivity import leveled, leveling_sensitivity
+from accelstudy.leveling.sensitivity import leveling_sensitivity, sample_leveling
 from accelstudy.leveling.shapley import linear_shapley
-from accelstudy.leveling.shares import leveling_shares, leveling_slope, overtaken
+from accelstudy.leveling.shares import leveling_shares, leveling_slope, order_changes
 from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise
 
@@ -110,7 +110,7 @@ def shares_of(scheme, roll, pitch):
 def test_the_slope_is_the_derivative():
     attitude = np.array([30.0, -20.0]) * GON
     f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
-    mean, function = np.concatenate([f_s[0], PAPER]), leveled(attitude, NINE)
+    mean, function = np.concatenate([f_s[0], PAPER]), sample_leveling(attitude, NINE)
     step = 1e-5 * np.eye(len(NAMES))
     numeric = (function(mean + step) - function(mean - step)).T / 2e-5
     slope = leveling_slope(NINE, PAPER, f_s, G)[0]
@@ -142,7 +142,7 @@ def test_correlated_scales_gain_and_overtake_the_biases():
     level = shares.loc["roll", 0.0, 0.0]
     np.testing.assert_allclose(level["shapley_effect"], level["total_effect"], atol=1e-4)
 
-    changed = overtaken(table)
+    changed = order_changes(table)
     at = changed[["output", "roll_gon", "pitch_gon"]].drop_duplicates().to_numpy().tolist()
     assert at == [["roll", 50.0, 25.0]]
     pairs = set(zip(changed["input"], changed["over"], strict=True))
@@ -162,7 +162,9 @@ def test_near_the_pole_shares_are_not_defined():
         f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
         mean = np.concatenate([f_s[0], PAPER])
         slope = leveling_slope(NINE, PAPER, f_s, G)[0]
-        offsets = leveled(attitude, NINE)(mean + sigma * rng.standard_normal((20_000, len(mean))))
+        offsets = sample_leveling(attitude, NINE)(
+            mean + sigma * rng.standard_normal((20_000, len(mean)))
+        )
         linear = np.sqrt((slope**2) @ sigma**2)
         # An sd of 20 000 draws is right to 0.5 %.
         fits = np.abs(offsets.std(axis=0) / linear - 1) < 0.025

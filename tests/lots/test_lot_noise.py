@@ -12,7 +12,7 @@ from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
 from accelstudy.lots.mean import mean_sensor
-from accelstudy.lots.noise import Agreement, SensorNoise, noises_of_lot
+from accelstudy.lots.noise import Agreement, NoisePrior, noises_of_lot
 
 N, REDUNDANCY = 16, 40
 QUIET, ROUGH = 3e-4, 2e-3
@@ -27,7 +27,7 @@ def fit(true, k, stated=None, within=None):
     """
     ratio = 1 + 0.11 * np.linspace(-1.5, 1.5, N)[k * 7 % N]
     return SimpleNamespace(
-        level=Level.unknown() if stated is None else Level.given(),
+        level=Level.of_nothing_stated() if stated is None else Level.of_stated_sigma(),
         within=None if within is None else np.full(3, within**2),
         sigma=stated or true * ratio,
         sigma_posteriori=true * ratio,
@@ -131,7 +131,7 @@ def test_the_mean_has_weights_by_known_noise_and_its_variance():
         squares = 30 * np.sum((sigmas * signs - shift) ** 2 / variances) / 90
         return shift, np.sqrt(squares / np.sum(1 / variances)), weights
 
-    known = [SensorNoise(s, RULES.freedom_given) for s in sigmas]
+    known = [NoisePrior(s, RULES.freedom_given) for s in sigmas]
     alone = np.append(sigmas[:2] ** 2, np.full(2, np.mean(sigmas[2:] ** 2)))
     for noises, variances in ((known, sigmas**2), ([*known[:2], None, None], alone)):
         shift, sigma, weights = expected(variances)

@@ -177,8 +177,8 @@ def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     d, one = derivatives.reshape(-1, 3), z.ravel()
     fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
     evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 4 * ROWS)
-    part = evidence.of_spaces(np.array([fitted @ fitted]), [3], one @ one)[0]
-    assert joint.odds == pytest.approx(part - evidence.of_noise(one @ one)[0], rel=1e-6)
+    part = evidence.spaces_density(np.array([fitted @ fitted]), [3], one @ one)[0]
+    assert joint.odds == pytest.approx(part - evidence.noise_density(one @ one)[0], rel=1e-6)
     assert joint.spec == "effect"
 
 

@@ -17,7 +17,7 @@ from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.lots.noise import SensorNoise
+from accelstudy.lots.noise import NoisePrior
 from accelstudy.lots.output import Lot
 from accelstudy.lots.type_file import write_type
 from accelstudy.schemes import get_scheme
@@ -47,7 +47,7 @@ def fitted(campaign):
 def type_of(sensors, folder):
     """The file of a type of which nothing is missing and no sensor is odd."""
     fits = [fitted(one) for one in sensors]
-    named = [SimpleNamespace(noise=SensorNoise(0.002, 200.0)) for _ in sensors]
+    named = [SimpleNamespace(noise=NoisePrior(0.002, 200.0)) for _ in sensors]
     lot = SimpleNamespace(
         usual=range(len(sensors)), sensors=named, each=(), effects=(), model=MODEL,
     )  # fmt: skip

@@ -14,8 +14,8 @@ from accelstudy.data_sheets import (
     DataSheet,
     data_sheet_names,
     get_data_sheet,
-    of_sigma,
     parse_data_sheet,
+    sheet_of_sigma,
 )
 from accelstudy.data_sheets.measured import with_history
 from accelstudy.data_sheets.sheet import FLICKER, flicker_change
@@ -28,8 +28,8 @@ def test_each_value_of_a_sensor_that_comes_along_has_its_source(name):
     assert sheet.name == name
     assert sheet.title
     assert sheet.source
-    assert all(sheet.sources[quantity] for quantity in sheet.known)
-    assert set(sheet.known) | set(sheet.unknown) <= set(QUANTITIES)
+    assert all(sheet.sources[quantity] for quantity in sheet.known_quantities)
+    assert set(sheet.known_quantities) | set(sheet.unknown_quantities) <= set(QUANTITIES)
     assert 1e-6 < sheet.sigma_mean(10.0) < 0.01
 
 
@@ -67,7 +67,7 @@ def test_the_bias_changes_with_time_temperature_and_switching_on():
     )  # fmt: skip
     assert sheet.bias_change(0.0) == 0
     assert sheet.bias_change(3600.0) == pytest.approx(6e-4)
-    assert sheet.warmed(10.0) == pytest.approx((1e-2, 0.0))
+    assert sheet.temperature_sigmas(10.0) == pytest.approx((1e-2, 0.0))
     assert sheet.bias_change(0.0, restarted=True) == pytest.approx(5e-3)
 
 
@@ -133,7 +133,11 @@ def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_pa
 
 
 def test_a_sensor_of_which_only_the_noise_is_known_keeps_it_however_long_the_hold():
-    assert of_sigma(0.002).sigma_mean(1.0) == of_sigma(0.002).sigma_mean(100.0, 1000.0) == 0.002
+    assert (
+        sheet_of_sigma(0.002).sigma_mean(1.0)
+        == sheet_of_sigma(0.002).sigma_mean(100.0, 1000.0)
+        == 0.002
+    )
 
 
 # --- from what was measured ----------------------------------------------------------------------
@@ -203,12 +207,12 @@ def test_a_history_tells_drift_and_switch_on_scatter(tmp_path):
     """The change of the bias between two sessions of simulated sensors, rms over the axes."""
     rng = np.random.default_rng(9)
     scatter, rate, years = np.array([1e-3, 4e-3, 0.0]), np.array([2e-3, 0.0, -6e-3]), 0.7
-    sheet = with_history(of_sigma(2e-3), history(tmp_path / "history.json", scatter, rate))
+    sheet = with_history(sheet_of_sigma(2e-3), history(tmp_path / "history.json", scatter, rate))
     one, other = scatter * rng.standard_normal((2, 20_000, 3))
     change = np.sqrt(np.mean((other + rate * years - one) ** 2))
     said = sheet.bias_change(years * 365.25 * 86400, restarted=True)
     assert said == pytest.approx(change, rel=0.01)
-    assert "repeatability" in sheet.known
+    assert "repeatability" in sheet.known_quantities
 
 
 def test_a_history_without_a_bias_is_refused(tmp_path):

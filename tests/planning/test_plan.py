@@ -19,20 +19,20 @@ from usual import NINE, G
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, angles_in
-from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, of_sigma
+from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.estimability import estimability
 from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
+from accelstudy.planning.best_positions import CalibrationKind
 from accelstudy.planning.candidates import candidates, information_of, tilt_of
-from accelstudy.planning.optimised import Kind
 from accelstudy.planning.question import BY_HAND, ROBOT, Question
-from accelstudy.planning.reasons import in_use, limits, spoilers
-from accelstudy.planning.simulated import simulate, study_of
+from accelstudy.planning.reasons import errors_in_use, limits, spoilers
+from accelstudy.planning.simulated import simulate_candidates, study_of
 from accelstudy.planning.wording import SENTENCES, part_lines, positions_command, table_lines
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
@@ -75,7 +75,7 @@ def plan(told):
 
 
 def asked(sheet=None, **options):
-    return Question(10 * MGON, 30 * GON, sheet or of_sigma(0.002), **options)
+    return Question(10 * MGON, 30 * GON, sheet or sheet_of_sigma(0.002), **options)
 
 
 # --- linear theory -------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():
         zero = {"value": [0.0] * 3, "unit": "m/s^2"}
         mine = {**config, "sensor": {**sensor, "bias": zero}, "simulated_effects": [*HAS]}
         mine["noise"] = {"sensor": {"sigma_mps2": 1e-8}}
-        squares.append(simulate(question, mine)[0].rms ** 2)
+        squares.append(simulate_candidates(question, mine)[0].rms ** 2)
     np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), expected.rms, rtol=0.02)
 
 
@@ -137,7 +137,7 @@ def test_the_quantile_is_that_of_draws():
         drawn = np.sqrt(np.quantile(squares, share, axis=0))
         np.testing.assert_allclose(expected.quantile(share), drawn, rtol=0.03)
         both = np.sqrt(np.quantile(squares.max(axis=1), share))
-        assert expected.of_both(share) == pytest.approx(both, rel=0.04)
+        assert expected.quantile_of_both(share) == pytest.approx(both, rel=0.04)
 
 
 def test_a_rotation_that_gravity_cannot_see_makes_no_candidate():
@@ -204,7 +204,7 @@ def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipm
     assert 0 < best.tilt.rms.max() < 100 * MGON
     assert limits(question, best)
     assert all(spoiler.size > 0 for spoiler in spoilers(question, best))
-    assert in_use(question).reading > 0
+    assert errors_in_use(question).reading > 0
 
 
 def test_longer_holds_lower_white_noise_and_not_the_bias_instability():
@@ -229,7 +229,7 @@ def test_neglected_effects_decide_the_model():
 
 
 def test_what_would_spoil_a_plan_is_of_the_size_that_leaves_the_target():
-    question = asked(of_sigma(0.002))
+    question = asked(sheet_of_sigma(0.002))
     candidate = _candidate(question, equipment="robot")
     sizes = {s.effect: s for s in spoilers(question, candidate)}
     assert math.isinf(sizes["gravity_error"].size)
@@ -260,7 +260,7 @@ def test_a_plan_has_a_line_of_each_calibration_and_the_unit_of_angles_that_is_as
 
 def test_set_up_is_told_in_its_own_unit():
     candidate = replace(_candidate(asked(), equipment="robot"), hold=600.0)
-    (effort,) = lines(SENTENCES, "effort", candidate)
+    (effort,) = render_lines(SENTENCES, "effort", candidate)
     assert effort.endswith("600 s each, about 4.57 hours, with 30 minutes to set it up")
 
 
@@ -277,7 +277,7 @@ def test_set_up_is_told_in_its_own_unit():
      r"A robot reaches it: \d+ positions with a robot, 10 s each"),
 ])  # fmt: skip
 def test_what_cannot_be_reached_is_one_line_with_what_can(target, options, said):
-    question = Question(target * MGON, 30 * GON, of_sigma(0.002), **options)
+    question = Question(target * MGON, 30 * GON, sheet_of_sigma(0.002), **options)
     result = answer(question, replicates=200)
     assert result.ranked == []
     (line,) = part_lines("answer", result)
@@ -376,7 +376,7 @@ def test_the_recommended_positions_suffice_and_both_angles_stay_below_what_is_sa
     assert value < 10 * MGON + 3 * error
     said = plan.first.simulated
     assert value == pytest.approx(said.rms.max(), abs=4 * np.hypot(error, said.error.max()))
-    inside = np.mean(np.all(left < said.of_both(0.95), axis=1))
+    inside = np.mean(np.all(left < said.quantile_of_both(0.95), axis=1))
     shares = 0.05 * 0.95 * (1 / len(left) + 1 / plan.replicates)
     assert abs(inside - 0.95) < 4 * np.sqrt(shares)
 
@@ -385,7 +385,7 @@ def test_one_position_less_does_not_suffice(plan):
     """Neither the best that are found, nor any at all: the bound is one of all choices."""
     n = plan.first.scheme.n_positions
     assert n == 18
-    kind = Kind.of(plan.question, plan.first)
+    kind = CalibrationKind.of(plan.question, plan.first)
     value, error = rms(by_hand(kind.best(n - 1).scheme.directions, 30 * GON))
     assert value > 10 * MGON + 2 * error
     request = kind.request(n - 1)
@@ -398,17 +398,17 @@ def test_one_position_less_does_not_suffice(plan):
 def test_the_fewest_positions_suffice_although_their_refinement_neglects_effects(target):
     bent = DataSheet("s", position_sigma=SIGMA, nonlinearity=0.001, full_scale=19.6133)
     question = Question(target, 50 * GON, bent, (BY_HAND,), holds=(10.0,))
-    found = Kind(question, BY_HAND, NINE, 10.0).fewest(20)
+    found = CalibrationKind(question, BY_HAND, NINE, 10.0).fewest(20)
     assert found.tilt.of("quadratic_scale").rms.max() > 0.2 * target
     assert found.tilt.rms.max() <= target
     assert found.scheme.n_positions < 30
 
 
 def test_a_share_of_the_calibrations_is_of_both_angles_at_once():
-    question = Question(20 * MGON, 30 * GON, of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
+    question = Question(20 * MGON, 30 * GON, sheet_of_sigma(SIGMA), (BY_HAND,), confidence=0.95)
     found = answer(question, replicates=4000).first
     n = found.scheme.n_positions
-    kind = Kind.of(question, found)
+    kind = CalibrationKind.of(question, found)
     inside = {
         count: np.mean(np.all(by_hand(kind.best(count).scheme.directions, 30 * GON) < 20 * MGON, 1))
         for count in (n, n - 2)
@@ -439,7 +439,7 @@ def test_temperature_in_use_leaves_what_warmed_sensors_do(name, tilt_range, kelv
     left = roll_and_pitch(f * (1 + scale) + bias) - roll_and_pitch(f)
     square = np.einsum("rka,k->ra", left**2, weights).mean(axis=0)
     # With 3 degrees of freedom or more the rms of so many is right to 0.6 %.
-    said = in_use(question, kelvin=kelvin).warmth
+    said = errors_in_use(question, kelvin=kelvin).warmth
     assert said == pytest.approx(np.sqrt(square.max()), rel=0.025)
 
 
@@ -480,7 +480,7 @@ def test_a_scheme_of_a_file_is_compared_and_named_by_its_path(tmp_path):
     (mine,) = {c.scheme.name for c in candidates(question)} & {get_scheme(str(path)).name}
     config = study_of(question, [_candidate(question, mine)], 1, 200)
     assert config["grids"][0]["schemes"] == str(path)
-    (result,) = simulate(question, config)
+    (result,) = simulate_candidates(question, config)
     assert mine in result.cell
     assert result.statistics.simulated == 200
 

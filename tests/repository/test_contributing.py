@@ -12,7 +12,7 @@ from places import ROOT
 from plugin_helpers import forgotten
 
 from accelstudy.basics import plugins
-from accelstudy.study.claims.quantities import Evidence
+from accelstudy.study.claims.quantities import ClaimData
 from accelstudy.study.claims.verdicts import judge_claim
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import caption, draw, figure_names, get_figure
@@ -88,7 +88,7 @@ def test_a_claim_is_judged():
     pairs = [("b_x", "s_x", -0.01), ("b_x", "b_y", 0.5), ("s_x", "s_y", 0.25)]
     correlations = pd.DataFrame(pairs, columns=["parameter_1", "parameter_2", "adjustment"])
     cell = STUDY.sensitivity.cell("gravity")
-    evidence = Evidence(STUDY, {"correlations": correlations.assign(cell=cell)}, None)
+    evidence = ClaimData(STUDY, {"correlations": correlations.assign(cell=cell)}, None)
     claim = judge_claim(yaml.safe_load(CLAIM.replace("\n  ", "\n")), evidence)
     assert (claim["claim"], claim["ours"]) == ("bias-and-scale", 0.01)
     assert claim["verdict"] == "reproduced"

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
-from accelstudy.campaign.calibration.applying import SensorCalibration
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import roll_pitch

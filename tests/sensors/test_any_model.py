@@ -15,11 +15,11 @@ from accelstudy.adjustment.quality import solve
 from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import read_calibration
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
+from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
@@ -280,7 +280,7 @@ def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
 def test_a_model_that_becomes_a_registered_one_is_a_study_too():
     campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30"))
     diagnosis = diagnose(campaign, get_model("bias-scale"))
-    assert diagnosis.extended.name == NINE
+    assert diagnosis.extended_model.name == NINE
     overlay = study_overlay(diagnosis)
     assert overlay["models"] == {"extended": ["bias", "scale", "nonorthogonality"]}
     models = parse_study({**overlay, "seed": 1}).grids[0].models

@@ -14,7 +14,7 @@ from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.decision.statement import family_of
-from accelstudy.effects import Course, HoldConditions, effect_names, get_effect
+from accelstudy.effects import HoldConditions, TemperatureCourse, effect_names, get_effect
 from accelstudy.effects.hold_conditions import MIN_STEP
 from accelstudy.effects.saturation import ROUND_WIDTH
 from accelstudy.leveling.angles import roll_pitch, specific_force
@@ -270,9 +270,9 @@ def test_a_sensor_that_lags_behind_its_thermometer():
     for value in outside[1:]:
         body.append(share * body[-1] + (1 - share) * value)
     at = np.array([130.0, 160.0, 300.0, 400.0, 600.0])
-    found = Course(time, temperature).behind(at, 80) + np.interp(at, time, temperature)
+    found = TemperatureCourse(time, temperature).behind(at, 80) + np.interp(at, time, temperature)
     np.testing.assert_allclose(found, np.interp(at, fine, body), atol=2e-3)
-    assert Course(time, temperature).behind(50.0, 80) == 0
+    assert TemperatureCourse(time, temperature).behind(50.0, 80) == 0
 
 
 def test_a_lag_is_a_setting_of_the_thermal_bias():
@@ -466,12 +466,12 @@ def test_a_column_that_is_absent_is_named():
 def test_an_effect_with_some_of_its_parameters():
     """The others are zero, in arrays and in generated code; all of them are the effect itself."""
     whole = get_effect("saturation(knee=9)")
-    part = whole.only((0, 2))
+    part = whole.with_parameters((0, 2))
     assert [p.name for p in part.parameters] == ["k_sat_x", "k_sat_z"]
     assert part.spec == f"{whole.spec}[k_sat_x, k_sat_z]"
     assert type(get_effect(part.spec)) is type(part)
-    assert type(whole.only((0, 1, 2))) is type(whole)
-    assert type(whole.only((0, 2))) is type(part)
+    assert type(whole.with_parameters((0, 1, 2))) is type(whole)
+    assert type(whole.with_parameters((0, 2))) is type(part)
     forces = 9.8 * np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0.8, 0]])
     expected = SensorModel("whole", (whole,)).sense(forces, [0.1, 0.0, 0.3])
     np.testing.assert_array_equal(SensorModel("part", (part,)).sense(forces, [0.1, 0.3]), expected)

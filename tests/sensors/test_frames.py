@@ -38,7 +38,7 @@ def test_well_known_frames():
     # In ROS and on phones the pitch is about an axis to the left, or to the right.
     np.testing.assert_array_equal(parse_frame("flu").signs, [1, -1, -1])
     np.testing.assert_array_equal(parse_frame("rfu").signs, [1, 1, -1])
-    np.testing.assert_array_equal(parse_frame("rfu").rearranged(np.array([1, 2, 3])), [2, 1, 3])
+    np.testing.assert_array_equal(parse_frame("rfu").to_frd_order(np.array([1, 2, 3])), [2, 1, 3])
 
 
 @pytest.mark.parametrize(("name", "message"), [

@@ -22,7 +22,7 @@ from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import advise as advice_for
-from accelstudy.sequential.choice import candidates
+from accelstudy.sequential.choice import candidate_positions
 from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_running
 from accelstudy.sequential.wording import attitude
@@ -88,7 +88,9 @@ def test_a_session_without_a_table_is_one_without_positions(begun):
 def test_the_accuracy_is_that_of_the_calibration(begun, name):
     measured = read_running(begun(16, name)).campaign
     promise = Promise(10 * MGON, 50 * GON)
-    advice = advice_for(measured, get_model(MODEL), get_approach(name), promise, candidates("cube"))
+    advice = advice_for(
+        measured, get_model(MODEL), get_approach(name), promise, candidate_positions("cube")
+    )
     fit = fit_campaign(measured, get_model(MODEL), get_approach(name))
     error_of = promise.tilt_error(fit.model, fit.parameters, fit.gravity, measured.hold)
     np.testing.assert_allclose(advice.rms, error_of.rms_of_all(fit.covariance), rtol=1e-9)
@@ -98,7 +100,7 @@ def test_the_accuracy_is_that_of_the_calibration(begun, name):
 def test_the_next_position_is_worth_more_than_others(begun):
     measured = read_running(begun(14)).campaign
     promise, model = Promise(1 * MGON, 30 * GON), get_model(MODEL)
-    directions = candidates("cube")
+    directions = candidate_positions("cube")
     advice = advice_for(measured, model, get_approach("gravity"), promise, directions)
     before = fit_campaign(measured, model, get_approach("gravity"))
     error_of = promise.tilt_error(model, before.parameters, before.gravity, measured.hold)
@@ -185,7 +187,7 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     """It said that one can stop where the calibration was rejected, and set positions aside."""
     measured, promise = read_running(begun(n, bumped=bumped)).campaign, Promise(1.0, 50 * GON)
     advice = advice_for(
-        measured, get_model(MODEL), get_approach("gravity"), promise, candidates("cube")
+        measured, get_model(MODEL), get_approach("gravity"), promise, candidate_positions("cube")
     )
     calibrated = assess(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
     assert (

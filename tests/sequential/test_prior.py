@@ -23,7 +23,7 @@ def converged_to_the_end(monkeypatch):
 
 
 def adjusted(prior, model, approach, so_far):
-    return prior.beside(CalibrationProblem.of(model, approach, so_far)).adjusted()
+    return prior.augment(CalibrationProblem.of(model, approach, so_far)).adjust()
 
 
 def observed(model, sessions=SESSIONS):

@@ -10,7 +10,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.information import Information, position_rows
 from accelstudy.schemes import get_scheme
-from accelstudy.sequential.choice import Chooser, Knowledge, candidates, typical_sizes
+from accelstudy.sequential.choice import Chooser, Knowledge, candidate_positions, typical_sizes
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, LEVEL, Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
@@ -27,7 +27,7 @@ def test_only_what_is_not_yet_accurate_enough_counts():
         strict=True,
     ):  # fmt: skip
         np.testing.assert_allclose(weight, expected, rtol=1e-12)
-    assert promise.reached(rms).tolist() == [False, False, False, True]
+    assert promise.is_kept(rms).tolist() == [False, False, False, True]
 
 
 def chooser(approach, scheme, directions=None, accuracy=10 * MGON):
@@ -80,20 +80,22 @@ def test_what_is_to_go_is_what_choosing_on_comes_to():
 
 
 def test_attitudes_to_choose_from(tmp_path):
-    assert len(candidates("cube")) == 26
-    np.testing.assert_allclose(candidates("grid")[0], candidates("cube")[0])  # level comes first
-    far = candidates("grid", pole_distance=60 * GON)
-    assert 0 < len(far) < len(candidates("grid"))
+    assert len(candidate_positions("cube")) == 26
+    np.testing.assert_allclose(
+        candidate_positions("grid")[0], candidate_positions("cube")[0]
+    )  # level comes first
+    far = candidate_positions("grid", pole_distance=60 * GON)
+    assert 0 < len(far) < len(candidate_positions("grid"))
     assert np.all(np.arccos(np.abs(far[:, 0])) >= 60 * GON - 1e-6)
-    low = candidates("grid", max_roll=50 * GON, max_pitch=50 * GON)
+    low = candidate_positions("grid", max_roll=50 * GON, max_pitch=50 * GON)
     assert np.all(low[:, 2] > 0.4)
     (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n0,0\n50,0\n", encoding="utf-8")
-    assert len(candidates(str(tmp_path / "mine.csv"))) == 2
+    assert len(candidate_positions(str(tmp_path / "mine.csv"))) == 2
     with pytest.raises(UnknownNameError, match="set of attitudes 'cubes'; did you mean 'cube'"):
-        candidates("cubes")
+        candidate_positions("cubes")
     (tmp_path / "mine.csv").write_text("roll_gon,pitch_gon\n50,0\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"none of .*mine\.csv is within"):
-        candidates(str(tmp_path / "mine.csv"), max_roll=20 * GON)
+        candidate_positions(str(tmp_path / "mine.csv"), max_roll=20 * GON)
 
 
 # --- the rule of stopping ------------------------------------------------------------------------

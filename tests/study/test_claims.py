@@ -17,7 +17,7 @@ from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.claims.page import claims_markdown, claims_page
-from accelstudy.study.claims.quantities import Evidence, claim_table
+from accelstudy.study.claims.quantities import ClaimData, claim_table
 from accelstudy.study.claims.verdicts import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -66,11 +66,11 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def evidence(tables):
     """Function that gives the evidence where the study, its tables or `by_scheme` are others."""
-    usual = Evidence(make_study(**KEYS), tables, tables["estimates"])
+    usual = ClaimData(make_study(**KEYS), tables, tables["estimates"])
 
     def of(by_scheme=usual.by_scheme, noise=(), **changed):
         study = make_study(**KEYS, noise=dict(noise))
-        other = Evidence(study, {**tables, **changed}, usual.estimates)
+        other = ClaimData(study, {**tables, **changed}, usual.estimates)
         vars(other)["by_scheme"] = by_scheme
         return other
 
@@ -154,7 +154,7 @@ def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
     usual = evidence()
-    other = Evidence(usual.study, {**tables, "summary": summary}, usual.estimates)
+    other = ClaimData(usual.study, {**tables, "summary": summary}, usual.estimates)
     reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
     assert set(reductions["scheme"]) == {"mclaren-24"}
     assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]

@@ -1,12 +1,12 @@
 import logging
 
-from accelstudy.campaign.batch.config import Task
+from accelstudy.campaign.batch.config import CampaignEntry
 from accelstudy.campaign.batch.run import run_task
-from accelstudy.jobs import logged
+from accelstudy.jobs import script_log
 
-with logged(snakemake):
+with script_log(snakemake):
     error = run_task(
-        Task.model_validate(snakemake.params.task),
+        CampaignEntry.model_validate(snakemake.params.task),
         snakemake.output[0],
         snakemake.input.get("public"),
         snakemake.log[0],

@@ -1,8 +1,8 @@
 from accelstudy.campaign.batch.config import parse_batch
 from accelstudy.campaign.batch.overview import counts, summarise_campaigns
-from accelstudy.jobs import logged
+from accelstudy.jobs import script_log
 
-with logged(snakemake):
+with script_log(snakemake):
     batch = parse_batch(snakemake.config)
     table = summarise_campaigns(
         batch.batch,

@@ -1,5 +1,5 @@
 from accelstudy.campaign.importing.public import public_file
-from accelstudy.jobs import logged
+from accelstudy.jobs import script_log
 
-with logged(snakemake):
+with script_log(snakemake):
     public_file(snakemake.wildcards.public, snakemake.params.folder)

@@ -1,8 +1,8 @@
 from accelstudy.campaign.simulated import CampaignSettings
 from accelstudy.diagnosis.round_trip import write_simulated
-from accelstudy.jobs import logged
+from accelstudy.jobs import script_log
 
-with logged(snakemake):
+with script_log(snakemake):
     write_simulated(
         CampaignSettings(**snakemake.params.settings),
         snakemake.output.campaign,

@@ -12,7 +12,7 @@ from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisatio
 from accelstudy.adjustment.observations import Observations
 from accelstudy.adjustment.quality.solution import Solution, solve
 from accelstudy.approaches import Approach
-from accelstudy.leveling.angles import angles_of, wrapped
+from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -154,5 +154,5 @@ class _WithoutOne:
 def _attitude_error(f: Array, angles: Array) -> Array:
     """Roll and pitch of `f` less the given ones, (n, 2), roll wrapped into ±π."""
     roll, pitch = (angles_of(f) - angles).T
-    roll = np.where(np.cos(angles[:, 1]) < NEAR_POLE, np.nan, wrapped(roll))
+    roll = np.where(np.cos(angles[:, 1]) < NEAR_POLE, np.nan, wrap_angle(roll))
     return np.stack([roll, pitch], axis=-1)

@@ -177,7 +177,7 @@ def solve(
     problem = CalibrationProblem.of(model, approach, observed)
     x, v = result.parameters[0], result.residuals[0]
     gravity = float(x[-1]) if problem.with_gravity else float(np.ravel(observed.gravity)[0])
-    at = problem.linearised(x[None], problem.observations + v)
+    at = problem.linearise(x[None], problem.observations + v)
     b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
     root_weight = np.sqrt(problem.weights)
     seen = problem.weights > 0

@@ -17,7 +17,7 @@ from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import KnownModel
 from accelstudy.files.reading import config_hash, overlay
-from accelstudy.files.validation import Block, Configuration, PathName, checked
+from accelstudy.files.validation import ConfigSection, Configuration, PathName, validate
 
 KINDS = ("campaign", "log", "public")
 
@@ -30,7 +30,7 @@ def _known_approach(name: str) -> str:
 Approach = Annotated[str, AfterValidator(_known_approach)]
 
 
-class Entry(Block):
+class Entry(ConfigSection):
     """One or more campaigns to calibrate, and what differs from the rest of the batch."""
 
     campaign: str | None = Field(None, description="folder of a campaign, or a pattern of folders")
@@ -85,14 +85,14 @@ class Entry(Block):
         return [str(path) for path in paths if path.is_file()]
 
 
-class Task(Entry):
+class CampaignEntry(Entry):
     """One campaign to calibrate: an entry without patterns, and with all that it inherits."""
 
     name: PathName
     model: KnownModel
 
 
-class LotSettings(Block):
+class LotSettings(ConfigSection):
     """How the campaigns of a batch are evaluated together, as those of sensors of one type."""
 
     model: KnownModel | None = Field(None, description="model; by default that of the batch")
@@ -131,7 +131,7 @@ class BatchConfig(Configuration):
             sources[task.name] = task.source
         return self
 
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[CampaignEntry]:
         """Campaigns in the order of the configuration, each with its name and all it inherits.
 
         Patterns match what is there now. A pattern leaves out what another entry names, so that
@@ -161,7 +161,7 @@ class BatchConfig(Configuration):
                     "model": entry.model or self.model,
                     "approach": entry.approach or self.approach,
                 }
-                tasks.append(Task.model_validate(inherited | _settings(entry)))
+                tasks.append(CampaignEntry.model_validate(inherited | _settings(entry)))
         return tasks
 
     @property
@@ -172,7 +172,7 @@ class BatchConfig(Configuration):
 
 def parse_batch(content: Mapping[str, Any], source: str = "config") -> BatchConfig:
     """Check a configuration; raise `InputError` with one line that names the source and the key."""
-    return checked(BatchConfig, content, source)
+    return validate(BatchConfig, content, source)
 
 
 def _settings(entry: Entry) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.basics.levels import (
     ACCEPTED,
     BLIND,
@@ -159,11 +159,11 @@ def _next_steps(rows: list[dict[Any, Any]]) -> list[tuple[str, str]]:
     """Commands for the first good and for the first doubtful campaign, each with its purpose."""
     steps = []
     for row in [row for row in rows if row["state"] in (ACCEPTED, UNCHECKED)][:1]:
-        command = suggested.apply(Path(row["folder"], suggested.HERE))
+        command = suggestions.apply(Path(row["folder"], suggestions.HERE))
         steps.append(("Level a log, for example", command))
     for row in [row for row in rows if row["state"] in (REJECTED, IMPLAUSIBLE)][:1]:
         is_folder = row["kind"] == "campaign"
         measured = row["source"] if is_folder else Path(row["folder"], "campaign")
-        command = suggested.diagnose(measured, row["model"], row["approach"])
+        command = suggestions.diagnose(measured, row["model"], row["approach"])
         steps.append(("Find what is wrong or missing, for example", command))
     return steps

@@ -11,7 +11,7 @@ from pathlib import Path
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.batch.config import Task
+from accelstudy.campaign.batch.config import CampaignEntry
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
@@ -23,7 +23,7 @@ from accelstudy.sensors.models import get_model
 
 
 def run_task(
-    task: Task,
+    task: CampaignEntry,
     folder: str | Path,
     public: str | Path | None = None,
     log: str | Path | None = None,
@@ -63,7 +63,7 @@ def run_task(
 
 
 def _calibrate(
-    task: Task, folder: Path, public: str | Path | None, log: str | Path | None
+    task: CampaignEntry, folder: Path, public: str | Path | None, log: str | Path | None
 ) -> str | None:
     """Import and calibrate into a folder; say what is wrong, and leave no half of a result."""
     try:
@@ -90,7 +90,7 @@ def _calibrate(
     return wrong
 
 
-def campaign_of(task: Task, folder: str | Path) -> Campaign:
+def campaign_of(task: CampaignEntry, folder: str | Path) -> Campaign:
     """Campaign of a task by the name of the task; `folder` is that of `run_task`.
 
     Raises
@@ -103,6 +103,6 @@ def campaign_of(task: Task, folder: str | Path) -> Campaign:
     return replace(campaign, name=task.name)
 
 
-def _read(task: Task) -> Campaign:
+def _read(task: CampaignEntry) -> Campaign:
     gravity = task.gravity
     return read_campaign(task.source, {"gravity": gravity.model_dump()} if gravity else None)

@@ -13,7 +13,7 @@ from accelstudy.adjustment.quality import VarianceComponents, variance_component
 from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
-from accelstudy.campaign.gross_errors.recognition import Recognised, recognise
+from accelstudy.campaign.gross_errors.recognition import Recognition, recognise
 from accelstudy.leveling.angles import tilt_by_output, tilt_slope
 from accelstudy.leveling.error import ATTITUDES, MAX_TILT_GON, cap_forces, holds_in_use
 from accelstudy.sensors.plausibility import implausible_parameters, implausible_tilt
@@ -67,7 +67,7 @@ class Assessment:
     components : variance components of accelerometer and robot; None without a robot
     tilt : TiltLeft, the tilt error that is left
     implausible : tuple of str, parameters and tilt errors that no sensor has
-    gross_error : Recognised or None, in the campaign, its robot's angles included
+    gross_error : Recognition or None, in the campaign, its robot's angles included
     """
 
     fit: CampaignFit
@@ -80,7 +80,7 @@ class Assessment:
     components: VarianceComponents | None
     tilt: TiltLeft
     implausible: tuple[str, ...]
-    gross_error: Recognised | None
+    gross_error: Recognition | None
 
     @property
     def p_adjusted(self) -> Array:

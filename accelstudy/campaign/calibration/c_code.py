@@ -18,12 +18,16 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.applying import RANGE_MARGIN, SensorCalibration, affine_form
+from accelstudy.campaign.calibration.sensor_calibration import (
+    RANGE_MARGIN,
+    SensorCalibration,
+    affine_form,
+)
 from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.effects.base import expressions
 from accelstudy.effects.components import AXES
 from accelstudy.effects.hold_symbols import HoldSymbols
-from accelstudy.pages import text
+from accelstudy.pages import render_text
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
@@ -74,7 +78,7 @@ def c_header(calibration: SensorCalibration) -> str:
         output = _affine("output", linear, "reading", whole, constant)
         force = _affine("force", body, "output", np.zeros(3), np.zeros(3))
     end = calibration.ranges.get("time_s", (0.0, None))[1]
-    return text(
+    return render_text(
         "campaign/calibration/calibration.h.j2",
         version=__version__,
         calibration=calibration,
@@ -115,7 +119,7 @@ def _stages(calibration: SensorCalibration) -> list[_Stage]:
     """Stages of the output; the first is of the force in the sensitive axes."""
     model, g = calibration.model, calibration.gravity
     sizes = np.concatenate([part * g * evenly_spread(DIRECTIONS) for part in FORCES])
-    force, hold = calibration.in_use(sizes, model.hold_columns, RANGE_MARGIN)
+    force, hold = calibration.with_conditions(sizes, model.hold_columns, RANGE_MARGIN)
     stages = []
     for name, last in (("accel_output", False), ("accel_last", True)):
         specs = tuple(effect.spec for effect in model.effects if effect.last == last)

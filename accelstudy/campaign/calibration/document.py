@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
-from accelstudy.campaign.calibration.applying import FORCES, affine_form
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
+from accelstudy.campaign.calibration.sensor_calibration import FORCES, affine_form
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -187,7 +187,7 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     return table
 
 
-def in_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
+def to_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
     """Turn K (3, 3) into a gauge: the matrix R K, R a rotation, that is triangular or symmetric.
 
     The diagonal is positive. "upper" is the gauge of Thalmann & Neuner (2018, eq. 4).
@@ -234,7 +234,7 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
     return {
         "matrix": matrix,
         "bias_mps2": bias,
-        "gauges": {gauge: in_gauge(matrix, gauge) for gauge in GAUGES},
+        "gauges": {gauge: to_gauge(matrix, gauge) for gauge in GAUGES},
     }
 
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
-from accelstudy.campaign.calibration.applying import SensorCalibration, affine_form
 from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.px4 import px4_losses, px4_parameters
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, affine_form
 from accelstudy.sensors.sensor import not_affine
 
 Array = NDArray[np.float64]

@@ -225,7 +225,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
     )
 
 
-def _known(campaign: Campaign) -> Known:
+def _known_parameters(campaign: Campaign) -> Known:
     """What is known a priori of the parameters."""
     return {} if campaign.sensor_type is None else campaign.sensor_type.known
 
@@ -253,7 +253,7 @@ def campaign_observations(campaign: Campaign) -> Observations:
         gravity=campaign.gravity,
         sigma_gravity=campaign.sigma_gravity,
         hold=campaign.hold,
-        known=_known(campaign),
+        known=_known_parameters(campaign),
         sigma_dof=campaign.sigma_dof or np.inf,
     )
 
@@ -386,7 +386,7 @@ def campaign_estimability(
         campaign_noise(campaign),
         gravity=campaign.gravity,
         hold=campaign.hold,
-        known=_known(campaign),
+        known=_known_parameters(campaign),
         forces=rough if blur else None,
         blur=blur,
     )

@@ -17,7 +17,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import show, track, warn
 from accelstudy.basics.units import attitude_unit, display_unit, to_attitude, to_display
-from accelstudy.campaign.calibration.applying import (
+from accelstudy.campaign.calibration.sensor_calibration import (
     FORCES,
     KNOWN,
     RANGE_MARGIN,
@@ -26,12 +26,12 @@ from accelstudy.campaign.calibration.applying import (
 from accelstudy.campaign.calibration.tables import ROWS, is_parquet, write_table
 from accelstudy.campaign.gross_errors.recognition import check_size
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.recording import AXES, CONDITIONS, Log, read_log
+from accelstudy.campaign.importing.recording import AXES, CONDITIONS, SensorLog, read_log
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.effects import HoldConditions, course_of_log
-from accelstudy.files.validation import checked
+from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import near_pole
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ DECIMALS = 9
 
 
 @dataclass(frozen=True)
-class Leveled:
+class LeveledLog:
     """A leveled log.
 
     Forces and angles are in the axes of the log. A row has empty cells if a reading is missing, or
@@ -61,13 +61,13 @@ class Leveled:
 
     Attributes
     ----------
-    log : Log, with the rows as they were read
+    log : SensorLog, with the rows as they were read
     added : table of calibrated forces, roll and pitch and their standard deviations, and whether
         the row is near the pole
     warnings : tuple of str
     """
 
-    log: Log
+    log: SensorLog
     added: pa.Table
     warnings: tuple[str, ...]
 
@@ -118,7 +118,7 @@ def level(
     given: Mapping[str, Any] | None = None,
     sigma: float | None = None,
     start: float | None = None,
-) -> Leveled:
+) -> LeveledLog:
     """Level a log; by default it is read like the log from which the campaign was made.
 
     Parameters
@@ -156,15 +156,15 @@ def level(
     noise = calibration.noise_of_reading if sigma is None else sigma
     rows = np.arange(len(forces))
     added = pa.concat_tables(
-        _leveled(calibration, read, forces[some], hold.take(some), noise)
+        _level_rows(calibration, read, forces[some], hold.take(some), noise)
         for some in track([rows[i : i + ROWS] for i in range(0, len(rows), ROWS)], "leveling")
     )
-    return Leveled(read, added, _warnings(calibration, read, hold, added, mends, start is None))
+    return LeveledLog(read, added, _warnings(calibration, read, hold, added, mends, start is None))
 
 
 def _warnings(
     calibration: SensorCalibration,
-    log: Log,
+    log: SensorLog,
     hold: HoldConditions,
     added: pa.Table,
     mends: bool,
@@ -179,7 +179,7 @@ def _warnings(
     late = 0
     if calibration.drifts and hold.time is not None and "time_s" in calibration.ranges:
         late = int(np.sum(hold.time > (1 + RANGE_MARGIN) * calibration.ranges["time_s"][1]))
-    warnings = lines(
+    warnings = render_lines(
         "campaign/calibration/leveling.txt.j2",
         "warnings",
         sensor=calibration,
@@ -200,13 +200,13 @@ def _warnings(
     return tuple(warnings)
 
 
-def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]) -> Log:
+def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]) -> SensorLog:
     """Open a log, and check that it has what the effects need."""
     needed = {condition for _, condition in calibration.needs}
     ranged = {key for key in CONDITIONS if KNOWN[key] in calibration.ranges}
     read = read_log(
         log,
-        checked(LogLayout, given, "options"),
+        validate(LogLayout, given, "options"),
         like=calibration.usual_layout,
         conditions=[key for key in OPTIONS if key in {*needed, *ranged, *given.get("columns", ())}],
         untimed=True,
@@ -226,7 +226,7 @@ def _read(calibration: SensorCalibration, log: LogFile, given: Mapping[str, Any]
     return read
 
 
-def _conditions(read: Log, start: float) -> HoldConditions:
+def _conditions(read: SensorLog, start: float) -> HoldConditions:
     """What is known of the rows besides the forces; the first is `start` s after the session's."""
     names = [name for name in ("time", *CONDITIONS) if name in read.rows]
     known: dict[str, Any] = {name: read.rows[name] for name in names}
@@ -241,8 +241,12 @@ def _conditions(read: Log, start: float) -> HoldConditions:
     return HoldConditions(**known, **steps)
 
 
-def _leveled(
-    calibration: SensorCalibration, log: Log, forces: Array, hold: HoldConditions, noise: float
+def _level_rows(
+    calibration: SensorCalibration,
+    log: SensorLog,
+    forces: Array,
+    hold: HoldConditions,
+    noise: float,
 ) -> pa.Table:
     """Columns that are added to rows whose readings, in frd, are forces (k, 3), m/s²."""
     with np.errstate(all="ignore"):  # forces that are not finite are counted below
@@ -265,7 +269,7 @@ def _leveled(
 
 
 def _beyond_ranges(
-    ranges: Mapping[str, list[float]], log: Log, added: pa.Table, hold: HoldConditions
+    ranges: Mapping[str, list[float]], log: SensorLog, added: pa.Table, hold: HoldConditions
 ) -> Iterator[dict[str, Any]]:
     """What lies beyond the ranges of a calibration, in how many rows, and how far."""
     forces = np.column_stack([added.column(i).to_numpy() for i in range(3)])
@@ -298,7 +302,7 @@ def _beyond_ranges(
             }
 
 
-def _reason(calibration: SensorCalibration, log: Log, row: int) -> str:
+def _reason(calibration: SensorCalibration, log: SensorLog, row: int) -> str:
     """Say why a row is empty, and where it is."""
     needed = {*AXES, "time", *(condition for _, condition in calibration.needs)}
     lost = [key for key in log.lacking(row) if key in needed]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from accelstudy.basics.levels import REFUTATION_LEVEL
-from accelstudy.basics.suggested import HERE
+from accelstudy.basics.suggestions import HERE
 from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.document import (
     assessed_positions,

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from accelstudy import __version__
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.campaign.calibration.applying import KNOWN, SensorCalibration
+from accelstudy.campaign.calibration.sensor_calibration import KNOWN, SensorCalibration
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
-from accelstudy.leveling.angles import angles_of, wrapped
+from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 from accelstudy.positions.points import evenly_spread
 from accelstudy.sensors.models import compose
 
@@ -51,7 +51,7 @@ def px4_parameters(calibration: SensorCalibration) -> str:
         not in m/s².
     """
     lost = px4_losses(calibration)
-    gains, offsets = _fitted(calibration)
+    gains, offsets = _fit(calibration)
     values: dict[str, float] = {}
     for i, axis in enumerate("XYZ"):
         values[f"CAL_ACC0_{axis}OFF"] = offsets[i, 0]
@@ -64,7 +64,7 @@ def px4_parameters(calibration: SensorCalibration) -> str:
     shown = {name: _positional(value) for name, value in sorted(values.items())}
     axes = calibration.usual_layout.axes
     content = calibration, __version__, lost, axes, is_warmed, shown
-    return "\n".join(lines(TEMPLATE, "parameters", *content)) + "\n"
+    return "\n".join(render_lines(TEMPLATE, "parameters", *content)) + "\n"
 
 
 def _positional(value: float) -> str:
@@ -87,7 +87,7 @@ def px4_losses(calibration: SensorCalibration) -> list[str]:
     lags = [(effect.name, tau) for effect in warmed if (tau := effect.settings.get("tau"))]
     is_lost = largest.max() > MIN_LOSS
     sizes = rms / MGON, largest / MGON
-    return lines(TEMPLATE, "losses", is_lost, *sizes, parts, lags, MAX_TILT_GON)
+    return render_lines(TEMPLATE, "losses", is_lost, *sizes, parts, lags, MAX_TILT_GON)
 
 
 def _is_warmed(calibration: SensorCalibration) -> bool:
@@ -105,7 +105,7 @@ def _readings(calibration: SensorCalibration, forces: Array) -> tuple[Array, Arr
     terms : (k, m) array, 1 and the powers of the temperature
     """
     model, frame = calibration.model, calibration.usual_layout.axes
-    forces, hold = calibration.in_use(forces, model.hold_columns)
+    forces, hold = calibration.with_conditions(forces, model.hold_columns)
     output = model.sense(forces, calibration.parameters, calibration.gravity, hold)
     readings = frame.from_frd(output @ np.linalg.inv(calibration.mending).T)
     warmer = hold.column("temperature") - REFERENCE_TEMPERATURE
@@ -113,7 +113,7 @@ def _readings(calibration: SensorCalibration, forces: Array) -> tuple[Array, Arr
     return forces, readings, np.vander(warmer, degree + 1, increasing=True)
 
 
-def _fitted(calibration: SensorCalibration) -> tuple[Array, Array]:
+def _fit(calibration: SensorCalibration) -> tuple[Array, Array]:
     """Gains (3,), and offsets (3, k) by powers of the temperature."""
     signs = np.array(list(product((1.0, -1.0), repeat=3)))
     ways = (signs[:, None] * evenly_spread(ATTITUDES)).reshape(-1, 3)
@@ -131,11 +131,13 @@ def _fitted(calibration: SensorCalibration) -> tuple[Array, Array]:
 
 def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
     """Rms and largest error, (2,), of roll and of pitch by what PX4 cannot hold, rad."""
-    gains, offsets = _fitted(calibration)
+    gains, offsets = _fit(calibration)
     cap = cap_forces(MAX_TILT_GON * GON, LOSS_ATTITUDES, calibration.gravity)
     forces, readings, terms = _readings(calibration, cap)
     corrected = (readings - terms @ offsets.T) / gains
-    error = wrapped(angles_of(calibration.usual_layout.axes.to_frd(corrected)) - angles_of(forces))
+    error = wrap_angle(
+        angles_of(calibration.usual_layout.axes.to_frd(corrected)) - angles_of(forces)
+    )
     return np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.basics.levels import ACCEPTED, BLIND, IMPLAUSIBLE, REJECTED
 from accelstudy.basics.units import GON, display_unit
 from accelstudy.basics.wording import estimate
@@ -17,7 +17,7 @@ from accelstudy.campaign.calibration.assessment import Assessment
 from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.importing.noise import steps_text
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 TEMPLATE = "campaign/calibration/wording.txt.j2"
@@ -42,7 +42,7 @@ def verdict_lines(assessment: Assessment) -> list[str]:
         int(fit.campaign.positions[suspect.position]): suspect.p_value
         for suspect in sorted(assessment.suspects, key=lambda suspect: suspect.position)
     }
-    return lines(
+    return render_lines(
         TEMPLATE,
         "verdict",
         assessment=assessment,
@@ -62,12 +62,12 @@ def approach_words(fit: CampaignFit) -> str:
     """Say what the positions were held against."""
     campaign = fit.campaign
     has = campaign.angles is not None, campaign.reference is not None
-    return lines(TEMPLATE, "approach", fit.approach.name, fit.approach.uses_angles, *has)[0]
+    return render_lines(TEMPLATE, "approach", fit.approach.name, fit.approach.uses_angles, *has)[0]
 
 
 def interval_words(fit: CampaignFit) -> str:
     """Say what the sigmas are, and how many of them hold 95 %."""
-    return lines(TEMPLATE, "sigmas", fit)[0]
+    return render_lines(TEMPLATE, "sigmas", fit)[0]
 
 
 def what_a_check_finds(fit: CampaignFit) -> str:
@@ -77,7 +77,7 @@ def what_a_check_finds(fit: CampaignFit) -> str:
     """
     r = fit.adjustment.redundancy
     low, high = (fit.sigma_position * np.sqrt(r / special.chdtri(r, p)) for p in (0.025, 0.975))
-    return lines(TEMPLATE, "finds", fit, low, high)[0]
+    return render_lines(TEMPLATE, "finds", fit, low, high)[0]
 
 
 def next_steps(
@@ -100,10 +100,10 @@ def next_steps(
     list of (purpose, command)
     """
     chosen = fit.model.name, fit.approach.name, fit.campaign.prior
-    diagnose = suggested.diagnose(campaign, *chosen)
+    diagnose = suggestions.diagnose(campaign, *chosen)
     if state in (REJECTED, IMPLAUSIBLE):
         return [("Find what is wrong or missing", diagnose)]
     return [
-        ("Level a log with this calibration", suggested.apply(result)),
+        ("Level a log with this calibration", suggestions.apply(result)),
         ("See whether the residuals have a pattern that the model lacks", diagnose),
     ]

@@ -49,7 +49,7 @@ class GrossError(WithSettings):
     family = "gross error"
     equation: ClassVar[str]
 
-    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+    def draw(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Return the same error with every open setting drawn for a campaign."""
         raise NotImplementedError
 
@@ -59,7 +59,7 @@ class GrossError(WithSettings):
 
     def apply(self, campaign: Campaign, rng: np.random.Generator) -> Campaign:
         """Draw the open settings, and act."""
-        return self.drawn(campaign, rng).act(campaign)
+        return self.draw(campaign, rng).act(campaign)
 
     def is_open(self, *names: str) -> bool:
         """Whether none of these settings is given."""
@@ -95,7 +95,7 @@ class AxisError(GrossError):
     takes = tuple(Setting(axis, "1", math.nan) for axis in "xyz")
     equation = "f → P f, P one of 48 signed permutations"
 
-    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+    def draw(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw one of the 47."""
         if not self.is_open(*"xyz"):
             return self
@@ -110,7 +110,7 @@ class AxisError(GrossError):
                 f"gross error {self.name!r}: x, y, z must be 1, 2, 3 in some order, each with a "
                 f"sign, such as x=2, y=-1, z=3, not {self.spec}"
             )
-        return turned(campaign, matrix_of(shown))
+        return permute_axes(campaign, matrix_of(shown))
 
 
 @register
@@ -128,7 +128,7 @@ class OutlierPosition(GrossError):
     )
     equation = "f + e in one position"
 
-    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+    def draw(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw the position, and the direction of e."""
         position = self.settings["position"]
         if self.is_open("position"):
@@ -158,7 +158,7 @@ class RowOrder(GrossError):
     takes = (Setting("first", "1", math.nan), Setting("second", "1", math.nan))
     equation = "f_j ↔ f_k"
 
-    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+    def draw(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw two positions in different attitudes."""
         if not self.is_open("first", "second"):
             if self.is_open("first") or self.is_open("second"):
@@ -177,7 +177,7 @@ class RowOrder(GrossError):
         rows = [self.row(campaign, "first"), self.row(campaign, "second")]
         order = np.arange(campaign.n_positions)
         order[rows] = rows[::-1]
-        return ordered(campaign, order)
+        return reorder_rows(campaign, order)
 
 
 @register
@@ -192,7 +192,7 @@ class UnitError(GrossError):
     takes = (Setting("force", "1", math.nan, above=0), Setting("angle", "1", math.nan, above=0))
     equation = "f → factor · f, or (φ, θ) → factor · (φ, θ)"
 
-    def drawn(self, campaign: Campaign, rng: np.random.Generator) -> Self:
+    def draw(self, campaign: Campaign, rng: np.random.Generator) -> Self:
         """Draw one of the usual mistakes."""
         if not self.is_open("force", "angle"):
             return self
@@ -230,13 +230,13 @@ def matrix_of(shown: Sequence[float]) -> Array:
     return matrix
 
 
-def turned(campaign: Campaign, matrix: Array) -> Campaign:
+def permute_axes(campaign: Campaign, matrix: Array) -> Campaign:
     """Return the campaign with f → P f; columns are reordered, not summed, so no digit changes."""
     axes = np.argmax(np.abs(matrix), axis=1)
     return with_readings(campaign, lambda values: matrix[range(3), axes] * values[:, axes])
 
 
-def ordered(campaign: Campaign, order: NDArray[np.int_]) -> Campaign:
+def reorder_rows(campaign: Campaign, order: NDArray[np.int_]) -> Campaign:
     """Return the campaign with the readings in another order."""
     n_samples = None if campaign.n_samples is None else campaign.n_samples[order]
     return replace(with_readings(campaign, lambda values: values[order]), n_samples=n_samples)

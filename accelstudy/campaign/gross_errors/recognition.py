@@ -23,9 +23,9 @@ from accelstudy.campaign.gross_errors.errors import (
     Array,
     angles_times,
     matrix_of,
-    ordered,
     other_units,
-    turned,
+    permute_axes,
+    reorder_rows,
 )
 from accelstudy.campaign.session import Campaign
 from accelstudy.leveling.angles import specific_force, usual_norm
@@ -69,7 +69,7 @@ MIN_POSITIONS_PER_OUTLIER = 8
 
 
 @dataclass(frozen=True)
-class Mending:
+class Correction:
     """What would undo a gross error.
 
     Attributes
@@ -91,18 +91,18 @@ class Mending:
 
 
 @dataclass(frozen=True)
-class Recognised:
+class Recognition:
     """Gross errors that were recognised.
 
     Attributes
     ----------
-    errors : tuple of Mending, one after the other
+    errors : tuple of Correction, one after the other
     """
 
-    errors: tuple[Mending, ...]
+    errors: tuple[Correction, ...]
 
     @property
-    def named(self) -> tuple[tuple[str, int | None], ...]:
+    def names(self) -> tuple[tuple[str, int | None], ...]:
         """Names of the errors, each once, and the number of each bumped position."""
         named = [
             (error.name, place) for error in self.errors for place in error.left_out or (None,)
@@ -119,7 +119,7 @@ class Recognised:
         """What is wrong, in words, by the names of the errors."""
         return {
             name: "; ".join(error.reason for error in self.errors if error.name == name)
-            for name, _ in self.named
+            for name, _ in self.names
         }
 
     @property
@@ -128,7 +128,7 @@ class Recognised:
         return "; ".join(self.reasons.values())
 
     @property
-    def mended(self) -> Campaign:
+    def corrected(self) -> Campaign:
         """The campaign with its errors undone."""
         return self.errors[-1].campaign
 
@@ -234,7 +234,7 @@ def check_plausible(campaign: Campaign, where: str, angle_unit: str = "gon") -> 
     return doubts
 
 
-def recognise(campaign: Campaign, attitude: bool = True) -> Recognised | None:
+def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     """Recognise wrong units, swapped axes, exchanged rows and bumped positions, if they are gross.
 
     Without the angles of a robot, swapped axes and exchanged rows do not show: they leave the norm
@@ -247,7 +247,7 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognised | None:
 
     Returns
     -------
-    Recognised, or None if nothing looks wrong
+    Recognition, or None if nothing looks wrong
 
     Raises
     ------
@@ -258,10 +258,10 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognised | None:
     forces = errors[-1].campaign.forces if errors else campaign.forces
     where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
     check_size(where, forces, campaign.gravity, "m/s^2", si)
-    return Recognised(errors) if errors else None
+    return Recognition(errors) if errors else None
 
 
-def _mendings(campaign: Campaign, attitude: bool) -> Iterator[Mending]:
+def _mendings(campaign: Campaign, attitude: bool) -> Iterator[Correction]:
     """Undo gross errors one after the other, first those that all positions have."""
     sensor = yield from _everywhere(campaign, attitude)
     # A sensor that is mounted askew is no reason to reorder its positions.
@@ -273,7 +273,7 @@ def _mendings(campaign: Campaign, attitude: bool) -> Iterator[Mending]:
 
 def _everywhere(
     campaign: Campaign, attitude: bool, angle_unit: str = "gon"
-) -> Generator[Mending, None, RealSensor]:
+) -> Generator[Correction, None, RealSensor]:
     """Undo a wrong unit and wrong axes, which all positions have; return the sensor after it."""
     hypotheses = axes, partial(units, angle_unit=angle_unit)
     # The norm shows a wrong unit even if the axes are wrong, so gravity comes before the attitudes.
@@ -284,8 +284,8 @@ def _everywhere(
 
 
 def _undo(
-    sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Mending]]
-) -> Generator[Mending, None, RealSensor]:
+    sensor: RealSensor, *hypotheses: Callable[[RealSensor], Iterator[Correction]]
+) -> Generator[Correction, None, RealSensor]:
     """Yield what helps most first, until nothing helps clearly; return the sensor after it."""
     for _ in range(MAX_ERRORS):
         helps = [
@@ -301,7 +301,7 @@ def _undo(
     return sensor
 
 
-def _is_clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
+def _is_clear(mending: Correction, before: RealSensor, after: RealSensor) -> bool:
     """Whether a mending clearly improves what was clearly wrong; no sensor is mirrored."""
     if mending.left_out:
         return True
@@ -311,17 +311,22 @@ def _is_clear(mending: Mending, before: RealSensor, after: RealSensor) -> bool:
             return after.misfit < before.misfit
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
-        return bool(gained or before.usual > MIN_RATIO * after.usual)
+        return bool(gained or before.usual_distance > MIN_RATIO * after.usual_distance)
     was, now = (np.median(sensor.distance[mending.changed]) for sensor in (before, after))
     return bool(
-        was > max(MIN_RATIO * now, MIN_RATIO**2 * after.usual, MIN_POSITION_ERROR * before.gravity)
+        was
+        > max(
+            MIN_RATIO * now,
+            MIN_RATIO**2 * after.usual_distance,
+            MIN_POSITION_ERROR * before.gravity,
+        )
     )
 
 
 # --- What would mend a campaign, the simplest first -----------------------------------------------
 
 
-def axes(sensor: RealSensor) -> Iterator[Mending]:
+def axes(sensor: RealSensor) -> Iterator[Correction]:
     """Undo each of the 47 exchanges of axes that are likely; none shows without a robot."""
     campaign = sensor.campaign
     if sensor.expected is None or campaign.angles is None or not sensor.is_far_off:
@@ -343,13 +348,13 @@ def axes(sensor: RealSensor) -> Iterator[Mending]:
     ]
     yield from (one for _, one in sorted(near, key=lambda one: one[0]) if one.reason)
     exchanged = replace(campaign, angles=campaign.angles[:, ::-1].copy())
-    yield Mending("axis_error", "roll and pitch of the robot are exchanged", exchanged)
+    yield Correction("axis_error", "roll and pitch of the robot are exchanged", exchanged)
 
 
-def _undone(campaign: Campaign, matrix: Array) -> Iterator[Mending]:
+def _undone(campaign: Campaign, matrix: Array) -> Iterator[Correction]:
     """Undo an exchange of axes, and one of columns of counts, before nominal scales and offsets."""
     reason = _axes_in_words(matrix) if np.any(matrix != np.eye(3)) else ""
-    yield Mending("axis_error", reason, turned(campaign, matrix), matrix)
+    yield Correction("axis_error", reason, permute_axes(campaign, matrix), matrix)
     if (nominal := campaign.nominal) is None or not reason:
         return
     # Counts P r, read with S and o, were r: S (r − o) = S P S⁻¹ · S (P⁻¹ r − P⁻¹ o).
@@ -360,7 +365,7 @@ def _undone(campaign: Campaign, matrix: Array) -> Iterator[Mending]:
     moved = campaign.forces + (nominal.offset - offset) * nominal.scale
     read = replace(campaign, forces=moved, nominal=Conversion(nominal.scale, offset))
     reason += ", in the counts, before `scale` and `offset`"
-    yield Mending("axis_error", reason, turned(read, scaled), scaled)
+    yield Correction("axis_error", reason, permute_axes(read, scaled), scaled)
 
 
 def _axes_in_words(matrix: Array) -> str:
@@ -375,7 +380,7 @@ def _axes_in_words(matrix: Array) -> str:
     return f"axes {wrong}: {words}"
 
 
-def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Mending]:
+def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Correction]:
     """Convert the forces, or the angles, as if they were in another unit."""
     if not sensor.is_far_off:
         return
@@ -388,24 +393,24 @@ def units(sensor: RealSensor, angle_unit: str = "gon") -> Iterator[Mending]:
                 instead = "" if stated == "m/s^2" else f", not in {stated}"
                 matrix = factor * np.eye(3)
                 reason = f"the forces are in {unit}{instead}"
-                yield Mending("unit_error", reason, turned(campaign, matrix), matrix)
+                yield Correction("unit_error", reason, permute_axes(campaign, matrix), matrix)
     if sensor.expected is not None:
         for unit, factor in other_units(ROBOT_UNITS, "rad", angle_unit).items():
             reason = f"the robot's angles are in {ROBOT_UNITS[unit]}"
-            yield Mending("unit_error", reason, angles_times(campaign, factor))
+            yield Correction("unit_error", reason, angles_times(campaign, factor))
 
 
-def rows(sensor: RealSensor) -> Iterator[Mending]:
+def rows(sensor: RealSensor) -> Iterator[Correction]:
     """Move each row that does not fit to the position where it fits; any number of rows."""
     campaign = sensor.campaign
     if sensor.expected is None or not sensor.tells:
         return
-    lost = sensor.usual > MAX_USABLE_ERROR * sensor.gravity
+    lost = sensor.usual_distance > MAX_USABLE_ERROR * sensor.gravity
     wrong = np.flatnonzero(sensor.wrong | lost)
     if not 1 < len(wrong) <= MAX_EXCHANGED:
         return
     # Rows in the same attitude could be exchanged at will, so an exchange must gain something.
-    least = min(MIN_RATIO * sensor.usual, MIN_POSITION_ERROR * sensor.gravity)
+    least = min(MIN_RATIO * sensor.usual_distance, MIN_POSITION_ERROR * sensor.gravity)
     cost = campaign.forces[wrong][:, None] - sensor.expected[wrong][None]
     order = np.arange(campaign.n_positions)
     order[wrong] = wrong[_places(np.linalg.norm(cost, axis=2), least)]
@@ -415,7 +420,7 @@ def rows(sensor: RealSensor) -> Iterator[Mending]:
         more = int(moved.sum()) - len(shown)
         positions = ", ".join(shown) + (f" and {more} more" if more else "")
         reason = f"the forces of positions {positions} are exchanged"
-        yield Mending("row_order", reason, ordered(campaign, order), changed=moved)
+        yield Correction("row_order", reason, reorder_rows(campaign, order), changed=moved)
 
 
 def _places(cost: Array, least: float) -> NDArray[np.int_]:
@@ -439,7 +444,7 @@ def _places(cost: Array, least: float) -> NDArray[np.int_]:
     return np.where((before >= MIN_RATIO**2 * after)[cycle], places, stay)
 
 
-def outliers(sensor: RealSensor) -> Iterator[Mending]:
+def outliers(sensor: RealSensor) -> Iterator[Correction]:
     """Leave out positions that are so wrong that they would spoil a calibration."""
     campaign = sensor.campaign
     far = sensor.wrong & (sensor.distance > MAX_USABLE_ERROR * sensor.gravity)
@@ -461,7 +466,7 @@ def outliers(sensor: RealSensor) -> Iterator[Mending]:
         each = comma_list([f"{size:.2g}" for size in sizes])
         reason = f"{which} {comma_list(names)} {are} wrong by {each} m/s^2"
     left = campaign.without(dict.fromkeys(bumped, reason))
-    yield Mending("outlier_position", reason, left, left_out=bumped)
+    yield Correction("outlier_position", reason, left, left_out=bumped)
 
 
 # --- How well a real sensor can fit a campaign ----------------------------------------------------
@@ -507,7 +512,7 @@ class RealSensor:
         return np.stack(columns, axis=1), (1 - np.sum(unit**2, axis=0, keepdims=True).T) / 2
 
     @cached_property
-    def _fitted(self) -> Array:
+    def _explained(self) -> Array:
         """Part of that lack, of the same shape, that the fitted sensor explains."""
         return _robust(*self._design, np.inf if self.mounted else USUAL_SD)
 
@@ -516,14 +521,14 @@ class RealSensor:
         """What it reads in each position, (n, 3), m/s²; None where only the norm is known."""
         if not self.attitude:
             return None
-        return attitude_forces(self.campaign) + self.gravity * self._fitted
+        return attitude_forces(self.campaign) + self.gravity * self._explained
 
     @cached_property
     def distance(self) -> Array:
         """Distance of each reading from what it should be, (n,), m/s²."""
         if self.expected is not None:
             return np.asarray(np.linalg.norm(self.campaign.forces - self.expected, axis=1))
-        squares = 1 - 2 * (self._design[1] - self._fitted)[:, 0]
+        squares = 1 - 2 * (self._design[1] - self._explained)[:, 0]
         return self.gravity * np.abs(np.sqrt(np.maximum(squares, 0)) - 1)
 
     @property
@@ -533,7 +538,7 @@ class RealSensor:
         return n >= u + MIN_SPARE_POSITIONS
 
     @property
-    def usual(self) -> float:
+    def usual_distance(self) -> float:
         """Distance of the usual position, m/s²."""
         return float(np.median(self.distance))
 
@@ -545,7 +550,7 @@ class RealSensor:
     @property
     def wrong(self) -> NDArray[np.bool_]:
         """Which positions, (n,), do not fit."""
-        return self.distance > MIN_RATIO * self.usual
+        return self.distance > MIN_RATIO * self.usual_distance
 
     @property
     def is_far_off(self) -> bool:
@@ -555,9 +560,9 @@ class RealSensor:
     @property
     def is_askew(self) -> bool:
         """Whether most positions fit clearly better if it may be mounted in any attitude."""
-        if not self.attitude or self.usual < MIN_POSITION_ERROR * self.gravity:
+        if not self.attitude or self.usual_distance < MIN_POSITION_ERROR * self.gravity:
             return False
-        return MIN_RATIO * self.free.usual < self.usual
+        return MIN_RATIO * self.free.usual_distance < self.usual_distance
 
     @cached_property
     def is_mirrored(self) -> bool:
@@ -569,7 +574,7 @@ class RealSensor:
             return False
         inverse = np.linalg.pinv(self._design[0])
         matrix = (inverse @ self.expected)[:3] / self.gravity
-        error = self.usual / self.gravity * np.linalg.norm(inverse[:3], ord=2)
+        error = self.usual_distance / self.gravity * np.linalg.norm(inverse[:3], ord=2)
         least = np.linalg.svd(matrix, compute_uv=False)[-1]
         return bool(np.linalg.det(matrix) < 0 and least > MIN_RATIO * error)
 

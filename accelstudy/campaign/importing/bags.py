@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
-from accelstudy.campaign.importing.sources import Source, chosen_of, table_of
+from accelstudy.campaign.importing.sources import Source, chosen_of, table_of_columns
 from accelstudy.files.reading import readable
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _source(
     """Times, s, forces, m/s², and perhaps temperatures as a table."""
     si = {"unit": "m/s^2", "time_unit": "s"}
     layout = {"columns": columns, "time": "time", "frame": frame, **si}
-    return Source(path, table_of(rows.T, ["time", *columns.values()]), layout, warnings)
+    return Source(path, table_of_columns(rows.T, ["time", *columns.values()]), layout, warnings)
 
 
 def _messages(reader: AnyReader, connections: Sequence[Connection]) -> Iterator[tuple[float, Any]]:

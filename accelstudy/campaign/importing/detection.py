@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES
 from accelstudy.campaign.importing.noise import HoldNoise, hold_noise, noise_before_rounding
 from accelstudy.campaign.importing.recording import AXES, SDS, Recording
@@ -177,7 +177,7 @@ def find_holds(
              "slowly"),
         ):  # fmt: skip
             if count:
-                warnings.append(f"{counted(count, 'hold')} left out: {why}")
+                warnings.append(f"{plural(count, 'hold')} left out: {why}")
         warnings += too_short
         if not holds and wandering:
             raise _never_still(each, "it turns slowly in all that looks like a hold", seconds)
@@ -198,7 +198,7 @@ def _runs_at_rest(
     Also a line about rests that are too short, with the option that takes them.
     """
     step, shortest = windows[0].log.step, settings.shortest_s
-    still = np.all([w.at_rest(limit) for w, limit in zip(windows, limits, strict=True)], axis=0)
+    still = np.all([w.are_at_rest(limit) for w, limit in zip(windows, limits, strict=True)], axis=0)
     edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
     cut, least = round(settings.trim_s / step), max(2, round(shortest / step))
     rests = edges + np.array([cut, -cut])
@@ -214,7 +214,7 @@ def _runs_at_rest(
     digit = 10.0 ** np.floor(np.log10(left))
     several = len(rests_s) > 1
     return runs, [
-        f"{counted(len(rests_s), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} "
+        f"{plural(len(rests_s), 'rest')} of {' to '.join(spans)} s {'are' if several else 'is'} "
         f"no hold: it takes {lost + shortest:.3g} s, of which {lost:.3g} s at its ends do not "
         f"count; `shortest` {digit * np.floor(left / digit):g} (now {shortest:g}) takes "
         f"{'them' if several else 'it'}"
@@ -298,7 +298,7 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     forces = [windows.log.forces[hold] for hold in holds]
     if np.isfinite(full_range) or not forces:
         # The largest reading of a converter is a step less than its range.
-        return [at_range(each, full_range - windows.steps.max()) for each in forces]
+        return [reaches_range(each, full_range - windows.steps.max()) for each in forces]
     step, extremes = windows.steps, windows.extremes[:, :, None, :]
     noise = noise_before_rounding(step, np.median([f.std(axis=0, ddof=1) for f in forces], axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -316,7 +316,7 @@ def find_saturated(windows: Windows, holds: Sequence[slice], full_range: float) 
     return result
 
 
-def at_range(forces: Array, full_range: float) -> bool:
+def reaches_range(forces: Array, full_range: float) -> bool:
     """Whether samples (n, 3) of a hold, m/s², lie at the sensor's range ±`full_range`."""
     # Conversion from counts or g rounds.
     beyond = np.abs(forces) >= full_range * (1 - 1e-9)

@@ -19,8 +19,8 @@ from accelstudy.campaign.importing.detection import Holds, find_blocks, find_hol
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.means import read_means
 from accelstudy.campaign.importing.names import thermometers
-from accelstudy.campaign.importing.noise import shown, steps_text
-from accelstudy.campaign.importing.recording import AXES, SDS, Log, Recording, read_log
+from accelstudy.campaign.importing.noise import sigma_text, steps_text
+from accelstudy.campaign.importing.recording import AXES, SDS, Recording, SensorLog, read_log
 from accelstudy.campaign.importing.settings import ImportSettings, named_after
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.importing.windows import usual_window
@@ -122,7 +122,7 @@ def write_imported(
         from accelstudy.drawing.saving import save_all
         from accelstudy.drawing.style import DPI
 
-        offset = holds.means[0] - campaign.whole.forces[0]
+        offset = holds.means[0] - campaign.with_left_out.forces[0]
         draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
         save_all(draw, folder, DPI)
 
@@ -249,8 +249,8 @@ def _campaign(path: LogFile, settings: ImportSettings, forces: Array, **columns:
     nominal = None
     if settings.unit == "counts":
         conversion = conversion_of(settings.unit, settings.scale, settings.offset)
-        scale = settings.axes.rearranged(conversion.scale) * settings.axes.signs
-        nominal = Conversion(scale, settings.axes.rearranged(conversion.offset))
+        scale = settings.axes.to_frd_order(conversion.scale) * settings.axes.signs
+        nominal = Conversion(scale, settings.axes.to_frd_order(conversion.offset))
     campaign = Campaign(
         **{
             "name": settings.name,
@@ -270,7 +270,7 @@ def _campaign(path: LogFile, settings: ImportSettings, forces: Array, **columns:
     return replace(campaign, warnings=(*campaign.warnings, *doubts))
 
 
-def _layout_of(settings: LogLayout, log: Log) -> LogLayout:
+def _layout_of(settings: LogLayout, log: SensorLog) -> LogLayout:
     """How a log was read, with all its columns, by name if it has names."""
 
     def column(key: str) -> Place:
@@ -305,7 +305,7 @@ def _notes(
         reference=reference,
         seconds=time[-1] - time[0],
         steps=steps_text(holds.windows.steps) if rounded else "",
-        shown=shown,
+        sigma_text=sigma_text,
     )
 
 
@@ -324,12 +324,12 @@ def _warnings(holds: Holds, gravity: float) -> list[str]:
         missing=[(i, part) for i, part in numbered if i not in holds.table.index],
         turned=turned,
         lost=[(holds.table.index[lost][0], name) for name, lost in unknown.items() if lost.any()],
-        shown=shown,
+        sigma_text=sigma_text,
     )
 
 
 def _lines(part: str, *content: Any, **named: Any) -> list[str]:
     """Say a part of the template; who reads logs without saying anything loads no templates."""
-    from accelstudy.pages import lines
+    from accelstudy.pages import render_lines
 
-    return lines(TEMPLATE, part, *content, **named)
+    return render_lines(TEMPLATE, part, *content, **named)

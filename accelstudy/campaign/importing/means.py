@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, UNITS
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.importing.noise import shown
-from accelstudy.campaign.importing.recording import SDS, Log, read_log
+from accelstudy.campaign.importing.noise import sigma_text
+from accelstudy.campaign.importing.recording import SDS, SensorLog, read_log
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.sources import Source
 
@@ -47,7 +47,7 @@ def read_means(
         if np.any(n_samples < 1):
             raise InputError(f"{file}: column n_samples: must be positive")
     if {*SDS} <= rows.keys():
-        sd = frame.rearranged(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
+        sd = frame.to_frd_order(np.column_stack([rows[k] for k in SDS]) * abs(log.conversion.scale))
         columns["sd"] = sd
         if np.any(sd < 0):
             raise InputError(f"{file}: columns sd_fx, sd_fy, sd_fz: must not be negative")
@@ -64,7 +64,7 @@ def read_means(
     # Logs of the sensor have the unit and the axes of the table, but not its columns.
     layout = settings.model_dump(include={"unit", "scale", "offset", "frame"}, exclude_none=True)
     sigma = columns.get("sigma_force")
-    said = f"sigma of a mean: {'unknown' if sigma is None else shown(sigma)}"
+    said = f"sigma of a mean: {'unknown' if sigma is None else sigma_text(sigma)}"
     columns |= {
         "log": LogLayout.model_validate(layout),
         "notes": (f"{len(log.forces)} positions; {said}",),
@@ -73,7 +73,9 @@ def read_means(
     return settings, log.forces, columns
 
 
-def _rows(log: Log, settings: ImportSettings) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+def _rows(
+    log: SensorLog, settings: ImportSettings
+) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
     """Columns of the rows without those that are not used, and warnings about these."""
     rows, warnings = dict(log.rows), []
     angles = [key for key in (*ANGLES, "yaw") if key in rows]

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from accelstudy.campaign.unit_spellings import unit_of
+from accelstudy.campaign.unit_spellings import parse_unit
 
 _OF_ROS = r"(_?([a-z0-9]+_)*linear_)?"  # with the topic or the message before, as .csv of a bag has
 _KNOWN = {
@@ -45,13 +45,13 @@ _AS_ENDING = re.compile(r"(.*[^\W_])[\s_]+([^\W_]+([_/^-]\w+)?)")
 
 def is_unit(text: str) -> bool:
     """Whether a cell below a name may be its unit, with or without brackets."""
-    return unit_of(text.strip().strip("()[]{}<>")) is not None
+    return parse_unit(text.strip().strip("()[]{}<>")) is not None
 
 
 def with_unit(name: str, unit: str) -> str:
     """Name with the unit from a row of units."""
     unit = unit.strip().strip("()[]{}<>")
-    return f"{name} [{unit}]" if unit_of(unit) and name else name
+    return f"{name} [{unit}]" if parse_unit(unit) and name else name
 
 
 def without_unit(name: str) -> str:
@@ -63,7 +63,7 @@ def without_unit(name: str) -> str:
 def unit_in(name: str, key: str) -> str | None:
     """Unit that the name of the column of a key says; None if it says none of this quantity."""
     parts = (pattern.fullmatch(name.strip()) for pattern in (_IN_BRACKETS, _AS_ENDING))
-    units = (unit_of(part[2]) for part in parts if part)
+    units = (parse_unit(part[2]) for part in parts if part)
     return next((unit for unit in units if unit in _UNITS_OF.get(key, ())), None)
 
 
@@ -89,14 +89,14 @@ def thermometers(names: Sequence[str]) -> list[int]:
 
 def _is_of(name: str, key: str, matches: Callable[[str], Any]) -> bool:
     bracket, own = _IN_BRACKETS.fullmatch(name.strip()), _UNITS_OF.get(key, ())
-    unit = unit_of(bracket[2]) if bracket else ""
+    unit = parse_unit(bracket[2]) if bracket else ""
     if unit not in ("", *own) and (unit or key != "time"):  # "Time (UTC)"
         return False
     if key == "temperature" and unit_in(name, key) and re.match(r"t[^a-z]", _plain(name)):
         return True
     plain = _plain(without_unit(name))
     ending = _AS_ENDING.fullmatch(plain)
-    known = ending is not None and unit_of(ending[2]) in own
+    known = ending is not None and parse_unit(ending[2]) in own
     return bool(matches(plain) or (ending and known and matches(ending[1])))
 
 

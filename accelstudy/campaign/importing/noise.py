@@ -230,6 +230,6 @@ def steps_text(steps: ArrayLike) -> str:
     return f"{comma_list([*different])} m/s²"
 
 
-def shown(sigma: float) -> str:
+def sigma_text(sigma: float) -> str:
     """Standard deviation of a force, m/s², for people."""
     return f"{1e3 * sigma:.3g} mm/s²"

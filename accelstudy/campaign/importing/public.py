@@ -13,14 +13,14 @@ from pydantic import Field
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.files.reading import read_layer
-from accelstudy.files.validation import Block, checked
+from accelstudy.files.validation import ConfigSection, validate
 
 REGISTRY = Path(__file__).with_name("public_data.yaml")
 TIMEOUT = 30.0
 """Longest time without data from a server, s."""
 
 
-class PublicData(Block):
+class PublicData(ConfigSection):
     """One public file.
 
     Attributes
@@ -44,14 +44,14 @@ class PublicData(Block):
         return Path(unquote(urlsplit(self.url).path)).name
 
 
-class _Registry(Block):
+class _Registry(ConfigSection):
     sets: dict[str, PublicData]
 
 
 @cache
 def public_data() -> Mapping[str, PublicData]:
     """Public files by name."""
-    return checked(_Registry, {"sets": read_layer(REGISTRY)}, REGISTRY).sets
+    return validate(_Registry, {"sets": read_layer(REGISTRY)}, REGISTRY).sets
 
 
 def import_settings(name: str) -> ImportSettings:
@@ -64,7 +64,7 @@ def import_settings(name: str) -> ImportSettings:
     InputError
         If the file holds no forces.
     """
-    settings = _known(name).settings
+    settings = _public_data(name).settings
     if settings is None:
         raise InputError(f"the public data {name!r} hold no forces")
     return settings.model_copy(update={"name": name})
@@ -87,7 +87,10 @@ def public_path(name: str, folder: str | Path) -> Path:
     """
     import pooch
 
-    data, folder = _known(name), Path(folder).expanduser()  # in a configuration no shell expands it
+    data, folder = (
+        _public_data(name),
+        Path(folder).expanduser(),
+    )  # in a configuration no shell expands it
     for path in sorted(folder.rglob(data.file_name)):
         if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
             return path
@@ -107,7 +110,7 @@ def public_file(name: str, folder: str | Path) -> Path:
     import pooch
 
     pooch.get_logger().setLevel("WARNING")
-    data = _known(name)
+    data = _public_data(name)
     try:
         path = public_path(name, folder)
         # As a stream, pooch would leave the connection open after an error.
@@ -127,7 +130,7 @@ def public_file(name: str, folder: str | Path) -> Path:
         ) from None
 
 
-def _known(name: str) -> PublicData:
+def _public_data(name: str) -> PublicData:
     registry = public_data()
     if name not in registry:
         raise UnknownNameError("public data", name, registry)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import CLOCK_UNITS, SENSOR_UNITS, UNITS
-from accelstudy.basics.wording import counted, short_list
+from accelstudy.basics.wording import plural, short_list
 from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.formats import open_source
 from accelstudy.campaign.importing.names import places_by_name, unit_in, without_unit
@@ -64,7 +64,7 @@ def read_log(
     like: LogLayout | None = None,
     conditions: Collection[str] = ("time", *CONDITIONS),
     untimed: bool = False,
-) -> Log:
+) -> SensorLog:
     """Find out how a log is laid out; its numbers are read when they are first asked for.
 
     What `layout` says counts before what the format of the file and the names of its columns say,
@@ -114,7 +114,7 @@ def read_log(
         name = source.names[places["time"]]
         raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
     factor = 1e-9 if dated else UNITS["s"][chosen.time_unit]
-    return Log(source, chosen, places, factor, conversion)
+    return SensorLog(source, chosen, places, factor, conversion)
 
 
 def _laid_over(
@@ -148,7 +148,7 @@ def _places(
         if key not in known:
             raise UnknownNameError("column", key, [each for each in known if each != "time"])
     columns = layout.columns | ({} if layout.time is None else {"time": layout.time})
-    found = ((key, place_of(source, key, columns.get(key))) for key in AXES)
+    found = ((key, find_column(source, key, columns.get(key))) for key in AXES)
     places = {key: place for key, place in found if place is not None}
     if not places and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
@@ -166,7 +166,7 @@ def _places(
             continue
         needed = key == "time" and not untimed
         try:
-            place = place_of(source, key, columns.get(key))
+            place = find_column(source, key, columns.get(key))
             if place is None and needed:
                 raise _not_found(source, key)
         except InputError as error:
@@ -190,7 +190,7 @@ def _places(
     return places
 
 
-def place_of(source: Source, key: str, column: Place | None = None) -> int | None:
+def find_column(source: Source, key: str, column: Place | None = None) -> int | None:
     """Place of the column of a key: as given, or by its usual names; None if no name tells it.
 
     Digits are a place, unless a column has them as its name.
@@ -259,7 +259,7 @@ def _units(source: Source, places: Mapping[str, int]) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Log:
+class SensorLog:
     """The log of one sensor in one file.
 
     Attributes
@@ -314,11 +314,11 @@ class Log:
         rows, start = {}, np.nan
         if "time" in values:
             time, start = counted_from_first(values["time"])
-            time[~_within(time)] = np.nan
+            time[~_within_limits(time)] = np.nan
             time *= self.time_factor
             if "nanoseconds" in values:
                 rest = values["nanoseconds"]
-                time += np.where(_within(rest), 1e-9 * rest, np.nan)
+                time += np.where(_within_limits(rest), 1e-9 * rest, np.nan)
             first = next(iter(time[np.isfinite(time)]), 0.0)
             rows["time"], start = time - first, start * self.time_factor + first
         elif self.layout.rate_hz is not None:
@@ -331,16 +331,16 @@ class Log:
         limit = max([MAX_FORCE, *([1000 * np.median(norms)] if len(norms) else [])])
         forces = np.empty((3, len(values["fx"])))
         for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
-            raw, own = values.pop(AXES[i]), conversion.of_axis(i)
+            raw, own = values.pop(AXES[i]), conversion.axis(i)
             np.subtract(raw, own.offset, out=force)
             force *= sign * own.scale
-            large = ~_within(raw, 2.0**31 - 2)
+            large = ~_within_limits(raw, 2.0**31 - 2)
             if large.any():
                 force[large] = np.where(_is_reading(raw[large]), force[large], np.nan)
-            force[~_within(force, limit)] = np.nan
+            force[~_within_limits(force, limit)] = np.nan
         rows |= zip(AXES, forces, strict=True)
         for key in self.conditions:
-            rows[key] = np.where(_within(values[key]), values[key], np.nan)
+            rows[key] = np.where(_within_limits(values[key]), values[key], np.nan)
         return rows, forces.T, start
 
     @cached_property
@@ -374,14 +374,14 @@ def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
     return values - float(zero), float(zero)
 
 
-def _within(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
+def _within_limits(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
     """Which numbers are at most ±`largest`; by default, those that can be calculated with."""
     return np.asarray((values >= -largest) & (values <= largest))
 
 
 def _is_reading(values: NDArray[Any]) -> NDArray[np.bool_]:
     """Which numbers of a log can be readings of a sensor."""
-    return _within(values) & ~np.isin(values, SENTINELS)
+    return _within_limits(values) & ~np.isin(values, SENTINELS)
 
 
 class Recording:
@@ -389,14 +389,14 @@ class Recording:
 
     Parameters
     ----------
-    parts : sequence of Log
-    others : sequence of sequences of Log, of the sensors in the same files; a row that lacks a
-        reading of one sensor is no row of any
+    parts : sequence of SensorLog
+    others : sequence of sequences of SensorLog, of the sensors in the same files; a row that lacks
+        a reading of one sensor is no row of any
 
     Attributes
     ----------
     parts, others
-    first : Log, which has the layout of all
+    first : SensorLog, which has the layout of all
     path : Path, first of the files
     step : float, s, usual time between two samples: the mean, without gaps. Steps may jitter or be
         multiples of a clock's tick. So the median may be far from the mean, and only the mean fits
@@ -417,7 +417,9 @@ class Recording:
         reading.
     """
 
-    def __init__(self, parts: Sequence[Log], others: Sequence[Sequence[Log]] = ()) -> None:
+    def __init__(
+        self, parts: Sequence[SensorLog], others: Sequence[Sequence[SensorLog]] = ()
+    ) -> None:
         self.parts, self.others, self.first = parts, others, parts[0]
         self.path = self.first.path
         sensors = zip(parts, *others, strict=True)
@@ -436,9 +438,9 @@ class Recording:
             times[i] = times[i] - (first if "time" in part.places else 0.0) + start
             end = times[i][-1] + self.step
         self.time = np.concatenate(times) if times[1:] else times[0]
-        self.forces = self._of_all([part.forces.T for part in parts]).T
+        self.forces = self._concatenate([part.forces.T for part in parts]).T
         self.conditions = {
-            key: self._of_all([part.rows[key] for part in parts])
+            key: self._concatenate([part.rows[key] for part in parts])
             for key in CONDITIONS
             if all(key in part.places for part in parts)
         }
@@ -452,9 +454,9 @@ class Recording:
     @property
     def row(self) -> NDArray[np.int_]:
         """Number of the row of each sample in its part, from 0, (n,)."""
-        return self._of_all([np.arange(len(lost)) for lost in self._lost])
+        return self._concatenate([np.arange(len(lost)) for lost in self._lost])
 
-    def _of_all(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    def _concatenate(self, parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
         """Columns of the parts, (..., n) each, without the rows that lack a reading."""
         whole = [part[..., used] for part, used in zip(parts, self._used, strict=True)]
         return np.concatenate(whole, axis=-1) if whole[1:] else whole[0]
@@ -477,7 +479,7 @@ class Recording:
             hint = "; give the rate (`rate`) instead" if key == "time" else ""
             raise InputError(
                 f"{part.path}: {said}, not a usable number{hint}; {lost.sum()} of "
-                f"{counted(len(lost), 'row')} lack one, which are too many"
+                f"{plural(len(lost), 'row')} lack one, which are too many"
             )
         if len(lost) < 2 or (place is not None and len(time) < 2):
             raise InputError(f"{part.path}: too few samples ({len(time)})")
@@ -521,7 +523,7 @@ class Recording:
                 each = "; ".join(self._describe(i, int(row))[0] for row in rows[:MAX_NAMED])
                 more = "; …" if len(rows) > MAX_NAMED else ""
                 said.append(
-                    f"{len(rows)} of {counted(len(lost), 'row')} left out, as a reading is missing "
+                    f"{len(rows)} of {plural(len(lost), 'row')} left out, as a reading is missing "
                     f"or absurd: {each}{more}"
                 )
         return said

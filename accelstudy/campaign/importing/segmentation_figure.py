@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.detection import Holds
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.drawing.style import FULL, INK, new_figure
@@ -49,7 +49,7 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
         label = f"threshold {holds.threshold.sd:.2g} m/s²"
         below.axhline(holds.threshold.sd, color=_THRESHOLD, linestyle="--", label=label)
     kind = "static hold" if holds.size is None else "block"
-    kept, lost = counted(int(used.sum()), kind), f"{len(holds.left_out)} left out"
+    kept, lost = plural(int(used.sum()), kind), f"{len(holds.left_out)} left out"
     looks = [(used, kept, {"color": _SHADE}), (~used, lost, _LEFT_OUT)]
     for shaded, label, look in looks[: 2 if holds.left_out else 1]:
         for ax, shown in ((above, label), (below, None)):

@@ -16,14 +16,14 @@ from accelstudy.campaign.header import LogLayout, Place
 from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.files.reading import overlay, read_layer
 from accelstudy.files.validation import (
-    Block,
+    ConfigSection,
     Gravity,
     NotNegative,
     PathName,
     Positive,
     SigmaAngle,
     SigmaGravity,
-    checked,
+    validate,
 )
 
 _LARGE = Field(le=1e6)
@@ -49,14 +49,14 @@ Which = Span | tuple[int, ...]
 """Holds by a span of time, or by the numbers that the detector gave them."""
 
 
-class GravitySettings(Block):
+class GravitySettings(ConfigSection):
     """Gravity where the sensor was."""
 
     value_mps2: Gravity = Field(STANDARD_GRAVITY, description="local gravity, m/s²")
     sigma_mps2: SigmaGravity = Field(0.0, description="its standard deviation; 0 holds it fixed")
 
 
-class RobotSettings(Block):
+class RobotSettings(ConfigSection):
     """The robot whose angles a table of means has."""
 
     angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
@@ -134,7 +134,7 @@ def parse_settings(
 
     `names` are those of keys that are not from the source, see `checked`.
     """
-    return checked(ImportSettings, content, source, names=names)
+    return validate(ImportSettings, content, source, names=names)
 
 
 def read_settings(

@@ -168,10 +168,10 @@ def open_matlab(path: Path, variable: str | None = None) -> Source:
         raise InputError(f"{path}: array {name} has complex numbers")
     # An array with few rows and many columns has the samples in its columns.
     columns = array if array.shape[0] < array.shape[1] else array.T
-    return Source(path, table_of(columns), named=False)
+    return Source(path, table_of_columns(columns), named=False)
 
 
-def table_of(columns: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
+def table_of_columns(columns: NDArray[Any], names: Sequence[str] = ()) -> pa.Table:
     """Columns (c, n) as a table; they have their places as names if they have no others."""
     names = names or [str(place) for place in range(len(columns))]
     return pa.table([*map(pa.array, columns)], names=[*names])

@@ -22,7 +22,7 @@ from pyarrow import csv as arrow_csv
 
 from accelstudy.basics.errors import InputError, printable
 from accelstudy.basics.progress import stage
-from accelstudy.basics.wording import counted, one_line
+from accelstudy.basics.wording import one_line, plural
 from accelstudy.campaign.importing.names import is_unit, layout_by_names, with_unit
 from accelstudy.campaign.importing.sources import Source, is_stamp
 from accelstudy.files.reading import readable
@@ -61,7 +61,7 @@ class TextSource(Source):
     @property
     def notes(self) -> list[str]:
         """Lines about the text as a table; see `Source`."""
-        again = f"the header stands {counted(self._repeated, 'more time')} between the rows"
+        again = f"the header stands {plural(self._repeated, 'more time')} between the rows"
         return [*self._rows.notes, *([again] if self._repeated else [])]
 
     @cached_property
@@ -71,7 +71,7 @@ class TextSource(Source):
 
     def typed_table(self) -> pa.Table:
         """Columns that hold only numbers as numbers; see `Source`."""
-        columns = [_typed(column) for column in self.table.columns]
+        columns = [_to_numbers(column) for column in self.table.columns]
         return pa.table(columns, names=self.table.column_names)
 
     def columns(self, places: Sequence[int]) -> list[pa.ChunkedArray]:
@@ -153,7 +153,7 @@ class TextSource(Source):
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """See `Source`; reads the file again, which only errors and warnings need."""
-        number, line = next(islice(self._numbered(), row, None), (0, ""))
+        number, line = next(islice(self._numbered_rows(), row, None), (0, ""))
         if not number:
             return f"row {row + 1}", "unreadable"
         cells = self._rows.split(line.split(self._rows.comment)[0])
@@ -163,7 +163,7 @@ class TextSource(Source):
             return f"line {number}", "the line ends before it"
         return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
-    def _numbered(self) -> Iterator[tuple[int, str]]:
+    def _numbered_rows(self) -> Iterator[tuple[int, str]]:
         """Rows with the numbers of their lines, counted from 1."""
         for number, line in enumerate(_read(self.path).decode().split("\n"), 1):
             if number > self._rows.first and (row := self._rows.clean(line)) is not None:
@@ -178,9 +178,9 @@ class TextSource(Source):
         if self._rows.are_clean(content, lines.tell()):
             return pa.py_buffer(content).slice(lines.tell())
         blocks = iter(lambda: lines.read(_BLOCK) + lines.readline(), b"")
-        return pa.py_buffer(b"".join(map(self._cleaned, blocks)))
+        return pa.py_buffer(b"".join(map(self._clean_lines, blocks)))
 
-    def _cleaned(self, block: bytes) -> bytes:
+    def _clean_lines(self, block: bytes) -> bytes:
         """Lines of a text without those that are no rows."""
         if self._rows.are_clean(block):
             return block
@@ -442,7 +442,7 @@ def _numbers_of_text(column: pa.ChunkedArray) -> NDArray[Any]:
         return column.cast(pa.float64()).to_numpy()
 
 
-def _typed(column: pa.ChunkedArray) -> pa.ChunkedArray:
+def _to_numbers(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """Cells as numbers if that loses no digit of any; as text otherwise."""
     filled = pc.if_else(pc.equal(column, ""), None, column)
     for kind in (pa.int64(), pa.float64()):

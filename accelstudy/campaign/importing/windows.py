@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.basics.wording import counted
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.noise import step_in
 from accelstudy.campaign.importing.recording import GAP_RATIO, Recording
 
@@ -161,7 +161,7 @@ class Windows:
     def _all_counts(self) -> NDArray[np.int_]:
         return self.counts + _histogram(self.variance[self.frozen])
 
-    def at_rest(self, sd: float) -> NDArray[np.bool_]:
+    def are_at_rest(self, sd: float) -> NDArray[np.bool_]:
         """Whether the window about each sample is at rest, (n,), up to a standard deviation."""
         return (self.variance <= sd**2) & (self.coarse | ~self.frozen)
 
@@ -169,7 +169,7 @@ class Windows:
         """What a user should know of the log."""
         said = []
         if self.gaps:
-            said.append(f"{counted(self.gaps, 'gap')} in time; no hold spans one")
+            said.append(f"{plural(self.gaps, 'gap')} in time; no hold spans one")
         if self.frozen.any() and not self.coarse:
             share = 100 * self.frozen.sum() / self.centred.sum()
             said.append(

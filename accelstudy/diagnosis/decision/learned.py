@@ -24,7 +24,7 @@ from accelstudy.diagnosis.decision.verdict import Finding, impossible
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import Place
@@ -68,7 +68,7 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
             return replace(
                 finding,
                 verdict=LEARNED,
-                frame=Frame.of(fitted[1]),
+                frame=SessionFit.of(fitted[1]),
                 chosen=chosen,
                 place=found.place,
                 without_function=finding,
@@ -115,11 +115,11 @@ def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, floa
         return {}
     for name in names[: names.index(UNKNOWN)]:
         beside = problem.examined.candidates[name].strongest(left.z).basis
-        left, unknown = left.beside(beside), unknown.beside(beside)
+        left, unknown = left.orthogonal_to(beside), unknown.orthogonal_to(beside)
     if not unknown.places:
         return {}
     evidence = replace(problem.evidence, redundancy=left.redundancy)
-    places = unknown.by_place(evidence, left.z)
+    places = unknown.place_densities_of(evidence, left.z)
     shares = special.softmax([*places.values()]).tolist()
     return dict(zip(places, shares, strict=True))
 
@@ -127,7 +127,7 @@ def shares_of_places(problem: Problem, names: Sequence[str]) -> dict[Place, floa
 # --- the shapes of a place ----------------------------------------------------------------------
 
 
-def shapes_of(place: Place, frame: Frame) -> Iterator[Learned]:
+def shapes_of(place: Place, frame: SessionFit) -> Iterator[Learned]:
     """Shapes of a place as effects, with the amplitude 1; none where no effect can stand for it.
 
     A step to the next hold is no cause, and a way that the robot moved is in no column.
@@ -146,7 +146,7 @@ def shapes_of(place: Place, frame: Frame) -> Iterator[Learned]:
             yield _shape({"coordinate": f"{column} wave", "target": of, "period": period})
 
 
-def _coordinates(coordinate: str, frame: Frame) -> Iterator[dict[str, str | float]]:
+def _coordinates(coordinate: str, frame: SessionFit) -> Iterator[dict[str, str | float]]:
     """Coordinates of effects that stand for one of the session."""
     hold = frame.hold
     if coordinate == "dT/dt":
@@ -159,12 +159,12 @@ def _coordinates(coordinate: str, frame: Frame) -> Iterator[dict[str, str | floa
         yield {"coordinate": coordinate}
 
 
-def _course(frame: Frame) -> str:
+def _course(frame: SessionFit) -> str:
     """Column of the time, or of the order where there is none."""
     return "order" if frame.hold.time is None else "time"
 
 
-def _range(effect: Learned, frame: Frame) -> dict[str, float]:
+def _range(effect: Learned, frame: SessionFit) -> dict[str, float]:
     """Range of the coordinate of an effect in a session; none of an angle."""
     if effect.coordinate in ANGLES:
         return {}
@@ -172,7 +172,7 @@ def _range(effect: Learned, frame: Frame) -> dict[str, float]:
     return {"low": float(f"{values.min():.6g}"), "high": float(f"{values.max():.6g}")}
 
 
-def coordinate_values(effect: Learned, frame: Frame) -> Array:
+def coordinate_values(effect: Learned, frame: SessionFit) -> Array:
     """Coordinate of each component of the target of an effect in the positions, (n, c)."""
     angles = tuple(frame.angles.T)
     return np.stack(effect.arguments(tuple(frame.sensed.T), angles, frame.hold), axis=1)
@@ -209,7 +209,12 @@ class PlaceShape:
 
     @classmethod
     def of(
-        cls, effect: Learned, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
+        cls,
+        effect: Learned,
+        frame: SessionFit,
+        residuals: Residuals,
+        errors: Array,
+        evidence: Evidence,
     ) -> PlaceShape | None:
         """Weigh a shape by errors (b, m) in a space of residuals; None if too little shows."""
         rows = frame.rows(effect) * effect.deviations
@@ -221,12 +226,12 @@ class PlaceShape:
         kept = values > 1e-6 * trace
         vectors = left @ turned[:, kept] / np.sqrt(values[kept])
         shares, squares = values[kept] / trace, np.sum(errors**2, axis=1)
-        logs = evidence.at_sizes((errors @ vectors) ** 2, shares, squares, SIZES)
+        logs = evidence.densities_by_size((errors @ vectors) ** 2, shares, squares, SIZES)
         return cls(effect, vectors, shares, trace, logs)
 
 
 def weigh_place(
-    place: Place, frame: Frame, residuals: Residuals, errors: Array, evidence: Evidence
+    place: Place, frame: SessionFit, residuals: Residuals, errors: Array, evidence: Evidence
 ) -> list[PlaceShape]:
     """Shapes of a place, weighed by errors (b, m) in the space of residuals of a frame."""
     each = (
@@ -243,7 +248,7 @@ def fit_of_place(
     Where no sigma is given, the prior of the function counts beside the noise that it leaves.
     """
     frame = problem.frame
-    residuals = frame.residuals.beside(space_of(beside, len(frame.residuals.z)))
+    residuals = frame.residuals.orthogonal_to(space_of(beside, len(frame.residuals.z)))
     z, evidence = residuals.z, replace(problem.evidence, redundancy=residuals.redundancy)
     shapes = weigh_place(place, frame, residuals, z[None], evidence)
     if not shapes:

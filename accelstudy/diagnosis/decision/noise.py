@@ -28,7 +28,7 @@ from accelstudy.diagnosis.evidence.noise_tests import (
     within_hold_test,
 )
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import LackOfFit, Spaces, clusters
 from accelstudy.diagnosis.space.residuals import Residuals
 
@@ -62,10 +62,10 @@ def misfit(problem: Problem, solution: Solution) -> Misfit | None:
     labels = clusters(problem.frame.forces)
     if len(labels) != len(solution.misclosures) or len(np.unique(labels)) == len(labels):
         return than_stated
-    square, freedom = _of_repeats(left, LackOfFit.of(left, labels))
+    square, freedom = _square_of_repeats(left, LackOfFit.of(left, labels))
     if not freedom or (stated and special.chdtrc(freedom, square) >= REFUTATION_LEVEL / 2):
         return than_stated
-    if _of_fit(left, square, freedom) >= REFUTATION_LEVEL:
+    if _lack_of_fit(left, square, freedom) >= REFUTATION_LEVEL:
         return None
     return than_stated or Misfit(ratio / float(np.sqrt(square / freedom)), of_repeats=True)
 
@@ -75,10 +75,10 @@ def lack_of_fit(problem: Problem) -> float:
     residuals, same = problem.residuals, problem.attitude
     if same is None:
         return 1.0
-    return _of_fit(residuals, *_of_repeats(residuals, same))
+    return _lack_of_fit(residuals, *_square_of_repeats(residuals, same))
 
 
-def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
+def _lack_of_fit(residuals: Residuals, square: float, freedom: int) -> float:
     """F test of all but the differences of repeats against these differences."""
     rest = residuals.redundancy - freedom
     if not freedom or not rest:
@@ -87,13 +87,13 @@ def _of_fit(residuals: Residuals, square: float, freedom: int) -> float:
     return float(special.fdtrc(rest, freedom, ratio))
 
 
-def _of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
+def _square_of_repeats(residuals: Residuals, same: Spaces) -> tuple[float, int]:
     """Square of the differences of repeated positions, and its degrees of freedom."""
     square = float(residuals.z @ residuals.z) - float(same.parts(residuals.z)[0])
     return max(square, 0.0), residuals.redundancy - int(same.dims[0])
 
 
-def tests_of_noise(case: Case, frame: Frame) -> tuple[NoiseTest, ...]:
+def tests_of_noise(case: Case, frame: SessionFit) -> tuple[NoiseTest, ...]:
     """All tests of the noise that a campaign allows, on the residuals of the base or final fit."""
     campaign, problem, chance = case.campaign, case.problem, case.chance
     if is_exact(problem.base.solution):
@@ -114,7 +114,7 @@ def tests_of_noise(case: Case, frame: Frame) -> tuple[NoiseTest, ...]:
     return tuple(tests)
 
 
-def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
+def level_test_of(problem: Problem, frame: SessionFit) -> NoiseTest:
     """Test the level of the noise; the base fit by its own Ω, as the calibration does."""
     if frame is problem.frame:
         base = problem.base.solution
@@ -122,7 +122,7 @@ def level_test_of(problem: Problem, frame: Frame) -> NoiseTest:
     return level_test(frame.residuals, frame.solution.sigma_dof)
 
 
-def judged_noise(problem: Problem, frame: Frame) -> JudgedNoise:
+def judged_noise(problem: Problem, frame: SessionFit) -> JudgedNoise:
     """Judge the noise by the residuals of a fit, which give it where no stated sigma holds."""
     residuals = frame.residuals
     stated, r = problem.evidence.level.known, residuals.redundancy
@@ -132,7 +132,7 @@ def judged_noise(problem: Problem, frame: Frame) -> JudgedNoise:
     return JudgedNoise(True, pooled_variance(omega, r, frame.solution.sigma_dof))
 
 
-def exceeds_stated(problem: Problem, frame: Frame) -> bool:
+def exceeds_stated(problem: Problem, frame: SessionFit) -> bool:
     """Whether sigma is given, and the residuals of a fit are larger than it allows."""
     refuted = problem.evidence.level.known and not judged_noise(problem, frame).trusted
     return refuted and frame.residuals.variance > 1

@@ -82,12 +82,12 @@ class Explanation:
         return shapes if len(shapes) == len(self.causes) else ()
 
     @property
-    def of_effects(self) -> bool:
+    def is_effects(self) -> bool:
         """Whether it is of effects alone."""
         return all(members[0] in effect_names() for members in self.classes)
 
     @property
-    def of_noise(self) -> bool:
+    def is_noise(self) -> bool:
         """Whether nothing is wrong but the noise."""
         return self.names[0] in NOISES
 
@@ -96,7 +96,7 @@ NOT_LISTED = Cause(UNKNOWN, (UNKNOWN,))
 """Something unknown."""
 
 
-def ranked(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
+def rank_explanations(explanations: Iterable[Explanation]) -> tuple[Explanation, ...]:
     """Explanations that exclude each other, with their probabilities, most probable first."""
     order = sorted(explanations, key=lambda one: -one.log_weight)
     p = special.softmax([one.log_weight for one in order]).tolist()
@@ -134,12 +134,12 @@ class Posterior:
             if same is not one:
                 total = float(np.logaddexp(same.log_weight, one.log_weight))
                 merged[key] = replace(same, log_weight=total)
-        return cls(ranked(merged.values()))
+        return cls(rank_explanations(merged.values()))
 
     @cached_property
     def reported(self) -> tuple[Explanation, ...]:
         """Those that are reported, most probable first."""
-        noise = next((i for i, one in enumerate(self.all) if one.of_noise), None)
+        noise = next((i for i, one in enumerate(self.all) if one.is_noise), None)
         size, parts = self._size, dict[tuple[tuple[str, ...], ...], int]()
         for i, one in enumerate(self.all):
             if one.best and len(one.names) == size:
@@ -147,14 +147,14 @@ class Posterior:
         counted = {i: float(one.log_weight) for i, one in enumerate(self.all)}
         for i, one in enumerate(self.all):
             into = None
-            if one.of_noise:
+            if one.is_noise:
                 into = noise
             elif len(one.names) > size:
                 within = (tuple(sorted(some)) for some in combinations(one.classes, size))
                 into = min((parts[some] for some in within if some in parts), default=None)
             if into is not None and into < i:
                 counted[into] = float(np.logaddexp(counted[into], counted.pop(i)))
-        return ranked(replace(self.all[i], log_weight=log) for i, log in counted.items())
+        return rank_explanations(replace(self.all[i], log_weight=log) for i, log in counted.items())
 
     @property
     def _size(self) -> int:
@@ -170,9 +170,9 @@ class Posterior:
         return credible_set(self.reported)
 
     @property
-    def of_noise(self) -> float:
+    def p_noise(self) -> float:
         """Probability that nothing is wrong but the noise."""
-        return sum(one.posterior for one in self.reported if one.of_noise)
+        return sum(one.posterior for one in self.reported if one.is_noise)
 
     def doubting(self, names: Collection[str]) -> Posterior:
         """Share what has some names with something unknown that they may only imitate."""
@@ -359,16 +359,16 @@ def posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterio
     count : int, sets of candidates that are refitted, the most probable to first order
     """
     tried = [single, *sorted(case.sets, key=lambda one: -one.log_weight)[:count]]
-    refitted = [_refitted(case, one) for one in tried]
+    refitted = [_refit(case, one) for one in tried]
     alone, solution = refitted[0]
     weighed = [one for one, _ in refitted]
     if solution is not None:
-        weighed += _beside(case, alone, solution)
+        weighed += _pairs_with(case, alone, solution)
     others = [one for one in case.alone if one.names != single.names]
     return Posterior.of([*weighed, *others, *case.noises])
 
 
-def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
+def _refit(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
     """Weigh an explanation by its refit instead of by first order."""
     fit = case.refit(one.causes)
     if fit is None:
@@ -378,18 +378,18 @@ def _refitted(case: Case, one: Explanation) -> tuple[Explanation, Solution | Non
     left = z - basis @ np.linalg.lstsq(basis, z, rcond=None)[0]
     gain = max(float(left @ left) - solution.omega, 0.0)
     parts = float(z @ z - left @ left) + np.array([0.0, gain])
-    first, refit = case.problem.evidence.of_spaces(parts, [basis.shape[1]] * 2, z @ z)
+    first, refit = case.problem.evidence.spaces_density(parts, [basis.shape[1]] * 2, z @ z)
     weight = one.log_weight + float(refit - first)
     both = zip(one.causes, refitted, strict=True)
     causes = tuple(replace(cause, best=other.best) for cause, other in both)
     return Explanation(causes, weight), solution
 
 
-def _beside(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
+def _pairs_with(case: Case, alone: Explanation, solution: Solution) -> list[Explanation]:
     """One effect with another one, or with something unknown, in what its refit leaves."""
     inner = Alternatives(pose(replace(case.problem.base, solution=solution)))
     problem, z, weighed = inner.problem, inner.problem.residuals.z, list[Explanation]()
-    odds = problem.field.odds(problem.evidence, problem.field.seen(z)) + alone.log_weight
+    odds = problem.field.odds(problem.evidence, problem.field.project(z)) + alone.log_weight
     for name, log in zip(problem.field.names, odds.tolist(), strict=True):
         cause, more = NOT_LISTED, np.log(problem.prior_unknown)
         if name != UNKNOWN:

@@ -19,7 +19,7 @@ from accelstudy.diagnosis.evidence.noise_models import UnequalAxes
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit, examine
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import LackOfFit, lack_of_fit
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes
@@ -85,14 +85,14 @@ def fit_base(campaign: Campaign, model: SensorModel, approach: Approach) -> Base
     if sd is not None and n is not None and np.all(sd > 0):
         within = np.asarray(np.mean(sd**2 / n[:, None], axis=0))
     if stated:
-        return BaseFit(solution, Level.given(solution.sigma_dof), within)
+        return BaseFit(solution, Level.of_stated_sigma(solution.sigma_dof), within)
     if within is None or np.mean(within) <= least_sigma(campaign, approach) ** 2:
-        return BaseFit(solution, Level.unknown(), within)
+        return BaseFit(solution, Level.of_nothing_stated(), within)
     most, ratio = RULES.beyond_white, fit.sigma_position_posteriori**2 / np.mean(within)
     if not 1 / most < ratio < most:
-        return BaseFit(solution, Level.unknown(), within)
+        return BaseFit(solution, Level.of_nothing_stated(), within)
     observed = replace(fit.observed, sigma_force=float(np.sqrt(np.mean(within))))
-    return BaseFit(solve(fit.model, fit.approach, observed), Level.within_holds(), within)
+    return BaseFit(solve(fit.model, fit.approach, observed), Level.of_holds(), within)
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Problem:
     examined: ExaminedFit
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> SessionFit:
         """Session of the fit."""
         return self.examined.frame
 
@@ -141,7 +141,7 @@ class Problem:
         return RULES.prior_unknown + (RULES.prior_unrecorded if slow else 0.0)
 
     @cached_property
-    def named(self) -> Field:
+    def named_field(self) -> Field:
         """All candidates that have names."""
         return Field(self.examined.candidates)
 
@@ -167,10 +167,10 @@ class Problem:
         """Log odds of the most probable single thing that is missing against nothing, or 0."""
         if not field.names:
             return 0.0
-        prior = np.full(len(field.names), 1 / len(field.named))
+        prior = np.full(len(field.names), 1 / len(field.named_shapes))
         if UNKNOWN in field.names:
             prior[-1] = self.prior_unknown
-        odds = field.odds(self.evidence, field.seen(self.residuals.z)) + np.log(prior)
+        odds = field.odds(self.evidence, field.project(self.residuals.z)) + np.log(prior)
         return max(0.0, float(np.max(odds)))
 
 
@@ -186,7 +186,9 @@ def pose(base: BaseFit) -> Problem:
         return problem
     noisier = problem.unequal_axes
     # Something unknown is asked last, as it takes longest.
-    if noisier > problem.best_odds(problem.named) and noisier > problem.best_odds(problem.field):
+    if noisier > problem.best_odds(problem.named_field) and noisier > problem.best_odds(
+        problem.field
+    ):
         sigma = np.sqrt(problem.axes.ratios)
         mean = np.mean(np.sqrt(first.variances[:, :3]))
         shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
-from accelstudy.diagnosis.evidence.candidates import Cause, Singles, shaped
+from accelstudy.diagnosis.evidence.candidates import Cause, Singles, reshape
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import Hypothesis
@@ -27,7 +27,7 @@ RANGE_FACTOR = 1.6
 
 def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     """Fit with effects added and bumped positions left out; None if it has no solution."""
-    effects = [h.shown for h in chosen if h.shown is not None]
+    effects = [h.distinguishable for h in chosen if h.distinguishable is not None]
     together = (*base.model.effects, *effects)
     try:
         model = SensorModel(composition_name(together), together) if effects else base.model
@@ -73,7 +73,7 @@ def best_refit(
         ]
         for one in chosen
     ]
-    sharp = [_sharpened(examined, one) for one in product(*alternatives)]
+    sharp = [_sharpen(examined, one) for one in product(*alternatives)]
     base = examined.frame.solution
     solved = [(one, fit) for one in sharp if (fit := refit(base, one)) is not None]
     if not solved:
@@ -115,7 +115,7 @@ def with_settings(
     for one in chosen:
         if one.smooth is None:
             continue
-        shown, name, value = one.shown, one.smooth, one.value
+        shown, name, value = one.distinguishable, one.smooth, one.value
         assert shown is not None
         psi = []
         for step in (-STEP, STEP):
@@ -123,7 +123,7 @@ def with_settings(
             effects = tuple(changed if e.name == one.name else e for e in model.effects)
             trial = SensorModel(model.name, effects)
             problem = CalibrationProblem.of(trial, fit.approach, fit.observed)
-            psi.append(problem.linearised(fit.parameters[None], at[None]).psi[:, 0].T)
+            psi.append(problem.linearise(fit.parameters[None], at[None]).psi[:, 0].T)
         slope = np.linalg.solve(fit.whitening, (psi[1] - psi[0])[..., None] / (2 * STEP)).ravel()
         columns.append(np.pad(slope, (0, len(fit.design) - len(slope)))[:, None])
         tried = _values(examined, one)
@@ -146,7 +146,7 @@ def _values(examined: ExaminedFit, hypothesis: Hypothesis) -> list[float]:
     return [value for value in values if not np.isnan(value)]
 
 
-def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _sharpen(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Search the settings of smooth effects by refits: a large effect is not of first order."""
     sharp, base = list(chosen), examined.frame.solution
     for k, start in enumerate(chosen):
@@ -159,7 +159,7 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
         ends = (*passed, *values)
 
         def omega(log: float, k: int = k, start: Hypothesis = start) -> float:
-            trial = shaped(examined, start, float(np.exp(log)))
+            trial = reshape(examined, start, float(np.exp(log)))
             if trial is None:
                 return base.omega
             fit = refit(base, [*sharp[:k], trial, *sharp[k + 1 :]])
@@ -178,7 +178,7 @@ def _sharpened(examined: ExaminedFit, chosen: Sequence[Hypothesis]) -> list[Hypo
             if inside or near in passed or omega(float(np.log(near))) > least.fun:
                 break
             at, passed = near, passed | {low, high}
-        best = shaped(examined, start, float(np.exp(least.x)))
+        best = reshape(examined, start, float(np.exp(least.x)))
         if best is not None and least.fun < omega(float(np.log(start.value))):
             sharp[k] = best
     return sharp

@@ -99,7 +99,7 @@ def statement_of(
     cosine : function of two names, the canonical cosine of their signatures
     probability : float, that is enough to be certain
     """
-    effects = [one for one in explanations if not one.of_noise]
+    effects = [one for one in explanations if not one.is_noise]
     if not effects:
         return Statement((), tuple(explanations))
     top = max(effects, key=lambda one: one.posterior)
@@ -119,7 +119,7 @@ def statement_of(
 
 def _match(top: Explanation, one: Explanation, cosine: Cosine) -> dict[int, int]:
     """Match the effects of two explanations: place in the first -> place in the other."""
-    if one.of_noise:
+    if one.is_noise:
         return {}
     alike = [
         [1.0 if a.members == b.members else cosine(a.name, b.name) for b in one.causes]

@@ -25,7 +25,7 @@ from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.noise_tests import COLOUR, LEVEL, NOISES, STEPS, NoiseTest
 from accelstudy.diagnosis.prediction import HeldOutGap
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.plausibility import impossible_parameters
@@ -67,7 +67,7 @@ class Finding:
     """
 
     verdict: str
-    frame: Frame
+    frame: SessionFit
     reason: Reason | None = None
     chosen: tuple[Cause, ...] = ()
     posterior: Posterior | None = None
@@ -124,7 +124,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         found = [replace(cause, posterior=top.posterior) for cause in fit[0]]
         found.sort(key=lambda one: one.shape.effect is not None)
         credible, verdict = posterior.credible_set, ""
-        of_effects = sum(one.posterior for one in credible if one.of_effects)
+        of_effects = sum(one.posterior for one in credible if one.is_effects)
         sure = top.posterior >= RULES.sure
         if sure and found[0].shape.effect is None:
             verdict = "gross_error"
@@ -133,8 +133,8 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
         elif (sure or len(credible) <= RULES.many) and of_effects >= RULES.sure:
             verdict = "narrowed"
         if verdict:
-            return Finding(verdict, Frame.of(fit[1]), None, tuple(found), posterior)
-    if top.of_noise and top.posterior >= RULES.sure:
+            return Finding(verdict, SessionFit.of(fit[1]), None, tuple(found), posterior)
+    if top.is_noise and top.posterior >= RULES.sure:
         reason = Reason.of("noise", name=top.names[0], remark=NOISES[top.names[0]])
         return Finding("noise_model", frame, reason, posterior=posterior)
     reason = Reason.of("not in the catalogue")
@@ -205,7 +205,7 @@ def add_certain_effects(case: Case, finding: Finding) -> Finding:
     fit = case.refit(chosen)
     if fit is None:
         return replace(finding, statement=Statement((), ()))
-    return replace(finding, frame=Frame.of(fit[1]), chosen=fit[0])
+    return replace(finding, frame=SessionFit.of(fit[1]), chosen=fit[0])
 
 
 def _certain_effects(case: Case, posterior: Posterior, says: Statement) -> list[tuple[Part, Cause]]:
@@ -270,7 +270,7 @@ def withdraw_refuted(case: Case, finding: Finding, held: HeldOutGap) -> Finding:
 def judge_noise(case: Case, worst: NoiseTest) -> Finding:
     """Judge a failed test of the noise, when no effect was significant."""
     problem, posterior = case.problem, case.posterior
-    verdict, name, noise = "noise_model", worst.name, posterior.of_noise
+    verdict, name, noise = "noise_model", worst.name, posterior.p_noise
     reason = Reason.of("noise", name=name, remark=worst.remark)
     if lack_of_fit(problem) < REFUTATION_LEVEL and name != STEPS:
         verdict, reason = "unknown", Reason.of("lack of fit")
@@ -289,7 +289,7 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
 # model is adequate.
 
 
-def coloured(case: Case, finding: Finding) -> float:
+def p_coloured(case: Case, finding: Finding) -> float:
     """Probability of coloured noise that may be an effect of an absent column."""
     posterior = finding.posterior
     if finding.verdict not in ("noise_model", "unknown") or posterior is None:
@@ -298,16 +298,16 @@ def coloured(case: Case, finding: Finding) -> float:
     return sum(slow) if case.problem.frame.absent else 0.0
 
 
-def unrecorded(case: Case, finding: Finding) -> Reason | None:
+def reason_of_unrecorded(case: Case, finding: Finding) -> Reason | None:
     """Why noise, or nothing with a name, may be an effect of what was not recorded; else None."""
     posterior, absent = finding.posterior, case.problem.frame.absent
     if finding.verdict not in ("noise_model", "unknown") or not absent or posterior is None:
         return None
-    slow, probability = case.slow, coloured(case, finding)
+    slow, probability = case.slow, p_coloured(case, finding)
     if finding.verdict == "noise_model":
-        enough = probability >= posterior.of_noise / 2
+        enough = probability >= posterior.p_noise / 2
     else:
-        enough = slow * probability + _of_courses(case.problem, posterior) >= RULES.sure
+        enough = slow * probability + _p_courses(case.problem, posterior) >= RULES.sure
     if not enough:
         return None
     noise = "slow"
@@ -319,12 +319,12 @@ def unrecorded(case: Case, finding: Finding) -> Reason | None:
     )
 
 
-def _of_courses(problem: Problem, posterior: Posterior) -> float:
+def _p_courses(problem: Problem, posterior: Posterior) -> float:
     """Probability of effects of time or temperature, and of something unknown like them."""
     courses = {name for name in effect_names() if get_effect(name).is_course}
     unknown = problem.unknown
     if unknown is not None:
-        places = unknown.by_place(problem.evidence, problem.residuals.z)
+        places = unknown.place_densities_of(problem.evidence, problem.residuals.z)
         if max(places, key=places.__getitem__)[0] in ("time", "temperature"):
             courses.add(UNKNOWN)
     return sum(one.posterior for one in posterior.reported if courses.issuperset(one.names))

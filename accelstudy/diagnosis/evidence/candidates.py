@@ -32,7 +32,7 @@ UNKNOWN = "unknown"
 """Something of one of the learned shapes, or of the attitude alone, that is none of the effects."""
 
 
-class Seen(NamedTuple):
+class Projection(NamedTuple):
     """What densities need of residuals: their parts by candidate, (..., p) each, and ‖z‖² (...)."""
 
     parts: tuple[Array, ...]
@@ -56,30 +56,30 @@ class Field:
         return tuple(self.candidates)
 
     @cached_property
-    def named(self) -> list[Hypotheses]:
+    def named_shapes(self) -> list[Hypotheses]:
         """Shapes of the candidates that have names."""
         return [one for one in self.candidates.values() if isinstance(one, Hypotheses)]
 
-    def seen(self, errors: Array) -> Seen:
+    def project(self, errors: Array) -> Projection:
         """What the densities need of residuals (..., m)."""
         parts = tuple(shapes.parts(errors) for shapes in self.candidates.values())
-        return Seen(parts, np.sum(errors**2, axis=-1))
+        return Projection(parts, np.sum(errors**2, axis=-1))
 
     @cached_property
     def _spaces(self) -> tuple[Ints, Array, Ints]:
         """Dimensions and log prior of all named shapes, (s,), and where those of each begin."""
-        dims = np.concatenate([one.dims for one in self.named])
-        log_prior = np.log(np.concatenate([one.prior for one in self.named]))
-        return dims, log_prior, np.cumsum([0, *(len(one) for one in self.named[:-1])])
+        dims = np.concatenate([one.dims for one in self.named_shapes])
+        log_prior = np.log(np.concatenate([one.prior for one in self.named_shapes]))
+        return dims, log_prior, np.cumsum([0, *(len(one) for one in self.named_shapes[:-1])])
 
-    def densities(self, evidence: Evidence, seen: Seen) -> Array:
+    def densities(self, evidence: Evidence, seen: Projection) -> Array:
         """Log density of residuals under each candidate, over its shapes, (..., K)."""
         if not self.candidates:
             return np.zeros((*np.shape(seen.squares), 0))
         # All spaces at once, which takes half as long as one candidate after the other.
         dims, log_prior, starts = self._spaces
         parts = np.concatenate(seen.parts[: len(starts)], axis=-1)
-        logs = evidence.of_spaces(parts, dims, seen.squares) + log_prior
+        logs = evidence.spaces_density(parts, dims, seen.squares) + log_prior
         top = np.maximum.reduceat(logs, starts, axis=-1)
         logs -= np.repeat(top, np.diff(starts, append=len(dims)), axis=-1)
         each = top + np.log(np.add.reduceat(np.exp(logs), starts, axis=-1))
@@ -88,9 +88,9 @@ class Field:
         unknown = self.candidates[UNKNOWN].log_density(evidence, seen.parts[-1], seen.squares)
         return np.append(each, unknown[..., None], axis=-1)
 
-    def odds(self, evidence: Evidence, seen: Seen) -> Array:
+    def odds(self, evidence: Evidence, seen: Projection) -> Array:
         """Log odds of each candidate against nothing, (..., K)."""
-        nothing = np.logaddexp.reduce(evidence.of_noise(seen.squares), axis=-1)
+        nothing = np.logaddexp.reduce(evidence.noise_density(seen.squares), axis=-1)
         return np.asarray(self.densities(evidence, seen) - nothing[..., None])
 
 
@@ -142,13 +142,13 @@ class Singles:
 def weigh_singles(examined: ExaminedFit, evidence: Evidence) -> Singles:
     """Weigh each candidate by itself."""
     z, field = examined.frame.residuals.z, Field(examined.candidates)
-    densities = field.densities(evidence, field.seen(z))
+    densities = field.densities(evidence, field.project(z))
     first = dict(zip(field.names, densities.tolist(), strict=True))
     least = max(first.values(), default=0.0) - RULES.refined_within
     shapes, logs, best = dict[str, Hypotheses](), dict[str, Array](), dict[str, Hypothesis]()
     for name, tried in examined.candidates.items():
         worth = first[name] > least
-        own = refined(examined, tried) if worth else tried
+        own = refine(examined, tried) if worth else tried
         parts = own.parts(z)
         shapes[name], logs[name] = own, own.logs(evidence, parts, z @ z)
         if worth and own[0].estimates is not None:
@@ -172,7 +172,7 @@ def equivalents(examined: ExaminedFit, singles: Singles) -> dict[str, tuple[str,
             continue
         logs = singles.logs[name]
         probable = [shapes[int(i)] for i in np.flatnonzero(logs > logs.max() - RULES.undecided)]
-        members[name] = tuple(sorted({*examined.alike(probable), name}))
+        members[name] = tuple(sorted({*examined.indistinguishable(probable), name}))
     return members
 
 
@@ -193,17 +193,17 @@ def classes_of(singles: Singles, members: Mapping[str, tuple[str, ...]]) -> list
     return classes
 
 
-def refined(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
+def refine(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
     """Add shapes between the neighbours of the best one, and again between those."""
     z = examined.frame.residuals.z
     if not isinstance(shapes, EffectShapes) or len(shapes) < 2:
         return shapes
     if shapes[0].smooth is None:
-        return _completed(examined, shapes)
+        return _complete(examined, shapes)
     for _ in range(RULES.refinements):
         best = int(np.argmax(shapes.parts(z)))
         around = (shapes[max(best - 1, 0)].value, shapes[min(best + 1, len(shapes) - 1)].value)
-        tried = _all_shaped(
+        tried = _reshape_all(
             examined, shapes[best], np.geomspace(*around, RULES.refined_shapes + 2)[1:-1]
         )
         fine = [*shapes, *(h for h in tried if h is not None)]
@@ -211,12 +211,12 @@ def refined(examined: ExaminedFit, shapes: Hypotheses) -> Hypotheses:
     return shapes
 
 
-def shaped(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
+def reshape(examined: ExaminedFit, hypothesis: Hypothesis, value: float) -> Hypothesis | None:
     """Return a smooth effect with another value of its setting; None if less of it shows."""
-    return _all_shaped(examined, hypothesis, [value])[0]
+    return _reshape_all(examined, hypothesis, [value])[0]
 
 
-def _all_shaped(
+def _reshape_all(
     examined: ExaminedFit, hypothesis: Hypothesis, values: Iterable[float]
 ) -> list[Hypothesis | None]:
     """Return one hypothesis per value of the smooth setting; None where less of it shows.
@@ -233,7 +233,7 @@ def _all_shaped(
     ]
 
 
-def _completed(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
+def _complete(examined: ExaminedFit, shapes: EffectShapes) -> EffectShapes:
     """Add the shapes next to the best one that were passed over, until none is left."""
     z, hold = examined.frame.residuals.z, examined.frame.hold
     while True:
@@ -268,10 +268,10 @@ def unknown_beside(
     residuals : Residuals
     evidence : Evidence
     """
-    rest, left = unknown.beside(basis), residuals.beside(basis)
+    rest, left = unknown.orthogonal_to(basis), residuals.orthogonal_to(basis)
     if not rest.places:
         return None
     evidence = replace(evidence, redundancy=left.redundancy)
     squares = left.z @ left.z
     density = rest.log_density(evidence, rest.parts(left.z), squares)
-    return float(density - np.logaddexp.reduce(evidence.of_noise(squares)))
+    return float(density - np.logaddexp.reduce(evidence.noise_density(squares)))

@@ -87,7 +87,7 @@ class Chance:
         for errors in self.errors(residuals):
             half = len(errors) // 2 or 1
             yield errors[:half]
-            changed = errors[-half:] + simulated(field.named, errors.shape[1], half, rng)
+            changed = errors[-half:] + draw_effects(field.named_shapes, errors.shape[1], half, rng)
             yield changed - (changed @ residuals.absorbed) @ residuals.absorbed.T
 
     def statistic(self, residuals: Residuals, function: Callable[[Array], Array]) -> Array:
@@ -119,7 +119,7 @@ class Detection:
     by_chance: Array
     weights: Array
 
-    def beyond(self, level: float) -> float:
+    def threshold(self, level: float) -> float:
         """Value of S that noise alone exceeds with the probability `level`."""
         order = np.argsort(-self.by_chance)
         rate = np.cumsum(self.weights[order]) / len(self.by_chance)
@@ -138,17 +138,17 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     chance : Chance
     """
     if not field.names:
-        noise = evidence.of_noise(residuals.z @ residuals.z)
+        noise = evidence.noise_density(residuals.z @ residuals.z)
         return Detection(0.0, 1.0, {}, noise, {}, {}, np.zeros(0), np.zeros(0))
-    seen, k = field.seen(residuals.z), len(field.names)
-    densities, noise = field.densities(evidence, seen), evidence.of_noise(seen.squares)
+    seen, k = field.project(residuals.z), len(field.names)
+    densities, noise = field.densities(evidence, seen), evidence.noise_density(seen.squares)
     nothing = np.logaddexp.reduce(noise)
     odds: list[Array] = []
     weights: list[Array] = []
     for errors in chance.errors_with_effects(residuals, field):
-        drawn = field.seen(errors)
+        drawn = field.project(errors)
         odds.append(field.odds(evidence, drawn))
-        ratio = np.exp(np.minimum(log_ratio(field.named, drawn.parts), 700.0))
+        ratio = np.exp(np.minimum(log_ratio(field.named_shapes, drawn.parts), 700.0))
         weights.append(1 / (0.5 + 0.5 * ratio))
     each, w = np.concatenate(odds), np.concatenate(weights)
     total = total_odds(each)
@@ -157,11 +157,15 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     observed = densities - nothing
     return Detection(
         statistic=statistic,
-        p_value=tail(total, w, statistic),
+        p_value=tail_probability(total, w, statistic),
         densities=dict(zip(field.names, densities.tolist(), strict=True)),
         noise=noise,
-        p_candidate={n: tail(each[:, i], w, observed[i]) for i, n in enumerate(field.names)},
-        p_family={n: tail(strongest, w, observed[i], k) for i, n in enumerate(field.names)},
+        p_candidate={
+            n: tail_probability(each[:, i], w, observed[i]) for i, n in enumerate(field.names)
+        },
+        p_family={
+            n: tail_probability(strongest, w, observed[i], k) for i, n in enumerate(field.names)
+        },
         by_chance=total,
         weights=w,
     )
@@ -172,7 +176,7 @@ def total_odds(each: Array) -> Array:
     return log_mean(each)
 
 
-def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:
+def tail_probability(values: Array, weights: Array, value: float, count: int = 1) -> float:
     """Probability that log odds, or the largest of `count` of them, reach a value by chance."""
     beyond = values >= value
     bound = float(count * np.exp(min(-value, 0.0)))
@@ -185,7 +189,7 @@ def tail(values: Array, weights: Array, value: float, count: int = 1) -> float:
 # --- simulated effects --------------------------------------------------------------------------
 
 
-def simulated(
+def draw_effects(
     candidates: Sequence[Shapes], conditions: int, count: int, rng: np.random.Generator
 ) -> Array:
     """Draw what a random candidate adds to so many conditions, (count, conditions).
@@ -206,7 +210,7 @@ def simulated(
         shares = np.concatenate([shapes.shares[place] for place in places])
         variances = np.repeat(sizes[rows], dims[rows]) * shares
         amounts = np.concatenate([normal[row] for row in rows]) * np.sqrt(variances)
-        added[rows] = shapes.drawn(places, amounts)
+        added[rows] = shapes.combine(places, amounts)
     return added
 
 
@@ -222,7 +226,7 @@ def log_ratio(candidates: Sequence[Shapes], parts: Sequence[Array]) -> Array:
     for size in PROPOSED.tolist():
         of_size = []
         for shapes, seen in zip(candidates, parts, strict=False):
-            taken, growth = shapes.taken(seen, size)
+            taken, growth = shapes.gain_and_growth(seen, size)
             of_size.append((taken - growth) / 2 + np.log(shapes.prior / len(candidates)))
         logs.append(log_sum(np.concatenate(of_size, axis=-1)))
     return log_mean(np.stack(logs, axis=-1))

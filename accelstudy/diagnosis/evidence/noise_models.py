@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.noise_effects.coloured_noise import memory, renewed
+from accelstudy.noise_effects.coloured_noise import autocorrelation, innovation_variance
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class UnequalAxes:
         x, y = (values.ravel() for values in np.meshgrid(LOG_RATIOS, LOG_RATIOS))
         logs = np.column_stack([x, y]) @ CONTRASTS
         determinant, squares = _restricted(residuals, np.exp(logs))
-        densities = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
+        densities = np.logaddexp.reduce(evidence.noise_density(squares, determinant), axis=-1)
         prior = _normal(x, y, np.zeros(3), RULES.spread_axes)
         if within is not None and np.all(within > 0):
             centre = np.log(within) - np.mean(np.log(within))
@@ -88,7 +88,7 @@ class UnequalAxes:
         posterior = prior * np.exp(densities - densities.max())
         mean = posterior @ logs / posterior.sum()
         z = residuals.z
-        nothing = float(np.logaddexp.reduce(evidence.of_noise(z @ z)))
+        nothing = float(np.logaddexp.reduce(evidence.noise_density(z @ z)))
         return cls(float(log_mean(densities, prior)) - nothing, np.exp(mean))
 
 
@@ -131,8 +131,8 @@ STRENGTHS = (0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
 
 def colour_densities(residuals: Residuals, evidence: Evidence) -> Array:
     """Log densities of residuals with coloured noise, (k,), by length; means over strengths."""
-    determinant, squares = restricted(residuals, STRENGTHS)
-    logs = np.logaddexp.reduce(evidence.of_noise(squares, determinant), axis=-1)
+    determinant, squares = restricted_likelihood(residuals, STRENGTHS)
+    logs = np.logaddexp.reduce(evidence.noise_density(squares, determinant), axis=-1)
     return log_mean(logs)
 
 
@@ -148,7 +148,7 @@ def quadratic_forms(v: Array) -> Array:
     forms = []
     for length in LENGTHS:
         if np.isfinite(length):
-            kernel = np.where(lag < n, memory(lag, length), 0.0)
+            kernel = np.where(lag < n, autocorrelation(lag, length), 0.0)
             forms.append(power @ (twice * np.fft.rfft(kernel).real))
         else:
             later = np.cumsum(v[..., ::-1, :], axis=-2)
@@ -156,7 +156,7 @@ def quadratic_forms(v: Array) -> Array:
     return np.stack(forms, axis=-1)
 
 
-def restricted(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array, Array]:
+def restricted_likelihood(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array, Array]:
     """log|Nᵀ Σ N| and zᵀ (Nᵀ Σ N)⁻¹ z of white noise and a process on each axis, (k, s) each.
 
     The covariance of unit weight is Σ = I + s F (I₃ ⊗ K) Fᵀ, with F the noise of the forces in the
@@ -169,21 +169,21 @@ def restricted(residuals: Residuals, strengths: Sequence[float]) -> tuple[Array,
     """
     n, c = residuals.whitening.shape[:2]
     columns = np.column_stack([residuals.absorbed, residuals.z])
-    determinant, normal = _filtered(residuals, columns[: n * c].reshape(n, c, -1), strengths)
+    determinant, normal = _filter(residuals, columns[: n * c].reshape(n, c, -1), strengths)
     rest = columns[n * c :]  # observed gravity is no force
     return restricted_to_residuals(determinant, normal + rest.T @ rest)
 
 
-def _filtered(
+def _filter(
     residuals: Residuals, columns: Array, strengths: Sequence[float]
 ) -> tuple[Array, Array]:
     """log|Σ|, (k, s), and Cᵀ Σ⁻¹ C, (k, s, v, v), of columns C (n, c, v), by a Kalman filter."""
     n, c, width = columns.shape
-    lasting = np.array([memory(1.0, length) for length in LENGTHS])[:, None]
+    lasting = np.array([autocorrelation(1.0, length) for length in LENGTHS])[:, None]
     walk = np.isinf(np.array(LENGTHS))[:, None]
     s = np.asarray(strengths, dtype=float)
     first = s * np.where(walk, 1 / n, 1.0)
-    added = s * np.where(walk, 1 / n, renewed(lasting))
+    added = s * np.where(walk, 1 / n, innovation_variance(lasting))
     lasting = lasting[..., None, None]
     eye = np.eye(3)
     state = np.zeros((*first.shape, 3, width))

@@ -132,7 +132,7 @@ class _Search:
             for dim in np.unique(self.dims)
         ]
         self.gram, self.seen = _products(self.shapes, self.z)
-        nothing = float(np.logaddexp.reduce(evidence.of_noise(self.square)))
+        nothing = float(np.logaddexp.reduce(evidence.noise_density(self.square)))
         self.found: dict[Places, tuple[float, tuple[int, ...]]] = {(): (nothing, ())}
         self.weights: dict[Places, float] = {}
         self.extended: set[Places] = set()
@@ -147,7 +147,7 @@ class _Search:
         """Weigh a set with each candidate, whose shapes are integrated."""
         self.extended.add(places)
         total, chosen = self.found[places]
-        alone, logs = self._beside(chosen)
+        alone, logs = self._with_each_further(chosen)
         logs += self.shape_priors
         sums = np.logaddexp.reduceat(logs, self.firsts) + (total - alone)
         for k in np.flatnonzero(np.isfinite(sums)).tolist():
@@ -183,7 +183,7 @@ class _Search:
                     logs[places] += float((self._bounds([one], beside) - self._bounds([one]))[0])
         return [EffectSet(best[places], logs[places]) for places in several]
 
-    def _beside(self, chosen: tuple[int, ...]) -> tuple[float, Array]:
+    def _with_each_further(self, chosen: tuple[int, ...]) -> tuple[float, Array]:
         """Log density of the residuals with some shapes, and with each further one as well, (s,).
 
         It is −∞ for a shape of which too little is left beside these, and for other shapes of the
@@ -209,7 +209,7 @@ class _Search:
         count = len(columns)
         # That of the set alone is the last one; of an empty set it is known.
         parts, dims = np.append(parts, part), np.append(count + self.dims, max(count, 1))
-        logs = self.evidence.of_spaces(parts, dims, self.square)
+        logs = self.evidence.spaces_density(parts, dims, self.square)
         alone = float(logs[-1]) if chosen else self.found[()][0]
         return alone, np.where(possible, logs[:-1], -np.inf)
 

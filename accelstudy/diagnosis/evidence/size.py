@@ -57,19 +57,19 @@ class Level:
     known: bool
 
     @classmethod
-    def given(cls, dof: float = RULES.freedom_given) -> Level:
+    def of_stated_sigma(cls, dof: float = RULES.freedom_given) -> Level:
         """Of a sigma that is given, which has so many degrees of freedom if it is right."""
         wrong, freedom = RULES.prior_sigma_wrong, min(dof, RULES.freedom_given)
         return cls((1 - wrong, wrong), (freedom, RULES.freedom_doubted), known=True)
 
     @classmethod
-    def within_holds(cls) -> Level:
+    def of_holds(cls) -> Level:
         """Of a sigma that is not given, where the noise within the holds may be all there is."""
         more = RULES.prior_more_than_within
         return cls((1 - more, more), (RULES.freedom_given, RULES.freedom_doubted), known=False)
 
     @classmethod
-    def unknown(cls) -> Level:
+    def of_nothing_stated(cls) -> Level:
         """Of a sigma of which nothing is known."""
         return cls((1.0,), (RULES.freedom_not_given,), known=False)
 
@@ -94,7 +94,7 @@ class Evidence:
         c = nu / 2 * np.log(nu) + gammaln((nu + self.redundancy) / 2) - gammaln(nu / 2)
         return np.asarray(np.log(self.level.weights) + c)
 
-    def of_noise(self, squares: ArrayLike, determinant: ArrayLike = 0.0) -> Array:
+    def noise_density(self, squares: ArrayLike, determinant: ArrayLike = 0.0) -> Array:
         """Noise alone, by the components of the level.
 
         Parameters
@@ -115,11 +115,11 @@ class Evidence:
 
     def variance(self, squares: float) -> float:
         """Variance of unit weight that is expected where this much of ‖z‖² is left to the noise."""
-        nu, logs = np.array(self.level.freedoms), self.of_noise(squares)
+        nu, logs = np.array(self.level.freedoms), self.noise_density(squares)
         weights = np.exp(logs - logs.max())
         return float(weights @ ((nu + squares) / (nu + self.redundancy)) / weights.sum())
 
-    def of_spaces(
+    def spaces_density(
         self, parts: Array, dims: NDArray[np.int_] | Sequence[int], squares: ArrayLike
     ) -> Array:
         """Something in a space beside the noise, over all sizes and levels.
@@ -135,7 +135,7 @@ class Evidence:
         (..., s) array
         """
         dims, squares = np.asarray(dims), np.asarray(squares, dtype=float)
-        noise, total = self.of_noise(squares), None
+        noise, total = self.noise_density(squares), None
         sizes, table_of = np.unique(dims, return_inverse=True)
         for c, nu in enumerate(self.level.freedoms):
             share = np.minimum(parts / (nu + squares)[..., None], 1 - 1e-14)
@@ -146,7 +146,9 @@ class Evidence:
         assert total is not None
         return total
 
-    def of_shapes(self, squares: Sequence[Array], shares: Sequence[Array], total: Array) -> Array:
+    def shapes_density(
+        self, squares: Sequence[Array], shares: Sequence[Array], total: Array
+    ) -> Array:
         """Something with a covariance λ K beside the noise, over all sizes and levels.
 
         Parameters
@@ -169,7 +171,7 @@ class Evidence:
         taken = np.empty((len(sizes), len(shares), len(total)), dtype=kind)
         for i, (along, some) in enumerate(zip(squares, np.split(kept, ends[:-1], 1), strict=True)):
             taken[:, i] = some @ along.T.astype(kind)
-        noise, logs = self.of_noise(total), []
+        noise, logs = self.noise_density(total), []
         for level, nu in enumerate(self.level.freedoms):
             left = 1 - taken / (nu + total).astype(kind)
             each = prior - kind((nu + self.redundancy) / 2) * np.log(left)
@@ -177,7 +179,7 @@ class Evidence:
             logs.append(top + np.log(np.sum(np.exp(each - top), axis=0)) + noise[:, level])
         return np.asarray(np.logaddexp.reduce(logs, axis=0).T)
 
-    def at_sizes(self, along: Array, share: Array, total: Array, sizes: Array) -> Array:
+    def densities_by_size(self, along: Array, share: Array, total: Array, sizes: Array) -> Array:
         """Something with a covariance λ K beside the noise, by its size λ, over all levels.
 
         Parameters
@@ -193,7 +195,7 @@ class Evidence:
         """
         growth = sizes[:, None] * share
         taken = along @ (growth / (1 + growth)).T
-        noise, logs = self.of_noise(total), []
+        noise, logs = self.noise_density(total), []
         for level, nu in enumerate(self.level.freedoms):
             rest = np.log1p(-taken / (nu + total)[:, None])
             logs.append(noise[:, level, None] - (nu + self.redundancy) / 2 * rest)

@@ -27,7 +27,7 @@ from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.next_positions import NextPosition
 from accelstudy.diagnosis.report.words import reason, warnings
-from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.result import Diagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.sensors.frames import FRD
@@ -131,7 +131,7 @@ def _certain(part: Part, d: Diagnosis) -> dict[str, Any]:
     }
 
 
-def effect_document(named: Named) -> dict[str, Any]:
+def effect_document(named: NamedCause) -> dict[str, Any]:
     """Describe an effect, a noise effect or a gross error that was found."""
     optional, content = ("position", "settings"), json_content(named)
     return {k: v for k, v in content.items() if k not in optional or v not in (None, [])}
@@ -177,21 +177,21 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
     which a recognised gross error is mended, and with the noise that the diagnosis takes.
     """
     d = diagnosis
-    bumped = d.campaign.positions[~d.kept].tolist()
+    bumped = d.campaign.positions[~d.used_positions].tolist()
     campaign = d.campaign.without(dict.fromkeys(bumped, "bumped, as the diagnosis found"))
     solution = d.final.solution
-    start = solution.parameters[: d.extended.n_parameters]
+    start = solution.parameters[: d.extended_model.n_parameters]
     observed = replace(solution.observed, initial=start)
     return CampaignFit(
         campaign=campaign,
-        model=d.extended,
+        model=d.extended_model,
         approach=d.approach,
         observed=observed,
         # Its cofactors do not know of the settings that were searched for.
         adjustment=replace(
-            calibrate(d.extended, d.approach, observed), cofactors=solution.cofactors[None]
+            calibrate(d.extended_model, d.approach, observed), cofactors=solution.cofactors[None]
         ),
-        estimability=campaign_estimability(campaign, d.extended, d.approach),
+        estimability=campaign_estimability(campaign, d.extended_model, d.approach),
         judged=d.noise,
     )
 
@@ -209,7 +209,7 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
     """
     fit = diagnosed_fit(diagnosis)
     # The diagnosis has looked at these data, unless it changed them or left out their angles.
-    unchanged = diagnosis.recognised is None and bool(diagnosis.kept.all())
+    unchanged = diagnosis.recognised is None and bool(diagnosis.used_positions.all())
     as_recognised = unchanged and (fit.approach.uses_angles or fit.campaign.angles is None)
     content = {
         **calibration_document(fit),
@@ -246,8 +246,8 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
         the fits to the other positions, without and with the effects that were found
     """
     d, campaign, held = diagnosis, diagnosis.campaign, diagnosis.gap.held_out
-    n, kept = campaign.n_positions, np.flatnonzero(diagnosis.kept)
-    split = np.where(d.kept, "fit", "left out").astype(object)
+    n, kept = campaign.n_positions, np.flatnonzero(diagnosis.used_positions)
+    split = np.where(d.used_positions, "fit", "left out").astype(object)
     if held is not None:
         split[list(held.held)] = "held-out"
     table = pd.DataFrame(
@@ -294,7 +294,7 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     """
     d = diagnosis
     solution = d.final.solution
-    extended = d.extended
+    extended = d.extended_model
     effects = [effect.spec for effect in extended.effects]
     models = [composition_name(d.model.effects)]
     composed: dict[str, list[str]] = {}
@@ -312,7 +312,7 @@ def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
     if d.campaign.sigma_angle is not None:
         noise["robot"] = {"sigma_mgon": d.campaign.sigma_angle / MGON}
     content = {
-        **plugins.as_a_key(),
+        **plugins.file_key(),
         "study": study_name(d.campaign.name),
         "gravity_mps2": solution.gravity,
         "noise": noise,

@@ -20,7 +20,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
-from accelstudy.diagnosis.report.words import as_place
+from accelstudy.diagnosis.report.words import place_text
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
@@ -80,7 +80,7 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
     panels = _panels(diagnosis, positions, len(names))
     refitted = diagnosis.final is not diagnosis.frame
-    explained = diagnosis.extended is not diagnosis.model
+    explained = diagnosis.extended_model is not diagnosis.model
     rows = ("before", "after") if refitted else ("before",)
     figure = new_figure(FULL, 12 + 46 * len(rows))
     # The scale of a bumped position would hide all others.
@@ -224,7 +224,7 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Posterior of the places where what is missing may live, and residuals over the best one."""
     d, best = diagnosis, diagnosis.like[0]
     bars = {
-        f"{o.target} over\n{_axis(as_place(o.coordinate))}": o.posterior
+        f"{o.target} over\n{_axis(place_text(o.coordinate))}": o.posterior
         for o in d.like[:MAX_PLACES]
     }
     if len(d.like) > MAX_PLACES:
@@ -242,7 +242,7 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     # Without times that of the time is the order.
     ordered = best.coordinate == "time" and d.frame.hold.time is None
     of = coordinate_of("order" if ordered else best.coordinate)
-    label = _axis(of.words if best.coordinate == "time" else as_place(best.coordinate))
+    label = _axis(of.words if best.coordinate == "time" else place_text(best.coordinate))
     when = "after" if d.verdict == "unknown" and d.found else "before"
     for k, ax in enumerate(axes):
         ax.axhline(0, color=INK, linewidth=0.6)
@@ -337,7 +337,7 @@ def shape_figure(shape: LearnedShape) -> Figure:
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    faint = hardly_shown(shape)
+    faint = is_noisy(shape)
     unit, hardly = shown_unit(target.unit), list[tuple[Axes, Array, Array]]()
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
@@ -363,7 +363,7 @@ def shape_figure(shape: LearnedShape) -> Figure:
     return figure
 
 
-def hardly_shown(shape: LearnedShape) -> NDArray[np.bool_]:
+def is_noisy(shape: LearnedShape) -> NDArray[np.bool_]:
     """Which residuals, (n, c), have so much noise that they are drawn small."""
     return np.asarray(shape.spreads > MAX_NOISE_RATIO * np.nanmin(shape.spreads, axis=0))
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from accelstudy.basics import suggested
+from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.calibration.applying import needs_of, unknown
 from accelstudy.campaign.calibration.document import write_json
+from accelstudy.campaign.calibration.sensor_calibration import needs_of, unknown
 from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report import words
 from accelstudy.diagnosis.report.document import (
@@ -21,7 +21,7 @@ from accelstudy.diagnosis.report.document import (
     positions_table,
     study_overlay,
 )
-from accelstudy.diagnosis.report.figures import diagnosis_figures, hardly_shown
+from accelstudy.diagnosis.report.figures import diagnosis_figures, is_noisy
 from accelstudy.diagnosis.result import MISSING, Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
@@ -83,7 +83,7 @@ def write_diagnosis(
         w=words,
         lines=lines,
         figures=save_all(diagnosis_figures(diagnosis, positions), folder / "figures"),
-        small_dots=shape is not None and bool(hardly_shown(shape).any()),
+        small_dots=shape is not None and bool(is_noisy(shape).any()),
         calibration=calibration,
         rules=RULES,
         missing=MISSING,
@@ -109,25 +109,25 @@ def next_steps(
     """
     d, steps = diagnosis, []
     chosen = (campaign, d.model.name, d.approach.name, d.campaign.prior)
-    result = Path(place) / suggested.HERE
+    result = Path(place) / suggestions.HERE
     if d.recognised is not None:
-        command = suggested.calibrate(*chosen)
+        command = suggestions.calibrate(*chosen)
         steps.append(("Correct the campaign, and calibrate it then", command))
     if d.verdict in ("narrowed", "unknown", "learned"):
         which = "the next positions" if d.next_positions else "positions"
         what = f"Add {which} to the campaign, and diagnose it again"
-        steps.append((what, suggested.diagnose(*chosen)))
+        steps.append((what, suggestions.diagnose(*chosen)))
     if d.better_for_leveling == "base":
-        command = suggested.calibrate(*chosen)
+        command = suggestions.calibrate(*chosen)
         return [*steps, ("Calibrate with the base model, which levels better", command)]
     if calibration is None or not calibration["quality"]["plausible"]:
         return steps
     use = "Level a log with the calibration that is beside this page"
-    steps.append((use, suggested.apply(result)))
-    on_device = [effect for effect in d.extended.effects if effect.part == "sensor"]
+    steps.append((use, suggestions.apply(result)))
+    on_device = [effect for effect in d.extended_model.effects if effect.part == "sensor"]
     if not unknown(needs_of(on_device)):
-        steps.append(("Take it to a device", suggested.export("c", result)))
-    if d.extended is not d.model:
-        command = suggested.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
+        steps.append(("Take it to a device", suggestions.export("c", result)))
+    if d.extended_model is not d.model:
+        command = suggestions.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))
     return steps

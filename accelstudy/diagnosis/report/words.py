@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
 from accelstudy.basics.units import GON
-from accelstudy.basics.wording import comma_list, grouped, probability, words
+from accelstudy.basics.wording import comma_list, probability, words, words_with_counts
 from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
@@ -24,12 +24,12 @@ from accelstudy.diagnosis.decision.statement import (
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.evidence.candidates import Cause
 from accelstudy.diagnosis.formulas import OTHER_FORM
-from accelstudy.diagnosis.result import Diagnosis, Named
+from accelstudy.diagnosis.result import Diagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.leveling.error import MAX_TILT_GON
-from accelstudy.pages import lines
+from accelstudy.pages import render_lines
 from accelstudy.sensors.plausibility import USUAL_CAUSE  # noqa: F401 (of the template)
 
 TEMPLATE = "diagnosis/report/words.txt.j2"
@@ -59,24 +59,24 @@ MAX_FORMULAS = 3
 HERE = sys.modules[__name__]
 
 
-def said(part: str, *content: object) -> list[str]:
+def render(part: str, *content: object) -> list[str]:
     """Say a part of the template, one sentence a line."""
-    return lines(TEMPLATE, part, *content, w=HERE)
+    return render_lines(TEMPLATE, part, *content, w=HERE)
 
 
 def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     """Say in a few sentences what was found; the first is the verdict."""
-    return said("verdict", diagnosis)
+    return render("verdict", diagnosis)
 
 
 def advice(diagnosis: Diagnosis) -> list[str]:
     """Say what would show more, apart from further positions."""
-    return said("advice", diagnosis)
+    return render("advice", diagnosis)
 
 
 def warnings(diagnosis: Diagnosis, axes: Sequence[float]) -> list[str]:
     """Say what a user of the calibration has to know; `axes` are their sigmas where they differ."""
-    return said("warnings", diagnosis, axes)
+    return render("warnings", diagnosis, axes)
 
 
 def reason(diagnosis: Diagnosis) -> str:
@@ -86,7 +86,7 @@ def reason(diagnosis: Diagnosis) -> str:
 
 def clauses(of: Reason | None) -> list[str]:
     """Clauses of a reason; none where there is none."""
-    return [] if of is None else said("reason", of)
+    return [] if of is None else render("reason", of)
 
 
 def sentence(text: str) -> str:
@@ -108,7 +108,7 @@ def too_few(diagnosis: Diagnosis) -> bool:
 
 def noise_only(diagnosis: Diagnosis) -> float:
     """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
-    return (diagnosis.found[0].posterior or 0.0) - diagnosis.coloured
+    return (diagnosis.found[0].posterior or 0.0) - diagnosis.p_coloured
 
 
 def may_be_an_effect(diagnosis: Diagnosis) -> bool:
@@ -116,7 +116,7 @@ def may_be_an_effect(diagnosis: Diagnosis) -> bool:
     return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < RULES.sure
 
 
-def called(named: Named) -> str:
+def name_text(named: NamedCause) -> str:
     """Name what was found; a learned function by its coordinate."""
     if named.name != LEARNED:
         return words(named.name)
@@ -125,17 +125,17 @@ def called(named: Named) -> str:
     return f"the function of {coordinate_of(effect.coordinate).words}"
 
 
-def effect_of(named: Named) -> Effect:
+def effect_of(named: NamedCause) -> Effect:
     """Effect that was found."""
     return get_effect(named.spec)
 
 
-def title(named: Named, titled: set[str] | None = None) -> str:
+def title(named: NamedCause, titled: set[str] | None = None) -> str:
     """Name what was found, with all that would be the same and has no title, or its position."""
     if named.position is not None:
         return f"{words(named.name)} {named.position}"
     same = [words(n) for n in named.equivalence_class if n not in (titled or {named.name})]
-    return " or ".join([called(named), *same])
+    return " or ".join([name_text(named), *same])
 
 
 def titles(diagnosis: Diagnosis) -> str:
@@ -145,9 +145,9 @@ def titles(diagnosis: Diagnosis) -> str:
     return comma_list([title(named, {each.name for each in found}) for named in found])
 
 
-def changed(diagnosis: Diagnosis) -> str:
+def change_text(diagnosis: Diagnosis) -> str:
     """Say how the final fit differs: with what was added, and without what was left out."""
-    added = [called(named) for named in diagnosis.found if named.parameters]
+    added = [name_text(named) for named in diagnosis.found if named.parameters]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
     parts = {"with ": added, "without position ": out}
     return comma_list([start + comma_list(names) for start, names in parts.items() if names])
@@ -156,7 +156,7 @@ def changed(diagnosis: Diagnosis) -> str:
 # --- a function without a name ------------------------------------------------------------------
 
 
-def like(diagnosis: Diagnosis) -> str:
+def like_text(diagnosis: Diagnosis) -> str:
     """Say of what that which is missing may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= MIN_SAID]
     if diagnosis.shape is not None and len(worth) == 1:
@@ -165,13 +165,16 @@ def like(diagnosis: Diagnosis) -> str:
     if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
     places = [
-        (f"{TARGETS[one.target].alone} that varies with {as_place(one.coordinate)}", one.posterior)
+        (
+            f"{TARGETS[one.target].alone} that varies with {place_text(one.coordinate)}",
+            one.posterior,
+        )
         for one in worth
     ]
-    return _listed(places, "or")
+    return _with_probabilities(places, "or")
 
 
-def as_place(coordinate: str) -> str:
+def place_text(coordinate: str) -> str:
     """Say a coordinate without regard to the axes."""
     of = coordinate_of(coordinate)
     return of.place or of.words
@@ -186,10 +189,10 @@ def formulas(diagnosis: Diagnosis) -> str:
         return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
     worth = [(one.text, one.posterior) for one in ranked if one.posterior >= MIN_SAID]
     rest = " or otherwise" if len(worth) > MAX_FORMULAS else ""
-    return f"It varies {_listed(worth[:MAX_FORMULAS], 'or')}{rest}."
+    return f"It varies {_with_probabilities(worth[:MAX_FORMULAS], 'or')}{rest}."
 
 
-def beyond(diagnosis: Diagnosis) -> str:
+def range_text(diagnosis: Diagnosis) -> str:
     """Say where a learned function is known; nothing if that is everywhere, or none was learned."""
     shape = diagnosis.shape
     if shape is None or not {"low", "high"} <= shape.effect.settings.keys():
@@ -223,17 +226,17 @@ def family_words(family: str) -> str:
     return FAMILIES.get(family, f"{article} {family}")
 
 
-def explained(names: Sequence[str]) -> str:
+def explanation_text(names: Sequence[str]) -> str:
     """Say the names of an explanation: bias drift with quadratic scale."""
-    return " with ".join(grouped(names, name_words))
+    return " with ".join(words_with_counts(names, name_words))
 
 
 def together(names: Sequence[str]) -> str:
     """List names, equal ones together: warm up and 2 outlier positions."""
-    return comma_list(grouped(names, name_words))
+    return comma_list(words_with_counts(names, name_words))
 
 
-def explain(names: Sequence[str]) -> str:
+def explain_text(names: Sequence[str]) -> str:
     """List names with the verb that belongs to them."""
     return f"{together(names)} explain{'s' if len(names) == 1 else ''}"
 
@@ -260,9 +263,9 @@ def without_a_name(set_says: Statement, beside: str = "something else") -> str:
         return "Something is missing from the model, and it has no name here."
     lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
     worth = [one for one in set_says.open if one.names and one.posterior >= MIN_SAID]
-    more = sorted(worth, key=lambda one: not one.of_effects)
+    more = sorted(worth, key=lambda one: not one.is_effects)
     surely = len(effects) < len(set_says.certain) or _surely_more(set_says, RULES.credible)
-    if any(one.of_effects for one in more) and len(more) <= RULES.many:
+    if any(one.is_effects for one in more) and len(more) <= RULES.many:
         return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
     if surely:
         return f"{lacks}; what is missing beside it has no name here."
@@ -280,7 +283,11 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
         for kind in dict.fromkeys(map(_kind, one.causes)):
             kinds[kind] += one.posterior
     worth = sorted(((k, p) for k, p in kinds.items() if p >= MIN_SAID), key=lambda item: -item[1])
-    return f"Most probable{' beside it' if certain else ''}: {_listed(worth)}." if worth else ""
+    return (
+        f"Most probable{' beside it' if certain else ''}: {_with_probabilities(worth)}."
+        if worth
+        else ""
+    )
 
 
 def stands_for(diagnosis: Diagnosis) -> list[str]:
@@ -310,18 +317,20 @@ def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     ]
     beside = set_says.open if alike or not others else credible_set
     more = [
-        (explained(o.names), o.posterior) for o in beside if o.names and o.posterior >= MIN_SAID
+        (explanation_text(o.names), o.posterior)
+        for o in beside
+        if o.names and o.posterior >= MIN_SAID
     ]
     perhaps = any(not one.names for one in beside)
     if len(more) > 1 and not perhaps:
         alike.append(more)
-    open_questions = [f"{', nor '.join(map(_listed, alike))} apart"] if alike else []
+    open_questions = [f"{', nor '.join(map(_with_probabilities, alike))} apart"] if alike else []
     if more and perhaps:
-        open_questions.append(f"whether {_listed(more, 'or')} is missing as well")
+        open_questions.append(f"whether {_with_probabilities(more, 'or')} is missing as well")
     return f"This campaign cannot tell {', nor '.join(open_questions)}" if open_questions else ""
 
 
-def _listed(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
+def _with_probabilities(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
     return comma_list([f"{what} ({probability(p)})" for what, p in alternatives], last)
 
 
@@ -354,7 +363,7 @@ def _names(names: Sequence[Cause]) -> str:
 
 
 def _or(explanations: Sequence[Explanation]) -> str:
-    alternatives = [explained(one.names) for one in explanations]
+    alternatives = [explanation_text(one.names) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
     return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
 
@@ -363,8 +372,8 @@ def _effects_and_others(
     credible_set: Sequence[Explanation],
 ) -> tuple[list[Explanation], list[Explanation]]:
     """Explanations by effects alone, and the others."""
-    effects = [one for one in credible_set if one.of_effects]
-    return effects, [one for one in credible_set if not one.of_effects]
+    effects = [one for one in credible_set if one.is_effects]
+    return effects, [one for one in credible_set if not one.is_effects]
 
 
 def _if_it_is_an_effect(effects: Sequence[Explanation], cosine: Cosine) -> Statement:

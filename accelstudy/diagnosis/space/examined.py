@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from accelstudy.adjustment.quality import Solution
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Frame
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import (
     OUTLIER,
     BumpedPositions,
@@ -42,13 +42,13 @@ class ExaminedFit:
     untestable : dict of effect to the reason why it cannot be tested
     """
 
-    frame: Frame
+    frame: SessionFit
     candidates: Mapping[str, Hypotheses]
     invisible: tuple[str, ...]
     untestable: Mapping[str, str]
 
     @classmethod
-    def of(cls, frame: Frame) -> ExaminedFit:
+    def of(cls, frame: SessionFit) -> ExaminedFit:
         """Evaluate the effects that are not in the model, and bumped positions."""
         residuals, solution = frame.residuals, frame.solution
         modelled = {effect.name for effect in solution.model.effects}
@@ -88,7 +88,7 @@ class ExaminedFit:
         """Return what an effect would leave in the residuals; None if nothing."""
         return self.frame.hypotheses((effect,))[0]
 
-    def alike(self, others: Sequence[Hypothesis]) -> set[str]:
+    def indistinguishable(self, others: Sequence[Hypothesis]) -> set[str]:
         """Effects indistinguishable from any of the given hypotheses, in one of their shapes."""
         ideals, ends = self._ideals
         same: set[str] = set()
@@ -141,7 +141,7 @@ class ExaminedFit:
 
 def examine(solution: Solution) -> ExaminedFit:
     """Examine a calibrated session."""
-    return ExaminedFit.of(Frame.of(solution))
+    return ExaminedFit.of(SessionFit.of(solution))
 
 
 def _of_robot(effect: Effect) -> bool:

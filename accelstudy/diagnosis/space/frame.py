@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Frame:
+class SessionFit:
     """One calibrated session, in which effects are evaluated.
 
     Attributes
@@ -58,12 +58,12 @@ class Frame:
         return tuple(n for n in ("temperature", "time") if getattr(self.hold, n) is None)
 
     @cached_property
-    def _columns(self) -> Columns:
+    def _columns(self) -> HoldColumns:
         """Columns of the holds beside arrays of settings and parameters."""
-        return Columns(self.hold, 2)
+        return HoldColumns(self.hold, 2)
 
     @classmethod
-    def of(cls, solution: Solution) -> Frame:
+    def of(cls, solution: Solution) -> SessionFit:
         """Frame of a calibration at its solution."""
         ideal, forces = ideal_residuals(solution)
         observed, model = solution.observed, solution.model
@@ -87,7 +87,7 @@ class Frame:
 
     def rows(self, effect: Effect) -> Array:
         """What an effect does to the conditions of unit weight, by its parameters, (m, k)."""
-        return self.residuals.whitened(self.signatures((effect,)))
+        return self.residuals.whiten(self.signatures((effect,)))
 
     def signatures(self, shapes: Sequence[Effect], ideal: bool = False) -> Signature:
         """Signatures of shapes of an effect of the sensor, or of an ideal one, side by side."""
@@ -103,7 +103,7 @@ class Frame:
     def columns(self, hypotheses: Sequence[Hypothesis]) -> list[Array]:
         """What shapes of one effect show in the conditions of unit weight, (m, l) each."""
         effects = [one.effect for one in hypotheses if one.effect is not None]
-        shown = np.split(self.residuals.whitened(self.signatures(effects)), len(effects), axis=1)
+        shown = np.split(self.residuals.whiten(self.signatures(effects)), len(effects), axis=1)
         return [each @ one.directions for each, one in zip(shown, hypotheses, strict=True)]
 
     def hypotheses(self, shapes: Sequence[Effect]) -> list[Hypothesis | None]:
@@ -114,10 +114,10 @@ class Frame:
             return np.moveaxis(columns.reshape(len(columns), len(shapes), -1), 1, 0)
 
         shown = self.signatures(shapes, ideal=True)
-        projected = of_each(self.ideal.project(self.ideal.whitened(shown)))
+        projected = of_each(self.ideal.project(self.ideal.whiten(shown)))
         sizes = self.ideal.size(shown, self.solution.gravity).reshape(len(shapes), -1)
         directions, ideal, seen = spans(projected, sizes, RULES.visible)
-        columns = of_each(self.residuals.project(self.residuals.whitened(self.signatures(shapes))))
+        columns = of_each(self.residuals.project(self.residuals.whiten(self.signatures(shapes))))
         # A force that passes a knee at the ideal sensor may not do so along the real axes.
         sizes = np.linalg.norm(projected @ directions, axis=1)
         also, basis, rank = spans(columns @ directions, sizes, ROUNDING)
@@ -156,7 +156,7 @@ def _estimates(hypothesis: Hypothesis, columns: Array) -> Array:
 # --- signatures -----------------------------------------------------------------------------------
 
 
-class Columns:
+class HoldColumns:
     """The columns of a `HoldConditions` with further axes, for arrays of parameters or settings.
 
     A column that is absent raises `InputError` when a formula uses it. Each is computed once.
@@ -192,11 +192,11 @@ def signature(
     effect: Effect, forces: Array, angles: Array, g: float, hold: HoldConditions
 ) -> Signature:
     """Signature of one effect; see `signatures`."""
-    return signatures((effect,), forces, angles, g, Columns(hold, 2))
+    return signatures((effect,), forces, angles, g, HoldColumns(hold, 2))
 
 
 def signatures(
-    shapes: Sequence[Effect], forces: Array, angles: Array, g: float, hold: Columns
+    shapes: Sequence[Effect], forces: Array, angles: Array, g: float, hold: HoldColumns
 ) -> Signature:
     """Evaluate shapes of one effect for the unit vectors of its parameters, in which it is linear.
 

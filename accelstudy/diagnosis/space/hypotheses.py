@@ -61,7 +61,7 @@ class Hypothesis:
         return self.basis.shape[1]
 
     @property
-    def shown(self) -> Effect | None:
+    def distinguishable(self) -> Effect | None:
         """Return the effect with as many of its parameters as the positions can tell apart.
 
         Those that no position shows are left out, unless something is known of them a priori.
@@ -75,7 +75,7 @@ class Hypothesis:
         from scipy.linalg import qr  # slow to import, and seldom needed
 
         order = qr(self.directions.T, mode="r", pivoting=True)[1]
-        return self.effect.only(tuple(sorted(order[: self.dim].tolist())))
+        return self.effect.with_parameters(tuple(sorted(order[: self.dim].tolist())))
 
     @property
     def smooth(self) -> str | None:
@@ -132,10 +132,10 @@ class Shapes:
     def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
         """Log density of residuals under each shape, (..., s), by their parts and ‖z‖² (...)."""
         along = self.split(np.atleast_2d(parts))
-        logs = evidence.of_shapes(along, self.shares, np.atleast_1d(squares))
+        logs = evidence.shapes_density(along, self.shares, np.atleast_1d(squares))
         return logs.reshape(*np.shape(squares), -1)
 
-    def taken(self, parts: Array, size: float) -> tuple[Array, Array]:
+    def gain_and_growth(self, parts: Array, size: float) -> tuple[Array, Array]:
         """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,), of a size λ."""
         growth = [size * share for share in self.shares]
         along = zip(self.split(parts), growth, strict=True)
@@ -146,7 +146,7 @@ class Shapes:
         """Log density of residuals over all shapes, (...)."""
         return log_sum(self.logs(evidence, parts, squares) + np.log(self.prior))
 
-    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
+    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
         """Sum vectors of some shapes, (b, m), with weights (Σ l,), one shape after the other."""
         dims = self.dims[places]
         rows = np.repeat(np.arange(len(places)), dims)
@@ -165,9 +165,9 @@ class Spaces(Shapes):
 
     def logs(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> Array:
         """Log density of residuals under each shape, (..., s)."""
-        return evidence.of_spaces(parts, self.dims, squares)
+        return evidence.spaces_density(parts, self.dims, squares)
 
-    def taken(self, parts: Array, size: float) -> tuple[Array, Array]:
+    def gain_and_growth(self, parts: Array, size: float) -> tuple[Array, Array]:
         """What λ K takes of ‖z‖², (..., s), and log|I + λ K|, (s,)."""
         g = size / self.dims
         return parts * (g / (1 + g)), np.asarray(self.dims * np.log1p(g), dtype=float)
@@ -268,7 +268,7 @@ class BumpedPositions(Hypotheses):
         basis = self.residuals.project(rows)
         return Hypothesis(OUTLIER, None, directions, basis, basis, place)
 
-    def drawn(self, places: NDArray[np.int_], amounts: Array) -> Array:
+    def combine(self, places: NDArray[np.int_], amounts: Array) -> Array:
         """Sum vectors of some shapes, but without R, (b, m)."""
         n, c = len(self.residuals.whitening), self.root.shape[-1]
         each = np.zeros((len(places), c))

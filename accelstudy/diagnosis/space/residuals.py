@@ -91,7 +91,7 @@ class Residuals:
         """
         problem = CalibrationProblem.of(model, approach, replace(observed, initial=None))
         x = problem.initial[0] if parameters is None else parameters
-        at = problem.linearised(x[None], problem.observations)
+        at = problem.linearise(x[None], problem.observations)
         b = np.moveaxis(at.jac_observations[:, :, 0], -1, 0)
         taken = problem.cofactors if variances is None else variances
         whitening, seen = whitening_of(b, taken), problem.weights > 0
@@ -112,7 +112,7 @@ class Residuals:
         """Residuals of unit weight, (m,)."""
         return self.project(self.errors)
 
-    def beside(self, basis: Array) -> Residuals:
+    def orthogonal_to(self, basis: Array) -> Residuals:
         """Residuals of a fit that takes up a further space, too, with a basis (m, l)."""
         return replace(self, design=np.concatenate([self.design, basis], axis=1))
 
@@ -142,13 +142,13 @@ class Residuals:
         """L⁻¹ B, (n, c, o): derivatives of the conditions of unit weight by the observations."""
         return np.asarray(np.linalg.solve(self.whitening, self.jac_observations))
 
-    def whitened(self, signature: Signature) -> Array:
+    def whiten(self, signature: Signature) -> Array:
         """Derivatives of the conditions of unit weight by the parameters of an effect, (m, k)."""
         b = self.by_observations
         change = b[..., :3] @ signature.force
         if b.shape[-1] > 3 and signature.angles.any():
             change += b[..., 3:] @ signature.angles
-        return self.stacked(change)
+        return self.stack(change)
 
     def size(self, signature: Signature, g: float) -> Array:
         """Size of a signature in the observations, (k,), however little the approach sees of it.
@@ -159,7 +159,7 @@ class Residuals:
         force, turned = signature.force, g * signature.angles
         return np.sqrt(np.sum(force**2, axis=(0, 1)) + np.sum(turned**2, axis=(0, 1))) / unit
 
-    def stacked(self, change: Array) -> Array:
+    def stack(self, change: Array) -> Array:
         """Stack changes of unit weight, (n, c, k), with none of observed gravity, (m, k)."""
         white = change.reshape(-1, change.shape[-1])
         rows = np.zeros((len(self.design), white.shape[1]))

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.frame import Columns, Frame
+from accelstudy.diagnosis.space.frame import HoldColumns, SessionFit
 from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
@@ -32,7 +32,7 @@ from accelstudy.effects.smooth import (
     sines,
     spectrum,
 )
-from accelstudy.leveling.angles import wrapped
+from accelstudy.leveling.angles import wrap_angle
 
 if TYPE_CHECKING:
     from accelstudy.diagnosis.evidence.size import Evidence
@@ -76,7 +76,7 @@ class LearnedShapes(Shapes):
     attitude: Spaces | None = None
 
     @classmethod
-    def of(cls, frame: Frame, attitude: Spaces | None = None) -> LearnedShapes:
+    def of(cls, frame: SessionFit, attitude: Spaces | None = None) -> LearnedShapes:
         """All shapes that the coordinates of a session allow, and that its model leaves.
 
         Parameters
@@ -132,7 +132,7 @@ class LearnedShapes(Shapes):
             shares.append(values[kept] / values[kept].sum())
         return cls(tuple(places), weights, np.concatenate(vectors, axis=1), tuple(shares))
 
-    def beside(self, basis: Array) -> LearnedShapes:
+    def orthogonal_to(self, basis: Array) -> LearnedShapes:
         """What is left of the shapes beside a space with an orthonormal basis (m, l)."""
         left = self.vectors - basis @ (basis.T @ self.vectors)
         roots = self.split(left * np.sqrt(np.concatenate([np.zeros(0), *self.shares])))
@@ -167,15 +167,17 @@ class LearnedShapes(Shapes):
             logs.append(self.attitude.logs(evidence, parts[..., self.ends[-1] :], squares))
         return np.concatenate(logs, axis=-1)
 
-    def of_place(self, evidence: Evidence, parts: Array, squares: ArrayLike) -> dict[Place, Array]:
+    def place_densities(
+        self, evidence: Evidence, parts: Array, squares: ArrayLike
+    ) -> dict[Place, Array]:
         """Log density of residuals under the shapes of each place, times its prior, (...)."""
         logs = self.logs(evidence, parts, squares) + np.log(self.prior)
         of_place = {p: [q == p for q in self.places] for p in dict.fromkeys(self.places)}
         return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
 
-    def by_place(self, evidence: Evidence, z: Array) -> dict[Place, float]:
+    def place_densities_of(self, evidence: Evidence, z: Array) -> dict[Place, float]:
         """Return the same of residuals z (m,)."""
-        each = self.of_place(evidence, self.parts(z), z @ z)
+        each = self.place_densities(evidence, self.parts(z), z @ z)
         return {place: float(log) for place, log in each.items()}
 
 
@@ -208,12 +210,12 @@ TURNING = ("mounting", "reading", "tilt")
 """Targets that turn the force, to which gravity alone is blind."""
 
 
-def coordinate_in_holds(name: str, frame: Frame) -> Array:
+def coordinate_in_holds(name: str, frame: SessionFit) -> Array:
     """Return a coordinate of a place in each hold, (n, a) for its a arguments, SI."""
     return next(one.values for one in _coordinates(frame) if one.name == name)
 
 
-def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
+def _coordinates(frame: SessionFit) -> Iterator[_Coordinate]:
     """Coordinates of a session that vary."""
     hold, f, angles = frame.hold, frame.sensed, frame.angles
     order = "order" if hold.time is None else "time"
@@ -240,7 +242,7 @@ def _coordinates(frame: Frame) -> Iterator[_Coordinate]:
     before = np.concatenate([f[:1], f[:-1]])
     yield from smooth("previous", ("bias", "scale"), before)
     yield from smooth("next", ("bias",), np.append(f[1:], f[-1:], 0) - f)
-    moved = wrapped(np.diff(angles, axis=0, prepend=angles[:1]))
+    moved = wrap_angle(np.diff(angles, axis=0, prepend=angles[:1]))
     yield from smooth("move", ("reading",), moved)
     if hold.temperature is not None and np.all(np.diff(when) > 0):
         rates = np.diff(hold.temperature) / np.diff(when)
@@ -277,14 +279,14 @@ def _on_the_sphere(f: Array) -> tuple[Array, Array]:
     some = unit[np.unique(np.linspace(0, len(unit) - 1, SPHERE_DIRECTIONS).round().astype(int))]
     features, weights = [], []
     for length in LENGTHS[1:]:
-        values, vectors = np.linalg.eigh(_alike(some, some, length))
+        values, vectors = np.linalg.eigh(_covariance(some, some, length))
         kept = values[-DIRECTIONS:]
-        features.append(_alike(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
+        features.append(_covariance(unit, some, length) @ vectors[:, -DIRECTIONS:] / kept)
         weights.append(kept)
     return np.concatenate(features, axis=1)[:, None], np.asarray(block_diag(*weights))
 
 
-def _alike(one: Array, other: Array, length: float) -> Array:
+def _covariance(one: Array, other: Array, length: float) -> Array:
     """Covariance of a smooth function at unit vectors, by the squares of their chords."""
     return np.asarray(np.exp((one @ other.T - 1) / length**2))
 
@@ -296,7 +298,7 @@ NAMED_TARGETS = {"square": "scale", "bias of the others": "bias"}
 PAIRS = tuple((i, j) for i in range(3) for j in range(3) if i != j)
 
 
-def _functions(frame: Frame) -> Iterator[tuple[Place, Array, Array]]:
+def _functions(frame: SessionFit) -> Iterator[tuple[Place, Array, Array]]:
     """Functions of all places: their rows of unit weight (m, k), and prior variances (p, k).
 
     Their means over the holds are zero: what is the same in all of them is no function.
@@ -315,7 +317,7 @@ def _functions(frame: Frame) -> Iterator[tuple[Place, Array, Array]]:
             yield place, rows, np.tile(one.priors[rough:], count)
 
 
-def function_rows(frame: Frame, target: str, functions: Array) -> Array:
+def function_rows(frame: SessionFit, target: str, functions: Array) -> Array:
     """What functions of a coordinate do to the conditions of unit weight, by components, (m, l).
 
     Parameters
@@ -327,8 +329,8 @@ def function_rows(frame: Frame, target: str, functions: Array) -> Array:
     residuals = frame.residuals
     seen = residuals.by_observations
     if target == "reading":
-        return residuals.stacked(seen[..., 3:] @ _each(functions, 2))
-    return residuals.stacked(seen[..., :3] @ _change(functions, target, frame))
+        return residuals.stack(seen[..., 3:] @ _for_each_component(functions, 2))
+    return residuals.stack(seen[..., :3] @ _change(functions, target, frame))
 
 
 def less_its_mean(functions: Array) -> Array:
@@ -336,7 +338,7 @@ def less_its_mean(functions: Array) -> Array:
     return functions - functions.mean(axis=0)
 
 
-def _change(h: Array, target: str, frame: Frame) -> Array:
+def _change(h: Array, target: str, frame: SessionFit) -> Array:
     """Change of the output, (n, 3, l), by functions h (n, a, k) of a target."""
     f, n = frame.sensed, len(frame.sensed)
     if target == "bias of the others":
@@ -344,14 +346,14 @@ def _change(h: Array, target: str, frame: Frame) -> Array:
         for k, (i, j) in enumerate(PAIRS):
             parts[:, i, k] = h[:, j]
         return parts.reshape(n, 3, -1)
-    units, hold = np.eye(len(TARGETS[target][0])), Columns(frame.hold, 1)
+    units, hold = np.eye(len(TARGETS[target][0])), HoldColumns(frame.hold, 1)
     x, y, z = f.T[..., None]
     shown = added_by(target, [*units], (x, y, z), frame.solution.gravity, hold, np)
     by_unit = np.stack([np.broadcast_to(each, (n, len(units))) for each in shown], axis=1)
-    return np.asarray(by_unit @ _each(h, len(units)))
+    return np.asarray(by_unit @ _for_each_component(h, len(units)))
 
 
-def _each(h: Array, count: int) -> Array:
+def _for_each_component(h: Array, count: int) -> Array:
     """Give each of so many components functions (n, a, k) of its own, (n, count, count k).
 
     They are of its own argument or, where there is one argument for all, of that.

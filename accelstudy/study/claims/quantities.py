@@ -22,7 +22,7 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
-from accelstudy.leveling.shares import overtaken
+from accelstudy.leveling.shares import order_changes
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
 from accelstudy.study.known import KnownValues
@@ -49,7 +49,7 @@ def claim_table() -> dict[str, list[dict[str, Any]]]:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class ClaimData:
     """What the claims are judged by.
 
     Attributes
@@ -140,7 +140,7 @@ def estimate(value: float, half: float, **others: Any) -> Numbers:
 
 
 def sd_of_tilt(
-    evidence: Evidence,
+    evidence: ClaimData,
     angle: str = "roll",
     at_roll: float = 0,
     at_pitch: float = 0,
@@ -158,7 +158,7 @@ def sd_of_tilt(
     return estimate(sd, Z95 * sd / np.sqrt(2 * DRAWS), theory=theory)
 
 
-def sd_ratio_of_noise(evidence: Evidence, times: float, at_pitch: float) -> Numbers:
+def sd_ratio_of_noise(evidence: ClaimData, times: float, at_pitch: float) -> Numbers:
     """Standard deviation of roll at some times the noise, over that at the noise of the study."""
     one = sd_of_tilt(evidence, at_pitch=at_pitch)["value"]
     many = sd_of_tilt(evidence, at_pitch=at_pitch, noise=times)
@@ -168,7 +168,7 @@ def sd_ratio_of_noise(evidence: Evidence, times: float, at_pitch: float) -> Numb
 # --- section 3.2: which inputs make roll and pitch uncertain -------------------------------------
 
 
-def effect_of_force(evidence: Evidence, force: str, at_roll: float) -> Numbers:
+def effect_of_force(evidence: ClaimData, force: str, at_roll: float) -> Numbers:
     """Total effect, %, of one force on roll, among the forces alone."""
     study, settings, table = evidence.study, evidence.settings, evidence.tables["sensitivity"]
     at = (table["roll_gon"] == at_roll) & (table["pitch_gon"] == 0)
@@ -181,7 +181,7 @@ def effect_of_force(evidence: Evidence, force: str, at_roll: float) -> Numbers:
 
 
 def largest_effect(
-    evidence: Evidence,
+    evidence: ClaimData,
     output: str,
     inputs: Sequence[str],
     max_roll: float = TILT,
@@ -205,18 +205,18 @@ def _largest(rows: pd.DataFrame) -> Numbers:
     return estimate(100 * float(row["total_effect"]), 100 * float(row["ci95"]))
 
 
-def order_of_inputs(evidence: Evidence) -> Numbers:
+def order_of_inputs(evidence: ClaimData) -> Numbers:
     """Share of attitudes, %, at which Shapley effects rank the inputs otherwise, and which."""
     shares, texts = zip(*(_order(evidence, approach) for approach in APPROACHES), strict=True)
     return {"value": shares[0], **dict(zip(APPROACHES, texts, strict=True))}
 
 
-def _order(evidence: Evidence, approach: str) -> tuple[float, str]:
+def _order(evidence: ClaimData, approach: str) -> tuple[float, str]:
     table, attitude = evidence.tables["shapley"], ["output", "roll_gon", "pitch_gon"]
     rows = table[(table["analysis"] == approach) & table["defined"].astype(bool)]
     points = 100 * float((rows["shapley_effect"] - rows["total_effect"]).abs().max())
     text = f"no share changes by more than {points:.2g} percentage points"
-    pairs = overtaken(rows)
+    pairs = order_changes(rows)
     if pairs.empty:
         return 0.0, f"no input overtakes another; {text}"
     rank = rows.groupby(attitude)["total_effect"].rank(ascending=False, method="first")
@@ -231,7 +231,7 @@ def _order(evidence: Evidence, approach: str) -> tuple[float, str]:
 
 
 def mean_sd(
-    evidence: Evidence, effect: str, approach: str = "gravity", scheme: str = ""
+    evidence: ClaimData, effect: str, approach: str = "gravity", scheme: str = ""
 ) -> pd.DataFrame:
     """Mean sd a posteriori of the parameters of an effect, its standard error `se`, and `truth`."""
     rows = evidence.rows("summary", approach, scheme).set_index("parameter")
@@ -240,7 +240,7 @@ def mean_sd(
     return rows.loc[parameters, [*names]].rename(columns=names).astype(float).abs()
 
 
-def mean_reduction(evidence: Evidence, effect: str, scheme: str = "") -> Numbers:
+def mean_reduction(evidence: ClaimData, effect: str, scheme: str = "") -> Numbers:
     """Reduction, %, of the mean sd a posteriori of an effect by the robot, in a scheme."""
     below, above = (mean_sd(evidence, effect, each, scheme).mean() for each in APPROACHES)
     left = 100 * above["sd"] / below["sd"]
@@ -248,7 +248,7 @@ def mean_reduction(evidence: Evidence, effect: str, scheme: str = "") -> Numbers
     return estimate(100 - left, Z95 * left * error)
 
 
-def reduction(evidence: Evidence, effect: str) -> Numbers:
+def reduction(evidence: ClaimData, effect: str) -> Numbers:
     """Return `mean_reduction` in the scheme of the claims, and what single simulations show."""
     rows = evidence.single_simulations(f"reduction-{effect}")
     names = sorted(rows.index[rows["paper"].between(rows["single_low"], rows["single_high"])])
@@ -258,7 +258,7 @@ def reduction(evidence: Evidence, effect: str) -> Numbers:
     return {**mean_reduction(evidence, effect), **single, "where": where}
 
 
-def single_reductions(evidence: Evidence, effect: str, scheme: str, paper: float) -> Numbers:
+def single_reductions(evidence: ClaimData, effect: str, scheme: str, paper: float) -> Numbers:
     """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
     pair = [evidence.sigmas[evidence.settings.cell(each, scheme)] for each in APPROACHES]
     gravity, robot = (sigmas[..., cell.columns_of(effect)].mean(axis=2) for cell, sigmas in pair)
@@ -277,7 +277,7 @@ def _ends(values: Iterable[float]) -> Numbers:
 
 
 def correlations(
-    evidence: Evidence,
+    evidence: ClaimData,
     approach: str = "gravity",
     scheme: str = "",
     first: str = "",
@@ -296,19 +296,19 @@ def correlations(
     return rows["adjustment"][chosen].abs().to_numpy(float)
 
 
-def scale_pairs(evidence: Evidence, approach: str, scheme: str = "") -> Array:
+def scale_pairs(evidence: ClaimData, approach: str, scheme: str = "") -> Array:
     """Mean |correlation| of each pair of scales."""
     return correlations(evidence, approach, scheme, "s_", "s_")
 
 
-def scale_correlation(evidence: Evidence) -> Numbers:
+def scale_correlation(evidence: ClaimData) -> Numbers:
     """Mean correlation of the scales, gravity-based, and its range over the schemes."""
     means = evidence.single_simulations("scale-correlation-gravity")["mean"]
     value = float(scale_pairs(evidence, "gravity").mean())
     return {"value": value, "least": means.min(), "most": means.max()}
 
 
-def scale_correlation_ratio(evidence: Evidence) -> Numbers:
+def scale_correlation_ratio(evidence: ClaimData) -> Numbers:
     """Mean correlation of the scales, gravity-based over robot-aided."""
     pairs = {approach: scale_pairs(evidence, approach) for approach in APPROACHES}
     means = {approach: float(each.mean()) for approach, each in pairs.items()}
@@ -316,12 +316,12 @@ def scale_correlation_ratio(evidence: Evidence) -> Numbers:
     return {"value": means["gravity"] / means["robot"], **means, **ends}
 
 
-def largest_correlation(evidence: Evidence, **pairs: str) -> Numbers:
+def largest_correlation(evidence: ClaimData, **pairs: str) -> Numbers:
     """Largest gravity-based correlation of pairs as in `correlations`."""
     return {"value": float(correlations(evidence, **pairs).max())}
 
 
-def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:
+def truth_over_sd(evidence: ClaimData, effect: str) -> Numbers:
     """True parameters of an effect over their mean sd a posteriori, gravity-based."""
     rows = mean_sd(evidence, effect)
     ratios = (rows["truth"] / rows["sd"]).to_numpy()
@@ -331,7 +331,7 @@ def truth_over_sd(evidence: Evidence, effect: str) -> Numbers:
     return estimate(value, half, orders_off=orders_off, **dict(zip("xyz", ratios, strict=True)))
 
 
-def sd_a_posteriori(evidence: Evidence, effect: str) -> Numbers:
+def sd_a_posteriori(evidence: ClaimData, effect: str) -> Numbers:
     """Mean sd a posteriori of an effect's parameters, gravity-based, also in % of the truth."""
     rows = mean_sd(evidence, effect)
     value, half = float(rows["sd"].mean()), Z95 * float(rows["se"].mean())
@@ -341,7 +341,7 @@ def sd_a_posteriori(evidence: Evidence, effect: str) -> Numbers:
 # --- slips ---------------------------------------------------------------------------------------
 
 
-def redundancy(evidence: Evidence) -> Numbers:
+def redundancy(evidence: ClaimData) -> Numbers:
     """Redundancy with the robot; that without it stands where the paper's number does."""
     paper, value = (
         float(evidence.rows("cells", approach)["redundancy"].iloc[0]) for approach in APPROACHES
@@ -349,7 +349,7 @@ def redundancy(evidence: Evidence) -> Numbers:
     return {"paper": paper, "value": value}
 
 
-def misclosure_as_printed(evidence: Evidence, at_roll: float) -> Numbers:
+def misclosure_as_printed(evidence: ClaimData, at_roll: float) -> Numbers:
     """Misclosure, gon, of a perfect sensor in the first condition of equation (10)."""
     force = specific_force(at_roll * GON, 0.0, evidence.study.gravity_mps2)
     return {"value": float(np.arctan2(force[1], -force[2]) / GON - at_roll)}

@@ -14,7 +14,7 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_page
-from accelstudy.study.claims.quantities import ESTIMATED, Evidence, Numbers, claim_table
+from accelstudy.study.claims.quantities import ESTIMATED, ClaimData, Numbers, claim_table
 from accelstudy.study.config import Study
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
@@ -42,7 +42,7 @@ def judge_claims(
     provenance : see `accelstudy.files.tables.origin`
     """
     read = {name: read_table(tables[name]) for name in TABLES}
-    evidence = Evidence(study, read, read_table(estimates, ESTIMATED))
+    evidence = ClaimData(study, read, read_table(estimates, ESTIMATED))
     claims = judge(evidence)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], evidence.by_scheme, provenance)
@@ -50,7 +50,7 @@ def judge_claims(
         path.write_text(claims_page(claims, evidence.by_scheme), encoding="utf-8")
 
 
-def judge(evidence: Evidence) -> pd.DataFrame:
+def judge(evidence: ClaimData) -> pd.DataFrame:
     """Judge all claims by all evidence.
 
     Returns
@@ -63,7 +63,7 @@ def judge(evidence: Evidence) -> pd.DataFrame:
     return pd.DataFrame([judge_claim(claim, evidence) for claim in claim_table()["paper"]])
 
 
-def judge_claim(claim: Mapping[str, Any], evidence: Evidence) -> dict[str, Any]:
+def judge_claim(claim: Mapping[str, Any], evidence: ClaimData) -> dict[str, Any]:
     """Judge a claim; return its row."""
     ((name, arguments),) = claim["quantity"].items()
     numbers: Numbers = dict.fromkeys(("low", "high", *SINGLE), np.nan)

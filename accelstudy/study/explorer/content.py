@@ -17,7 +17,7 @@ import pandas as pd
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import display_unit
-from accelstudy.drawing.style import model_title, shown
+from accelstudy.drawing.style import in_shown_unit, model_title
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, Factor
 from accelstudy.study.figures.panels import ANGLES, by_cell, group_sds, in_shown_units
@@ -38,7 +38,7 @@ def records(table: pd.DataFrame) -> str:
     return table.assign(**numbers).to_json(orient="records", double_precision=15)
 
 
-def packed(text: str) -> str:
+def compress(text: str) -> str:
     """Return a text gzipped, in base 64."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
@@ -102,7 +102,7 @@ def _tilt(cells: pd.DataFrame, tables: Tables) -> dict[str, np.ndarray]:
     for angle in ANGLES:
         columns[f"{angle}_rms"] = by_cell(tables["leveling"], f"{angle}_rms_mgon")
     return {
-        name: shown(cells["cell"].map(column).astype(float), "mgon")[0]
+        name: in_shown_unit(cells["cell"].map(column).astype(float), "mgon")[0]
         for name, column in columns.items()
     }
 

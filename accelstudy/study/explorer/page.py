@@ -16,16 +16,16 @@ from pathlib import Path
 import pandas as pd
 
 from accelstudy.basics.units import angles_in, display_unit
-from accelstudy.basics.wording import comma_list, counted
+from accelstudy.basics.wording import comma_list, plural
 from accelstudy.files.cache import cached
 from accelstudy.files.outputs import whole_file
 from accelstudy.pages import render
 from accelstudy.study.config import Study
 from accelstudy.study.explorer import charts
 from accelstudy.study.explorer.content import (
+    compress,
     correlations,
     noise_levels,
-    packed,
     parameters,
     records,
     setups,
@@ -86,7 +86,7 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
     return render(
         "study/explorer/explorer.html.j2",
         study=study.study,
-        counts=f"{counted(len(cells), 'set-up')} with {calibrations} simulated calibrations.",
+        counts=f"{plural(len(cells), 'set-up')} with {calibrations} simulated calibrations.",
         fixed=comma_list(fixed),
         fields=fields,
         by=next(iter(noises), "scheme" if len(set(rows["scheme"])) > 1 else "model"),
@@ -96,12 +96,12 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
         tables=comma_list([f"{name}.parquet" for name in TABLES]),
         packed={
             "vega": vega(),
-            "datatables": packed((bundle / "dt_bundle.js").read_text("utf-8")),
-            "style": packed((bundle / "dt_bundle.css").read_text("utf-8")),
-            "page": packed(json.dumps(page)),
-            "setups": packed(records(rows)),
-            "parameters": packed(records(details)),
-            "correlations": packed(records(correlations(cells, tables))),
+            "datatables": compress((bundle / "dt_bundle.js").read_text("utf-8")),
+            "style": compress((bundle / "dt_bundle.css").read_text("utf-8")),
+            "page": compress(json.dumps(page)),
+            "setups": compress(records(rows)),
+            "parameters": compress(records(details)),
+            "correlations": compress(records(correlations(cells, tables))),
         },
     )
 
@@ -125,4 +125,4 @@ def vega() -> str:
 def _bundled() -> bytes:
     import vl_convert
 
-    return packed(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")).encode()
+    return compress(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")).encode()

@@ -40,7 +40,7 @@ def beyond_linear_theory(tables: Tables, study: Study) -> Figure:
     lines = {"excess": MIN_NONLINEAR_SHARE, "noise": float(NOISES[0].shown(study.sigma_force))}
 
     def draw(ax: Axes, rows: DataFrame) -> None:
-        groups, seen = style.in_order(rows["group"]), rows["size"].notna()
+        groups, seen = style.sort_groups(rows["group"]), rows["size"].notna()
         offset = rows["approach"].map(approaches.index) - (len(approaches) - 1) / 2
         rows = rows.assign(y=rows["group"].map(groups.index) + APPROACH_DISTANCE * offset)
         quantity = rows["quantity"].iloc[0]

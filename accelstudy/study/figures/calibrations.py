@@ -70,12 +70,12 @@ def single_runs(tables: Tables, study: Study) -> DataFrame:
     """
     import pandas as pd
 
-    ends = of_the_two(tables["quantiles"], study).rename(columns={"name": "parameter"})
+    ends = paper_cells(tables["quantiles"], study).rename(columns={"name": "parameter"})
     ends = ends.assign(end=ends["probability"].map({0.025: "low", 0.975: "high"}))
     names = ["approach", "quantity", "parameter"]
     ends = ends.pivot_table("value", names, "end")
     ends = ends.reindex(columns=["low", "high"]).rename({"sd_posteriori": "sd a posteriori"})
-    rows = of_the_two(tables["summary"], study)
+    rows = paper_cells(tables["summary"], study)
     rows = rows[(rows["n_converged"] > 0) & (rows["parameter"] != "g")]
     rows = rows.assign(group=rows["parameter"].map(style.group_of).map(style.group_label))
     errors = rows.assign(quantity="error", first=rows["first_error"], mean=np.nan)
@@ -85,7 +85,7 @@ def single_runs(tables: Tables, study: Study) -> DataFrame:
     return in_shown_units(table, "first", "mean", "low", "high")
 
 
-def of_the_two(table: DataFrame, study: Study) -> DataFrame:
+def paper_cells(table: DataFrame, study: Study) -> DataFrame:
     """Rows of the paper's two cells, with their approach."""
     assert study.sensitivity is not None
     cells = {study.sensitivity.cell(name): name for name in APPROACHES}
@@ -129,7 +129,7 @@ def correlations(tables: Tables, study: Study) -> Figure:
 
 def correlation_table(tables: Tables, study: Study) -> DataFrame:
     """Correlations of the two calibrations: `size` is the absolute value less the identity."""
-    table = of_the_two(tables["correlations"], study).dropna(subset="adjustment")
+    table = paper_cells(tables["correlations"], study).dropna(subset="adjustment")
     identity = table["parameter_1"] == table["parameter_2"]
     titles = table["approach"].map({"gravity": "gravity-based", "robot": "robot-aided"})
     return table.assign(size=table["adjustment"].abs() - identity, title=titles)

@@ -29,7 +29,7 @@ def monte_carlo_against_theory(tables: Tables, study: Study) -> Figure:
     def draw(ax: Axes, rows: DataFrame) -> None:
         ax.axhline(1, color=style.INK, linewidth=0.6)
         ax.grid(False, axis="x")
-        groups = style.in_order(rows["group"])
+        groups = style.sort_groups(rows["group"])
         for i, group in enumerate(groups):
             members = rows[rows["group"] == group].sort_values(["approach", "half"])
             members = members.assign(x=i * (1 + GAP) + np.linspace(0, 1, len(members)))

@@ -138,15 +138,17 @@ def by_cell(table: DataFrame, column: str) -> dict[str, float]:
 
 def in_shown_units(table: DataFrame, *columns: str) -> DataFrame:
     """Table whose columns, in the recorded unit of the column `unit`, are in the units shown."""
-    factors = {unit: float(style.shown(1.0, unit)[0]) for unit in table["unit"].unique()}
+    factors = {unit: float(style.in_shown_unit(1.0, unit)[0]) for unit in table["unit"].unique()}
     factor = table["unit"].map(factors).astype(float)
     numbers = {name: table[name].astype(float) * factor for name in columns}
-    return table.assign(**numbers, unit=[style.shown(1.0, unit)[1] for unit in table["unit"]])
+    return table.assign(
+        **numbers, unit=[style.in_shown_unit(1.0, unit)[1] for unit in table["unit"]]
+    )
 
 
 def in_group_order(table: DataFrame) -> DataFrame:
     """Table with the rows of each group of parameters in the order of all figures."""
-    order = style.in_order(table["group"])
+    order = style.sort_groups(table["group"])
     return table.sort_values("group", key=lambda names: names.map(order.index), kind="stable")
 
 

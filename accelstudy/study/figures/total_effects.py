@@ -89,11 +89,11 @@ def changes(table: DataFrame) -> DataFrame:
     """Rows with `value`, Shapley less total effect in percentage points, and `overtakes`."""
     import pandas as pd
 
-    from accelstudy.leveling.shares import overtaken
+    from accelstudy.leveling.shares import order_changes
 
     table = table[(table["analysis"] == "gravity") & (table["pitch_gon"] >= 0)]
     value = 100 * (table["shapley_effect"] - table["total_effect"])
-    winners = pd.MultiIndex.from_frame(overtaken(table)[PLACE])
+    winners = pd.MultiIndex.from_frame(order_changes(table)[PLACE])
     return table.assign(
         value=value.where(table["defined"].astype(bool)),
         half=0.0,

@@ -10,37 +10,37 @@ from pathlib import Path
 from typing import Any
 
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, shown
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.names import check_file_name
-from accelstudy.basics.units import Given
+from accelstudy.basics.units import InputQuantity
 
 
-def of_type(name: str, value: Any, *types: type, expected: str) -> None:
+def check_type(name: str, value: Any, *types: type, expected: str) -> None:
     """Raise `InputError` if a value is none of the types."""
     if not isinstance(value, types):
-        raise InputError(f"{name}: expected {expected}, not {shown(value)}")
+        raise InputError(f"{name}: expected {expected}, not {brief(value)}")
 
 
 def path_of(name: str, value: Any, expected: str = "a path") -> Path:
     """Path that was given as one, or as text."""
-    of_type(name, value, str, PathLike, expected=expected)
+    check_type(name, value, str, PathLike, expected=expected)
     check_file_name(value)
     return Path(value)
 
 
-def whole(name: str, value: Any, allowed: Range) -> int:
+def whole_number(name: str, value: Any, allowed: Range) -> int:
     """Whole number within a range."""
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise InputError(f"{name}: expected a whole number, not {shown(value)}")
+        raise InputError(f"{name}: expected a whole number, not {brief(value)}")
     allowed.check_key(name, int(value))
     return int(value)
 
 
-def quantity(name: str, value: Any, given: Given) -> float:
+def quantity(name: str, value: Any, given: InputQuantity) -> float:
     """Quantity in SI: a number in SI, or text with a unit, as on the command line."""
     if not isinstance(value, bool) and isinstance(value, Real) and isfinite(value):
         value = f"{float(value)!r} {given.unit}"  # the unit may begin with a digit, as 1/K does
-    of_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
+    check_type(name, value, str, expected=f"a number in {given.unit} or a text with its unit")
     try:
         return given.read(value)
     except InputError as error:
@@ -52,7 +52,7 @@ def tidy(value: float, digits: int = 12) -> float:
     return float(f"{value:.{digits}g}") + 0.0  # -0.0 becomes 0.0
 
 
-def each(value: Any) -> Sequence[Any]:
+def as_sequence(value: Any) -> Sequence[Any]:
     """One or several values as a sequence; a text is one."""
     several = not isinstance(value, str | bytes | Mapping) and hasattr(value, "__iter__")
     return tuple(value) if several else (value,)

@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from accelstudy.basics import bounds
+from accelstudy.basics.arguments import path_of
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, shown
-from accelstudy.basics.given import path_of
+from accelstudy.basics.errors import InputError, brief
 from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.campaign.header import ANY, LogLayout, Nominal, PerAxis
-from accelstudy.effects import Course, Effect, HoldConditions
+from accelstudy.effects import Effect, HoldConditions, TemperatureCourse
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
 from accelstudy.files.reading import read_json, readable
 from accelstudy.files.validation import (
@@ -27,8 +27,8 @@ from accelstudy.files.validation import (
     Number,
     ParameterSigma,
     ParameterValue,
-    checked,
-    within,
+    bounds_of,
+    validate,
 )
 from accelstudy.leveling.angles import angles_of, tilt_by_output, tilt_slope
 from accelstudy.sensors.conversion import Conversion, conversion_of
@@ -144,7 +144,7 @@ class SensorCalibration:
                 f"{effect} depends on the {what}, which no device knows; calibrate without it"
             )
 
-    def in_use(
+    def with_conditions(
         self, forces: Array, columns: Collection[str], margin: float = 0.0
     ) -> tuple[Array, HoldConditions]:
         """Combine forces with conditions, spread over the ranges of the calibration.
@@ -173,7 +173,7 @@ class SensorCalibration:
         each = np.repeat(grid, len(forces), axis=0).T
         conditions: dict[str, Any] = dict(zip(KNOWN, each, strict=True))
         conditions |= dict.fromkeys(("step_x", "step_y", "step_z"), np.zeros(each.shape[1]))
-        course = Course(np.zeros(1), np.full(1, REFERENCE_TEMPERATURE))
+        course = TemperatureCourse(np.zeros(1), np.full(1, REFERENCE_TEMPERATURE))
         return np.tile(forces, (len(grid), 1)), HoldConditions(**conditions, course=course)
 
     def correct(self, forces: ArrayLike, hold: HoldConditions | None = None) -> Array:
@@ -188,7 +188,7 @@ class SensorCalibration:
         -------
         (n, 3) array, m/s²; NaN where no force explains the reading
         """
-        forces, _ = self._as_continued(np.asarray(forces, dtype=float), hold)
+        forces, _ = self._continue_drifts(np.asarray(forces, dtype=float), hold)
         return self.model.correct(forces, self.parameters, self.gravity, hold)
 
     def level(
@@ -207,7 +207,7 @@ class SensorCalibration:
         angles, sigma : (n, 2) arrays, rad; sigma combines the noise of the reading and the
         uncertainty of the calibration
         """
-        forces, share = self._as_continued(np.asarray(forces, dtype=float), hold)
+        forces, share = self._continue_drifts(np.asarray(forces, dtype=float), hold)
         corrected = self.model.correct(forces, self.parameters, self.gravity, hold)
         at = self.model, self.parameters, forces, corrected, self.gravity, hold
         slope = share * tilt_slope(*at)
@@ -215,7 +215,7 @@ class SensorCalibration:
         variance += np.square(sigma_force) * np.sum(tilt_by_output(*at) ** 2, axis=-1)
         return angles_of(corrected), np.sqrt(variance)
 
-    def _as_continued(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
+    def _continue_drifts(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
         """Change readings as if drifts had gone on, since the model lets them go on.
 
         A drift is known within its session only. After it the sensor keeps the value at its end.
@@ -258,7 +258,7 @@ def _regular(matrix: list[list[float]]) -> list[list[float]]:
     return matrix
 
 
-def _ordered(ends: list[float]) -> list[float]:
+def _check_ends(ends: list[float]) -> list[float]:
     if ends[0] > ends[1]:
         raise ValueError("must be the smallest and the largest value, in this order")
     return ends
@@ -267,13 +267,13 @@ def _ordered(ends: list[float]) -> list[float]:
 Triple = Annotated[list[ParameterValue], PerAxis]
 Regular = Annotated[list[Triple], PerAxis, AfterValidator(_regular)]
 Ends = Annotated[
-    list[Annotated[float, *within(ANY)]],
+    list[Annotated[float, *bounds_of(ANY)]],
     Field(min_length=2, max_length=2),
-    AfterValidator(_ordered),
+    AfterValidator(_check_ends),
 ]
 
 
-class _Mended(BaseModel):
+class _CorrectionDocument(BaseModel):
     error: str
     reason: str
     matrix: Regular | None
@@ -294,22 +294,22 @@ class _Document(BaseModel):
     date: str | None = None
     model: str
     approach: str = ""
-    n_positions: Annotated[int, *within(bounds.POSITIONS)] | None = None
+    n_positions: Annotated[int, *bounds_of(bounds.POSITIONS)] | None = None
     effects: Annotated[list[str], Field(min_length=1)]
     unit: Literal["m/s^2", "g", "mg", "counts"]
     nominal: Nominal | None
     gravity_mps2: Gravity
     sigma_source: Literal["a priori", "a posteriori"] = "a posteriori"
-    redundancy: Annotated[int, *within(REDUNDANCY)] = 0
-    sigma_dof: Annotated[float, *within(REDUNDANCY)] | None = None
+    redundancy: Annotated[int, *bounds_of(REDUNDANCY)] = 0
+    sigma_dof: Annotated[float, *bounds_of(REDUNDANCY)] | None = None
     sigma_position_mps2: ParameterSigma | None
     sigma_reading_mps2: ParameterSigma | None = None
     sigmas_95: ParameterSigma | None = None
     parameters: list[_Parameter]
-    covariance: list[list[Annotated[float, *within(VARIANCE)] | None]]
+    covariance: list[list[Annotated[float, *bounds_of(VARIANCE)] | None]]
     log: LogLayout | None = None
     range_mps2: ParameterSigma | None = None
-    mended: _Mended | None = None
+    mended: _CorrectionDocument | None = None
     quality: _Quality = _Quality()
     ranges: dict[str, Ends] = {}
 
@@ -383,7 +383,7 @@ def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
     if not isinstance(sensor, SensorCalibration):
         raise InputError(
             f"{name}: expected what `calibrate` or `read_calibration` returns, or a path, not "
-            f"{shown(given)}"
+            f"{brief(given)}"
         )
     return sensor
 
@@ -396,7 +396,7 @@ def calibration_of(content: Any, where: str = NO_CALIBRATION) -> SensorCalibrati
     InputError
         If it is no calibration.
     """
-    document = checked(_Document, content, where)
+    document = validate(_Document, content, where)
     whole = compose(document.model, tuple(document.effects))
     # Effects of the rig were estimated together with those of the sensor, but stay with the rig.
     specs = [effect.spec for effect in whole.effects if effect.part == "sensor"]

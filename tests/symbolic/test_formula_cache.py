@@ -19,7 +19,7 @@ from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import not_affine
 from accelstudy.sensors.trace import trace_of
 from accelstudy.simulation.sessions import Noise, session
-from accelstudy.symbolic import made
+from accelstudy.symbolic import formula_cache
 from accelstudy.symbolic.tracing import TracedFunction, symbolic, symbols
 
 MODEL = "bias+scale+saturation(knee=8)[k_sat_z]+thermal_bias+encoder_offset"
@@ -94,10 +94,15 @@ def test_different_formulas_have_different_keys():
         *("learned(coordinate=yaw)", "learned(target=scale)", "learned(length=0.25)"),
     )
     kinds = [type(get_effect(spec)) for spec in specs]
-    keys = [made.key_of(kind) for kind in kinds]
+    keys = [formula_cache.key_of(kind) for kind in kinds]
     assert None not in keys
-    assert len({*keys, made.key_of(*kinds), made.key_of(*kinds[::-1])}) == len(specs) + 2
-    assert made.key_of(type(get_effect("saturation(knee=9)"))) == keys[1]  # settings are symbols
+    assert (
+        len({*keys, formula_cache.key_of(*kinds), formula_cache.key_of(*kinds[::-1])})
+        == len(specs) + 2
+    )
+    assert (
+        formula_cache.key_of(type(get_effect("saturation(knee=9)"))) == keys[1]
+    )  # settings are symbols
 
 
 def test_what_is_not_of_the_package_is_not_kept():
@@ -105,35 +110,35 @@ def test_what_is_not_of_the_package_is_not_kept():
         name = "own"
         parameters = get_effect("bias").parameters
 
-    assert made.key_of(type(get_effect("bias")), Own) is None
-    assert made.kept_under(None, "name", lambda: [1]) == [1]
-    assert not cache_folder(made.KIND).exists()
+    assert formula_cache.key_of(type(get_effect("bias")), Own) is None
+    assert formula_cache.kept_under(None, "name", lambda: [1]) == [1]
+    assert not cache_folder(formula_cache.KIND).exists()
     patched = type("Patched", (type(get_effect("bias")),), {"output": lambda *_: (1, 1, 1)})
-    assert made.key_of(patched) is None
+    assert formula_cache.key_of(patched) is None
 
 
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
-    """A copy of the package, of whose files keys are made."""
-    for room in made.ROOMS:
+    """A copy of the package, of whose files keys are formula_cache."""
+    for room in formula_cache.ROOMS:
         shutil.copytree(PACKAGE / room, tmp_path / "package" / room)
     init = tmp_path / "package" / "__init__.py"
     monkeypatch.setattr(accelstudy, "__file__", str(init))
-    made._versions.cache_clear()
+    formula_cache._versions.cache_clear()
     yield init.parent
-    made._versions.cache_clear()
+    formula_cache._versions.cache_clear()
 
 
 def test_another_formula_or_processor_makes_other_keys(copied, monkeypatch):
     kind = type(get_effect("bias"))
-    before = made.key_of(kind)
+    before = formula_cache.key_of(kind)
     with (copied / "effects" / "scale.py").open("a", encoding="utf-8") as file:
         file.write("# changed\n")
-    made._versions.cache_clear()
-    changed = made.key_of(kind)
-    monkeypatch.setattr(made, "version", lambda name: "0")
-    made._versions.cache_clear()
-    assert len({before, changed, made.key_of(kind)}) == 3
+    formula_cache._versions.cache_clear()
+    changed = formula_cache.key_of(kind)
+    monkeypatch.setattr(formula_cache, "version", lambda name: "0")
+    formula_cache._versions.cache_clear()
+    assert len({before, changed, formula_cache.key_of(kind)}) == 3
 
 
 def test_keys_have_all_files_on_which_formulas_depend():
@@ -142,4 +147,4 @@ def test_keys_have_all_files_on_which_formulas_depend():
     code = f"import sys, {modules}; print(*(m for m in sys.modules if m[:11] == 'accelstudy.'))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     rooms = {name.split(".")[1] for name in ran.stdout.split()}
-    assert rooms - {"config_names"} <= {*made.ROOMS}
+    assert rooms - {"config_names"} <= {*formula_cache.ROOMS}

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.given import tidy
+from accelstudy.basics.arguments import tidy
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX
 from accelstudy.design.search import STEPS
@@ -19,9 +19,9 @@ from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
     angle_sigma,
-    by_time,
     in_scheme,
     sigma_of,
+    sort_by_time,
 )
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.proposal.request import Request
@@ -44,7 +44,7 @@ not tried."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class CalibrationKind:
     """Calibrations that differ by their positions alone.
 
     Attributes
@@ -61,7 +61,7 @@ class Kind:
     hold: float
 
     @classmethod
-    def of(cls, question: Question, candidate: Candidate) -> Kind:
+    def of(cls, question: Question, candidate: Candidate) -> CalibrationKind:
         """The kind of a candidate."""
         return cls(question, candidate.equipment, candidate.model, candidate.hold)
 
@@ -101,7 +101,7 @@ class Kind:
         if not self.least <= n <= self.most:
             return None
         request = self.request(n)
-        found = request.search.finished(_positions(request, len(STEPS)), bounded=False)
+        found = request.search.finish(_positions(request, len(STEPS)), bounded=False)
         content = {"title": "minimax", "source": "accelstudy design"}
         content["directions"] = found.directions.tolist()
         return self._in_positions(remember(content, f"{MINIMAX}-{n}"), request)
@@ -160,8 +160,8 @@ def _of_one_less(n: int) -> float:
 def _positions(request: Request, moves: int) -> NDArray[np.float64]:
     """Positions of a search after the moves on so many grids."""
     if moves == 0:
-        return request.search.exchanged(1)
-    return request.search.moved(_positions(request, moves - 1), STEPS[moves - 1])
+        return request.search.exchange(1)
+    return request.search.move(_positions(request, moves - 1), STEPS[moves - 1])
 
 
 def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | None:
@@ -178,11 +178,11 @@ def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | N
     Candidate, or None if none reaches the target
     """
     first: dict[tuple[str, float], Candidate] = {}
-    for c in by_time(c for c in compared if question.reached_by(c.tilt)):
+    for c in sort_by_time(c for c in compared if question.reached_by(c.tilt)):
         first.setdefault((c.model.name, c.hold), c)
     hopes = []
     for c in first.values():
-        kind = Kind.of(question, c)
+        kind = CalibrationKind.of(question, c)
         n = c.scheme.n_positions * (question.accuracy(c.tilt) / question.target) ** 2
         hopes.append((kind.seconds(USUAL_SHARE * n), kind.seconds(MIN_SHARE * n), n, kind))
     found = [*first.values()][:1]
@@ -190,5 +190,5 @@ def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | N
         if least <= found[0].seconds:
             no_longer = replace(question, most_seconds=found[0].seconds)  # else it costs more
             fewest = replace(kind, question=no_longer).fewest(USUAL_SHARE * n)
-            found = by_time(filter(None, [*found, fewest]))
+            found = sort_by_time(filter(None, [*found, fewest]))
     return found[0] if found else None
