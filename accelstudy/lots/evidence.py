@@ -67,11 +67,6 @@ class SensorEvidence:
     square: float = 0.0
     variance: float = 1.0
 
-    @property
-    def kept(self) -> SensorEvidence:
-        """The same without what a lot only gathers, so that memory hardly follows their number."""
-        return replace(self, shown={}, tested={})
-
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
@@ -83,7 +78,7 @@ class Sensor:
     model : SensorModel; None for one that the campaign does not determine: then it says nothing
     approach : Approach
     seed : int, of the draws
-    noise : SensorNoise, in place of what the campaign says of its noise
+    noise : NoisePrior, in place of what the campaign says of its noise
     """
 
     campaign: Campaign

@@ -172,8 +172,7 @@ def _again(passes: Sequence[Pass], whole: SensorModel, mapped: Mapped) -> Pass |
     mapped : maps a function over the sensors
     """
     own = [
-        replace(sensor, model=_own(whole, passes, i), noise=None)
-        for i, sensor in enumerate(passes[0].sensors)
+        replace(sensor, model=_own(whole, passes, i)) for i, sensor in enumerate(passes[0].sensors)
     ]
 
     def fitted(i: int, sigma: float | None = None) -> BaseFit | None:

@@ -72,7 +72,7 @@ class Mixture:
     prior: Mapping[str, float]
     common: Mapping[Names, float] = field(default_factory=dict)
     typical: Mapping[Names, Sequence[TypicalSet]] = field(default_factory=dict)
-    _known: dict[Names, list[tuple[float, OddsOf]]] = field(default_factory=dict, init=False)
+    _known: dict[Names, list[tuple[Array, OddsOf]]] = field(default_factory=dict, init=False)
 
     @cached_property
     def sets(self) -> dict[Names, float]:
@@ -112,10 +112,9 @@ class Mixture:
             if name in names and p > MIN_POSTERIOR:
                 # A mixture of narrow steps between the nodes of the integral.
                 nodes, weights = _nodes(len(names))
-                place = names.index(name)
-                others = tuple(axis for axis in range(len(names)) if axis != place)
-                shares = sum(w * self._of_shares(names, odds) for w, odds in self._judged(names))
-                mass = np.asarray(shares).sum(axis=others)
+                place = 1 + names.index(name)
+                others = tuple(axis for axis in range(1 + len(names)) if axis != place)
+                mass = self._shares(names).sum(axis=others)
                 log = np.log(np.maximum(mass / weights, 1e-300))
                 fine = np.exp(np.interp(grid, nodes[:-1], log[:-1]))
                 density += p * mass[:-1].sum() * fine / fine.sum()
@@ -141,12 +140,12 @@ class Mixture:
     def sensors_under(self, names: Names) -> tuple[dict[Names, Array], Array]:
         """Return what `sensors` has, if the model of the lot lacks some effects."""
         table = np.zeros((len(_subsets(names)) + 1, len(self._anything)))
-        for probability, odds_of in self._judged(names):
-            weights, each = np.ravel(self._of_shares(names, odds_of)), []
+        for shares, (_, odds_of) in zip(self._shares(names), self._ways(names), strict=True):
+            weights, each = np.ravel(shares), []
             for logs in self._contributions(names, odds_of):
-                shares = np.exp(logs - np.logaddexp.reduce(logs))
-                each.append(shares.reshape(*logs.shape[:2], -1) @ weights)
-            table += probability * np.concatenate(each, axis=1)
+                of_each = np.exp(logs - np.logaddexp.reduce(logs))
+                each.append(of_each.reshape(*logs.shape[:2], -1) @ weights)
+            table += np.concatenate(each, axis=1)
         return dict(zip(_subsets(names), table[:-1], strict=True)), table[-1]
 
     def having(self, name: str) -> Array:
@@ -207,37 +206,32 @@ class Mixture:
 
     def _evidence(self, names: Names) -> float:
         """Log evidence of effects, whatever their sizes."""
-        return float(special.logsumexp([log for log, _ in self._weighed(names)]))
+        return float(special.logsumexp([logs for logs, _ in self._ways(names)]))
 
-    def _weighed(self, names: Names) -> list[tuple[float, OddsOf]]:
-        """Log evidence of effects by how their sizes differ, and what sensors say of them then."""
+    def _ways(self, names: Names) -> list[tuple[Array, OddsOf]]:
+        """Log evidence by the ways in which sizes differ, (nodes ...) of shares, and odds then."""
         if names in self._known:
             return self._known[names]
         own, types = self._of_own_sizes, self.typical.get(names, ())
-        alike: list[tuple[float, OddsOf]] = []
+        logs = self._log_likelihood(names, own)
+        if types:
+            logs = logs + np.log(1 - PRIOR_ALIKE)
+        elif names in self.common:
+            # Which of the sensors have it, is not asked then.
+            alone, alike = special.logsumexp(logs), self.common[names]
+            both = np.logaddexp(np.log(1 - PRIOR_ALIKE) + alone, np.log(PRIOR_ALIKE) + alike)
+            logs = logs + both - alone
+        ways: list[tuple[Array, OddsOf]] = [(logs, own)]
         for one in types:
             odds = partial(self._of_type, one)
-            log = np.log(PRIOR_ALIKE / len(types)) + one.cost + self._log_evidence(names, odds)
-            alike.append((float(log), odds))
-        if not alike and names in self.common:
-            # Which of the sensors have it, is not asked then.
-            alike = [(float(np.log(PRIOR_ALIKE) + self.common[names]), own)]
-        prior = np.log(1 - PRIOR_ALIKE) if alike else 0.0
-        self._known[names] = [(float(prior + self._log_evidence(names, own)), own), *alike]
-        return self._known[names]
+            prior = np.log(PRIOR_ALIKE / len(types)) + one.cost
+            ways.append((prior + self._log_likelihood(names, odds), odds))
+        self._known[names] = ways
+        return ways
 
-    def _log_evidence(self, names: Names, odds_of: OddsOf) -> float:
-        """Log evidence of effects, over their shares."""
-        return float(special.logsumexp(self._log_likelihood(names, odds_of)))
-
-    def _judged(self, names: Names) -> list[tuple[float, OddsOf]]:
-        """Probability of each way in which sizes differ, and what sensors say then."""
-        logs, odds = zip(*self._weighed(names), strict=True)
-        return [*zip(special.softmax(logs).tolist(), odds, strict=True)]
-
-    def _of_shares(self, names: Names, odds_of: OddsOf) -> Array:
-        """Posterior probabilities of the nodes of each share, (nodes ...)."""
-        return np.asarray(special.softmax(self._log_likelihood(names, odds_of)))
+    def _shares(self, names: Names) -> Array:
+        """Posterior of each way in which sizes differ and of the shares, (w, nodes ...)."""
+        return np.asarray(special.softmax([logs for logs, _ in self._ways(names)]))
 
 
 def _with(names: Names, name: str) -> Names:

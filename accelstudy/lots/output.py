@@ -148,13 +148,12 @@ class Lot(Result):
             say(f"not in the lot: {name}: {why.removeprefix(f'{name}: ')}")
         diagnosis = weigh_lot(usable, model, approach, seed, cores)
         fits = list[CampaignFit | InputError]()
-        for i, campaign in enumerate(usable):
+        for i, sensor in enumerate(diagnosis.sensors):
             try:
-                chosen = approach or usual_approach(campaign)
-                fits.append(fit_campaign(campaign, diagnosis.model_of(i), chosen))
+                fits.append(fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach))
             except InputError as error:
                 fits.append(error)
-        return cls(diagnosis, model, fits, approach or usual_approach(usable[0]), without)
+        return cls(diagnosis, model, fits, diagnosis.sensors[0].approach, without)
 
     @cached_property
     def fitted(self) -> dict[int, CampaignFit]:

@@ -129,11 +129,12 @@ class Pass:
         mapped : maps a function over the sensors
         """
         n, said, anything = len(sensors), list[SensorEvidence](), LotTest({})
-        # What noise alone would say is most of what a sensor gives, and is not kept.
+        # What noise alone would say is most of what a sensor gives, and is not kept. What its
+        # shapes show is only gathered here, so that memory hardly follows the number of sensors.
         for one in track(mapped(Sensor.evidence, sensors), "evidence of the sensors", n):
             anything.add(one.tested)
             said.append(replace(one, tested={}))
-        now = cls(tuple(sensors), tuple(one.kept for one in said), anything)
+        now = cls(tuple(sensors), tuple(replace(one, shown={}) for one in said), anything)
         usual = [i for i in now.usual if sensors[i].model]
         those, their = [sensors[i] for i in usual], [said[i] for i in usual]
         mean = _evidence_of_mean(those, their, whole, sensors[0].seed - 1 if sensors[0].seed else n)
@@ -169,8 +170,10 @@ class Pass:
         pairs: dict[Names, Array] = {}
         for i, one in enumerate(self.evidence):
             for names, log in self._pairs(one).items():
-                # Of a sensor without odds of both they are as where none has any (`Mixture`).
-                pairs.setdefault(names, np.min([odds[name] for name in names], axis=0))[i] = log
+                if names not in pairs:
+                    # Of a sensor without odds of both they are as where none has any (`Mixture`).
+                    pairs[names] = np.min([odds[name] for name in names], axis=0)
+                pairs[names][i] = log
         kinds = {name: _kind(name) for name in self.classes}
         counts = Counter(kinds.values())
         total = sum(WEIGHTS[kind] for kind in counts)
@@ -196,9 +199,8 @@ class Pass:
     @cached_property
     def shapes(self) -> dict[str, str]:
         """Effects in the settings that explain most of what all sensors have in common."""
-        specs = {name: one.spec for name, one in self.pooled.items()}
         of_mean = {} if self.mean is None else self.mean.specs
-        return {name: of_mean.get(name, spec) for name, spec in specs.items()}
+        return {name: of_mean.get(name, one.spec) for name, one in self.pooled.items()}
 
     def strongest(self) -> list[Names]:
         """Return the most probable sets of one and two effects, and each of their effects."""
@@ -265,9 +267,11 @@ class Pass:
 
     def _rivals(self, name: str) -> list[str]:
         """Effects that all campaigns together hardly tell from one that is not certain."""
-        asked = [] if self.sizes is None else self.sizes.asked
+        if self.sizes is None:
+            return []
+        asked = self.sizes.asked
         names = next((s for s in self.mixture.sets if name in s and s in asked), None)
-        if self.sizes is None or names is None or names not in self.mixture.typical:
+        if names is None or names not in self.mixture.typical:
             return []
         rivals = []
         for rival in self.classes:

@@ -248,7 +248,7 @@ class TypeSizes:
     Attributes
     ----------
     specs : mapping of effects to their settings
-    asked : tuple of sets of one or two of these effects
+    asked : sequence of sets of one or two of these effects
     normal, right : (n, K, K) and (n, K) arrays, of all parameters that show, in units in which they
         show equally well
     columns : mapping of each effect to its parameters among the K
