@@ -294,7 +294,7 @@ def whiten(at: Linearisation, v: Array, q: Array) -> WhitenedConditions:
     """
     b = at.jac_observations
     bq = _times(b, q)
-    factor, design = _whiten(at, bq)
+    factor, design = _factor_and_design(at, bq)
     w = cholesky.forward(factor, at.psi - np.einsum("corn,orn->crn", b, v))
     return WhitenedConditions(factor, design, w, bq)
 
@@ -304,10 +304,10 @@ def whitened_design(at: Linearisation, q: Array) -> Array:
 
     q : (o, n) variances or (o, o, n) matrices
     """
-    return _whiten(at, _times(at.jac_observations, q))[1]
+    return _factor_and_design(at, _times(at.jac_observations, q))[1]
 
 
-def _whiten(at: Linearisation, bq: Array) -> tuple[Array, Array]:
+def _factor_and_design(at: Linearisation, bq: Array) -> tuple[Array, Array]:
     """Scale conditions to unit weight: M = B Q Bᵀ = L Lᵀ; L (c, c, R, n), L⁻¹A (c, u, R, n)."""
     b = at.jac_observations
     m = np.empty((len(b), len(b), *b.shape[2:]))

@@ -82,7 +82,7 @@ def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
 
 @contextmanager
 def explain_missing(content: Mapping[str, Any], source: str | Path) -> Iterator[None]:
-    """Read a file of data, which loads none of the plug-ins that it names.
+    """Add to an error within the block which plug-ins a file of data names that are not loaded.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from pydantic import (
 from accelstudy.basics import bounds
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.dates import read_date
-from accelstudy.basics.units import GON
+from accelstudy.basics.units import CLOCK_UNITS, GON, SENSOR_UNITS
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.unit_spellings import parse_unit
 from accelstudy.files.validation import (
@@ -155,7 +155,7 @@ class LogLayout(ConfigSection):
     )
     time: Place | None = Field(None, description="column of time")
     time_unit: Annotated[
-        Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling("s", "ms", "us", "ns"))
+        Literal["s", "ms", "us", "ns"], BeforeValidator(_usual_spelling(*CLOCK_UNITS))
     ] = Field("s", description="unit of that column")
     rate_hz: Rate | None = Field(None, description="samples per second, without time")
     variable: str | None = Field(
@@ -168,7 +168,7 @@ class LogLayout(ConfigSection):
     )
     unit: Annotated[
         Literal["m/s^2", "g", "mg", "counts"],
-        BeforeValidator(_usual_spelling("m/s^2", "g", "mg", "counts")),
+        BeforeValidator(_usual_spelling(*SENSOR_UNITS, "counts")),
     ] = Field("m/s^2", description="unit of the forces")
     scale: OneOrMore[Finite] | None = Field(None, description="with counts: m/s² per count")
     offset: OneOrMore[Finite] | None = Field(None, description="with counts: reading at 0 m/s²")

@@ -25,7 +25,7 @@ class Campaign:
     """One calibration session of one sensor, in SI; n static holds in order of acquisition.
 
     Holds that are left out of every fit are in `left_out` only. So no calculation uses them by
-    mistake, while `hold` and `whole` still know them.
+    mistake, while `hold` and `with_left_out` still know them.
 
     Attributes
     ----------

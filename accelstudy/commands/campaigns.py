@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,13 +154,13 @@ SIMULATE_CAMPAIGN = Command(
 )
 
 
-@contextmanager
-def new_table(path: Path, inputs: Iterable[str | Path] = (), force: bool = False) -> Iterator[Path]:
-    """Yield the file of a table, which is no spreadsheet; see `new_file`."""
+def new_table(
+    path: Path, inputs: Iterable[str | Path] = (), force: bool = False
+) -> AbstractContextManager[Path]:
+    """Return the place of a table, which is no spreadsheet; see `new_file`."""
     if path.suffix.lower() in (".xlsx", ".xls", ".ods"):
         raise InputError(f"{path}: a spreadsheet is not written; let it end in .csv or .parquet")
-    with new_file(path, inputs, force) as temporary:
-        yield temporary
+    return new_file(path, inputs, force)
 
 
 APPLY = Command(

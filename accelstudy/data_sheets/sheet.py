@@ -188,7 +188,8 @@ class DataSheet:
         """Standard deviation of the bias's change since the calibration, m/s².
 
         It is √(F² + K² t + rate² t² + repeatability²) with F of `flicker_change`. Unknown
-        quantities count as zero; `unknown` lists them. What a temperature adds says `warmed`.
+        quantities count as zero; `unknown_quantities` lists them. What a temperature adds says
+        `temperature_sigmas`.
 
         Parameters
         ----------

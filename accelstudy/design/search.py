@@ -256,9 +256,8 @@ class Search:
     def _refine(self, starts: int) -> Array:
         """Best positions from so many random sets."""
         found = [self.exchange(start) for start in range(1, starts + 1)]
-        order = stable_order([self.value(each) for each in found], DESIGN_TOLERANCE)[
-            :REFINED_STARTS
-        ]
+        values = [self.value(each) for each in found]
+        order = stable_order(values, DESIGN_TOLERANCE)[:REFINED_STARTS]
         for step in STEPS:
             for i in order:
                 found[i] = self.move(found[i], step)

@@ -62,7 +62,7 @@ def parameter_changes(
     Parameters
     ----------
     base, final : Solution, without and with the effects
-    frame : Frame, of the fit in which the effects were found
+    frame : SessionFit, of the fit in which the effects were found
     effects : that were added, in their order
     variance : float, of unit weight
     """

@@ -74,7 +74,7 @@ def rank_formulas(
 
     Parameters
     ----------
-    frame : Frame, of the fit without the function
+    frame : SessionFit, of the fit without the function
     evidence : Evidence
     effect : Learned, which says of what the function is one
     place : Place, coordinate and target of the same
@@ -131,7 +131,7 @@ class _Functions:
 
     Attributes
     ----------
-    frame : Frame
+    frame : SessionFit
     residuals : Residuals, beside what else was found
     effect : Learned
     arguments : (n, a) array, the coordinate
@@ -178,9 +178,8 @@ class _Functions:
         if not shapes:
             return float(logsumexp(evidence.noise_density(square)))
         along = [(z @ one.vectors)[None] ** 2 for one in shapes]
-        return float(
-            log_mean(evidence.shapes_density(along, [s.shares for s in shapes], square)[0])
-        )
+        shares = [one.shares for one in shapes]
+        return float(log_mean(evidence.shapes_density(along, shares, square)[0]))
 
     def fit(
         self, form: Form, setting: float, components: tuple[int, ...]
@@ -192,10 +191,8 @@ class _Functions:
         sizes, sigmas : (c,) arrays, amplitude of a sine, or how far another form goes
         taking : components that take part; the most significant one if none does
         """
-        z, left = (
-            self.residuals.z,
-            self._residual_functions(form, np.array([setting]))[0][0][:, [*components]],
-        )
+        z = self.residuals.z
+        left = self._residual_functions(form, np.array([setting]))[0][0][:, [*components]]
         m, count, k = left.shape
         inverse = np.linalg.pinv(left.reshape(m, -1), rcond=RULES.visible)
         values = inverse @ z
@@ -250,7 +247,7 @@ class Form:
     words : str, with a place for the setting s if it has one
     basis : callable, φ of s and of c (...), (..., k)
     settings : (t,) array
-    shown : callable, shows a setting
+    setting_text : callable, says a setting
     is_sine : bool, of which the amplitude is told; of others it is how much they go up and down
     """
 

@@ -92,7 +92,7 @@ def next_positions(
 
     Parameters
     ----------
-    frame : Frame, of the base fit
+    frame : SessionFit, of the base fit
     first, second : explanations by effects
     """
     effects = [one.effect for one in (*first, *second) if one.effect is not None]
@@ -173,7 +173,7 @@ def positions_to_learn(frame: SessionFit, learned: Learned) -> list[NextPosition
 
     Parameters
     ----------
-    frame : Frame, of the fit with the function
+    frame : SessionFit, of the fit with the function
     learned : Learned, the function
     """
     if learned.coordinate not in LEARNABLE:

@@ -199,7 +199,7 @@ class LinearSplit:
 
     Attributes
     ----------
-    frame : Frame, of all positions
+    frame : SessionFit, of all positions
     fitted, held : (f,) and (h,) int arrays
     """
 

@@ -274,7 +274,8 @@ class Diagnosis:
             at = int(self.campaign.positions[best.place])
             return NamedCause(OUTLIER, OUTLIER, at, (OUTLIER,), p, cause.posterior)
         assert best.effect is not None
-        assert best.distinguishable is not None
+        effect = best.distinguishable
+        assert effect is not None
         # What is beside a large effect was found in what its refit leaves.
         here = None if best.name == LEARNED else examined.hypothesis(best.effect)
         near = () if here is None else examined.nearest(here)
@@ -288,9 +289,7 @@ class Diagnosis:
             members,
             p,
             cause.posterior,
-            tuple(
-                Estimate(q.name, *values[q.name], q.unit) for q in best.distinguishable.parameters
-            ),
+            tuple(Estimate(q.name, *values[q.name], q.unit) for q in effect.parameters),
             tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
             tuple(other for other in like if other not in members),
             tuple(Rival(n, c) for n, c in near if c >= RULES.rival and n not in members),
@@ -398,12 +397,9 @@ class Diagnosis:
     @cached_property
     def changes(self) -> tuple[Change, ...]:
         """Changes of the parameters of the base model; none if a position was left out."""
-        effects = [
-            one.shape.distinguishable
-            for one in self.finding.chosen
-            if one.shape.distinguishable is not None
-        ]
-        if not effects or len(effects) < len(self.finding.chosen):
+        tried = [one.shape.distinguishable for one in self.finding.chosen]
+        effects = [effect for effect in tried if effect is not None]
+        if not effects or len(effects) < len(tried):
             return ()
         final, variance = self.final.solution, self.noise.variance
         return parameter_changes(self.base, self.frame, effects, final, variance)

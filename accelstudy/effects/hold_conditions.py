@@ -35,8 +35,8 @@ class HoldConditions:
     step_x, step_y, step_z : (n,) arrays, m/s², specific force less that of the hold before; 0 in
         the first hold
     order : (n,) array, the time or, where there is none, the number of the hold, from 1 on
-    course : Course, of the temperature of the whole session, with the holds that were left out; by
-        default of these holds alone
+    course : TemperatureCourse, of the whole session, with the holds that were left out; by default
+        of these holds alone
     full_range : float, m/s², the sensor measures ± this
     """
 

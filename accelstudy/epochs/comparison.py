@@ -64,9 +64,8 @@ class Comparison(Calibrations):
     @cached_property
     def statements(self) -> list[tuple[str, ...]]:
         """Whether each parameter changed, in words."""
-        return [
-            ("changed",) * (i in self.change.fewest_changes) for i in range(len(self.parameters))
-        ]
+        changed = self.change.fewest_changes
+        return [("changed",) * (i in changed) for i in range(len(self.parameters))]
 
     def instead_of(self, place: int) -> list[str]:
         """Names of parameters that may have changed instead of one that did."""

@@ -134,7 +134,7 @@ class Differences:
         return tuple(sorted(found))
 
     def instead_of(self, one: int) -> tuple[int, ...]:
-        """Parameters that may have changed instead of one of `changed`."""
+        """Parameters that may have changed instead of one of `fewest_changes`."""
         others = [i for i in range(len(self.differences)) if i not in self.fewest_changes]
         kept = [[*(i for i in others if i != other), one] for other in others]
         tests = [self.of(sorted(each)).test for each in kept]

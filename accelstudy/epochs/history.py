@@ -111,10 +111,8 @@ class History(Calibrations):
     @cached_property
     def sentences(self) -> list[str]:
         """What drifts and what scatters; the verdict comes first."""
-        each, level = (
-            list(zip(self.courses, self.parameters, self.statements, strict=True)),
-            self.level,
-        )
+        level = self.level
+        each = list(zip(self.courses, self.parameters, self.statements, strict=True))
         drifting = [(course, parameter) for course, parameter, found in each if "drifts" in found]
         least = (
             [course.detectable_rate(level) for course in self.courses],

@@ -105,7 +105,7 @@ def result_folder(
     Parameters
     ----------
     out : path of the folder of results, made if it is not there
-    kind : Kind of the results
+    kind : OutputKind of the results
     inputs : files and folders that are read; `out` must be apart from them
     force : bool
         Whether to write into a folder with other files. Files that have the name of one that is

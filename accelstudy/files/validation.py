@@ -227,7 +227,7 @@ def _first_error(
         text += f"; did you mean {near[0]!r}?" if near else ""
         text += f" (known: {', '.join(siblings)})"
     elif first["type"] == "value_error":
-        # The check of a whole block names the key itself.
+        # The check of a whole section names the key itself.
         mark = ": " if place else "."
         text = mark.join(filter(None, [key, str(first["ctx"]["error"])]))
     else:
@@ -271,21 +271,21 @@ def _wanted(error: ErrorDetails) -> str:
 
 def _keys_beside(location: Sequence[str | int], root: type[BaseModel]) -> list[str]:
     """Keys that are known in the place of an unknown one."""
-    block = root
+    section = root
     for part in location[:-1]:
-        field = _keys(block).get(str(part))
+        field = _keys(section).get(str(part))
         if field is not None:
-            block = next(_blocks(field.annotation), block)
-    return list(_keys(block))
+            section = next(_sections(field.annotation), section)
+    return list(_keys(section))
 
 
-def _keys(block: type[BaseModel]) -> dict[str, FieldInfo]:
-    return {field.alias or name: field for name, field in block.model_fields.items()}
+def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:
+    return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
-def _blocks(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Blocks that occur in an annotation such as `list[Grid] | None`."""
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Sections that occur in an annotation such as `list[Grid] | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in getattr(annotation, "__args__", ()):
-        yield from _blocks(argument)
+        yield from _sections(argument)

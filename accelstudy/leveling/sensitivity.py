@@ -123,7 +123,7 @@ def _total_effects(values: Array, shares: Array) -> tuple[Array, Array]:
     return total, Z95 * resampled.std(axis=1, ddof=1)
 
 
-def sample_leveling(
+def leveling_function(
     attitude: Array, model: SensorModel | None, g: float = STANDARD_GRAVITY
 ) -> Callable[[Array], Array]:
     """Return leveling near an attitude as a function of its uncertain inputs.
@@ -189,7 +189,7 @@ def leveling_sensitivity(
         f_s = np.array(specific_force(attitude[0], attitude[1], g))
         if model is not None:
             f_s = model.sense(f_s[None], x, g)[0]
-        of_inputs, mean = sample_leveling(attitude, model, g), np.concatenate([f_s, x])
+        of_inputs, mean = leveling_function(attitude, model, g), np.concatenate([f_s, x])
         effects.append(total_effects(of_inputs, mean, sigma, base_samples, resamples, seed))
     total, ci95, sd = (np.array(each) for each in zip(*effects, strict=True))
     return effects_table(roll_gon, pitch_gon, names, sd, {"total_effect": total, "ci95": ci95})

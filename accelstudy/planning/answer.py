@@ -50,19 +50,19 @@ class Answer:
     instead: Candidate | None = None
 
     @property
-    def simulated(self) -> list[Candidate]:
+    def simulated_candidates(self) -> list[Candidate]:
         """Candidates in the table that are simulated, the recommended one first.
 
         That is by hand if that reaches the target, else with the robot.
         """
-        checked = [c for c in self.ranked if c.simulated is not None]
-        first = [c for c in checked if c.equipment.name == "gravity"][:1] or checked[:1]
-        return first + [c for c in checked if c is not first[0]]
+        simulated = [c for c in self.ranked if c.simulated is not None]
+        first = [c for c in simulated if c.equipment.name == "gravity"][:1] or simulated[:1]
+        return first + [c for c in simulated if c is not first[0]]
 
     @property
     def first(self) -> Candidate:
         """The recommended candidate."""
-        return self.simulated[0]
+        return self.simulated_candidates[0]
 
     def best(self, equipment: str = "") -> Candidate | None:
         """The most accurate candidate, of all or with one equipment, however long it takes."""
@@ -72,7 +72,7 @@ class Answer:
     @property
     def study(self) -> dict[str, object]:
         """Configuration of the study whose cells are the simulated candidates."""
-        return study_of(self.question, self.simulated, self.seed, self.replicates)
+        return study_of(self.question, self.simulated_candidates, self.seed, self.replicates)
 
 
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:

@@ -1,7 +1,7 @@
 """A study, as its configuration `config/*.yaml` says: schema, parser and cells.
 
 The models below are the schema; `workflow/schemas/config.schema.json` is generated from them.
-Models, schemes, approaches and effects are written by their names; a block has the objects.
+Models, schemes, approaches and effects are written by their names; a section has the objects.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _at(key: str) -> Iterator[None]:
 OWN_MODELS: ContextVar[Mapping[str, SensorModel]] = ContextVar(
     "own_models", default=MappingProxyType({})
 )
-"""Models that the configuration defines, while the blocks that may name them are parsed."""
+"""Models that the configuration defines, while the sections that may name them are parsed."""
 
 
 def _written(
@@ -206,7 +206,7 @@ Composition = Annotated[SensorModel, _written(OneOrMore[str], _composed, _effect
 """A model that is written as a list of effects."""
 Simulated = Annotated[SensorModel | None, _written(OneOrMore[str], _simulated, _effects)]
 
-# --- the blocks ----------------------------------------------------------------------------------
+# --- the sections --------------------------------------------------------------------------------
 
 
 class SensorNoise(ConfigSection):

@@ -24,6 +24,7 @@ from accelstudy.study.estimate import (
     Statistic,
     controlled,
 )
+from accelstudy.study.known import KnownValues
 from accelstudy.study.quantiles import controlled_quantiles, usual_levels
 from accelstudy.study.replicates import Replicates, simulate
 
@@ -117,9 +118,6 @@ def statistics(
     replicates : Replicates
     levels : probabilities of the quantiles; by default those that so many replicates can have
     """
-    # Imports scipy.special slowly; who only reads tables does without it.
-    from accelstudy.study.known import KnownValues
-
     good, count = replicates.simulated.converged, int(replicates.simulated.converged.sum())
     if not count:
         return CellStatistics(cell, replicates)

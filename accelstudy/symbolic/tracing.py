@@ -89,7 +89,7 @@ class TracedFunction:
     Parameters
     ----------
     trace : function without arguments that returns arguments and expressions
-    key : str, under which the function is kept; None if it is not (`symbolic.made.key_of`)
+    key : str, under which the function is kept; None if it is not (`formula_cache.key_of`)
     name : str, of the function among those of the key
     """
 

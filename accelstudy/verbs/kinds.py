@@ -328,15 +328,8 @@ class Keyword:
         kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
         many, ends = "Sequence" in said, said.startswith("tuple")
         optional = default is None or "None" in said
-        return cls(
-            parameter.name,
-            kind_of_annotation(kind),
-            many,
-            ends,
-            default,
-            optional,
-            "".join(meaning),
-        )
+        kind = kind_of_annotation(kind)
+        return cls(parameter.name, kind, many, ends, default, optional, "".join(meaning))
 
     @property
     def option(self) -> str:

@@ -16,18 +16,17 @@ from hypothesis import strategies as st
 from quality_helpers import TRUTH, draw, ideal_session
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm, t
-from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
+from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, G
 
 from accelstudy.adjustment import CalibrationEquations, adjust, calibrate
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import MGON
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
-G = STANDARD_GRAVITY
 X = NINE.vector(TRUTH)
 
 

@@ -229,10 +229,8 @@ def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined
     z, r = basis.T @ residuals.z, residuals.redundancy
     g = np.einsum("ncr,nca->anr", basis[: n * c].reshape(n, c, -1), residuals.force_noise)
     v = np.random.default_rng(2).standard_normal((4, n, 3))
-    forms, (determinants, squares) = (
-        quadratic_forms(v),
-        restricted_likelihood(residuals, (0.25, 16.0)),
-    )
+    forms = quadratic_forms(v)
+    determinants, squares = restricted_likelihood(residuals, (0.25, 16.0))
     for k, length in enumerate(LENGTHS):
         lag = np.abs(i[:, None] - i)
         kernel = np.exp(-lag / length) if length < np.inf else (np.minimum(i[:, None], i) + 1) / n

@@ -29,7 +29,7 @@ VERBS = ("calibrate", "diagnose", "compare", "history", "lot")
 
 
 def logged():
-    """A log of 24 holds with a turn before each, of a sensor with a known bias."""
+    """A log of 24 holds, shaken before each, of a sensor with a known bias."""
     held = -9.80795 * get_scheme("fibonacci-24").directions + BIAS
     readings, _ = session(sigma=0.005, moving=100, forces=held)
     return pd.DataFrame(readings, columns=["ax", "ay", "az"])

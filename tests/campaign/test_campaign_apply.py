@@ -9,7 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from calling import refused
-from campaign_helpers import NINE, ROBOT, simulated_campaign
+from campaign_helpers import simulated_campaign
+from usual import NINE, ROBOT
 
 import accelstudy as acs
 from accelstudy.adjustment import calibrate

@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from calling import succeed
-from campaign_helpers import NINE, simulated_campaign
+from campaign_helpers import simulated_campaign
 from log_helpers import table
 from page_helpers import assert_sound, text_of
+from usual import NINE
 
 import accelstudy as acs
 from accelstudy.campaign.format import read_campaign, write_campaign

@@ -5,9 +5,10 @@ import re
 
 import numpy as np
 import pytest
-from campaign_helpers import FIVE_AXES, GRAVITY, NINE, ROBOT, simulated_campaign
+from campaign_helpers import FIVE_AXES, simulated_campaign
 from hypothesis import given
 from hypothesis import strategies as st
+from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.assessment import assess

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign_helpers import GRAVITY, NINE, simulated_campaign
+from campaign_helpers import simulated_campaign
 from log_helpers import table
+from usual import GRAVITY, NINE
 
 import accelstudy as acs
 from accelstudy.adjustment import Observations, calibrate

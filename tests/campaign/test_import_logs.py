@@ -36,9 +36,7 @@ HEADS = {
 }
 """Names of columns in the first row, and what a reader needs besides."""
 GIVEN = {"\t": "tab", "   ": "blank", " , ": "comma"}
-CALIBRATION = acs.calibrate(acs.simulate_campaign(scheme="fibonacci-24"))
 CALIBRATED = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
-EXPECTED = CALIBRATION.apply(pd.DataFrame(FORCES, columns=["fx", "fy", "fz"]))[CALIBRATED]
 
 
 @st.composite
@@ -67,18 +65,26 @@ def layouts(draw):
     return (gzip.compress(content), ".csv.gz", options) if one(0, 1) else (content, ".csv", options)
 
 
+@pytest.fixture(scope="module")
+def calibration():
+    """A calibration, and the forces that it makes of FORCES."""
+    made = acs.calibrate(acs.simulate_campaign(scheme="fibonacci-24"))
+    return made, made.apply(pd.DataFrame(FORCES, columns=["fx", "fy", "fz"]))[CALIBRATED]
+
+
 @settings(max_examples=120)
 @given(layouts())
-def test_text_in_any_layout_gives_the_same_numbers(layout):
+def test_text_in_any_layout_gives_the_same_numbers(calibration, layout):
     content, suffix, options = layout
+    made, expected = calibration
     with TemporaryDirectory() as folder:
         path = Path(folder, f"log{suffix}")
         path.write_bytes(content)
         log = open_log(path, **options)
         np.testing.assert_array_equal(log.time, TIME)
         np.testing.assert_array_equal(log.forces, FORCES)
-        leveled = CALIBRATION.apply(acs.read_log(path, **options))
-    pd.testing.assert_frame_equal(leveled[CALIBRATED], EXPECTED)
+        leveled = made.apply(acs.read_log(path, **options))
+    pd.testing.assert_frame_equal(leveled[CALIBRATED], expected)
 
 
 @pytest.mark.parametrize(("name", "variable"), [("log", None), ("log.T", None), ("other", "log")])

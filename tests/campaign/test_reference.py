@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from calling import refused
+from usual import GRAVITY, NINE, ROBOT, TWELVE, G
 
 from accelstudy.adjustment import Observations, calibrate
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
-from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.fit import campaign_observations, fit_campaign
 from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.format import read_campaign, write_campaign
@@ -20,14 +19,10 @@ from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.models import get_model
 from accelstudy.sequential.advisor import next_rows
 from accelstudy.simulation.sessions import Noise
 
-NINE = get_model("bias-scale-nonorthogonality")
-TWELVE = get_model("bias-scale-nonorthogonality-crossaxis")
 SESSIONS = 120
-ROBOT, GRAVITY = get_approach("robot"), get_approach("gravity")
 NOISE, NOISE_OF_REFERENCE = 1e-3, 0.5e-3
 
 

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 from diagnosis_helpers import campaign
-from usual import NINE
+from usual import NINE, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.approaches import get_approach
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.diagnosis import prediction
 from accelstudy.diagnosis.decision.verdict import Reason
 from accelstudy.diagnosis.pipeline import diagnose
@@ -30,7 +29,7 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
     approach, rng, z = get_approach(name), np.random.default_rng(0), []
     extended = compose("extended", (*(e.spec for e in NINE.effects), "quadratic_scale"))
     directions = get_scheme(scheme).directions
-    ideal = session(NINE, np.zeros(NINE.n_parameters), directions, STANDARD_GRAVITY)
+    ideal = session(NINE, np.zeros(NINE.n_parameters), directions, G)
     fitted, held = prediction.split_positions(-directions, HoldConditions(), count, rng)
     for _ in range(60):
         observed = ideal.draw(Noise(), 1, rng)

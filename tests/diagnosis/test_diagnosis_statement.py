@@ -1,6 +1,6 @@
 """What a credible set leaves no doubt of, on sets made by hand."""
 
-from types import SimpleNamespace as Diagnosis
+from types import SimpleNamespace
 
 import pytest
 from diagnosis_helpers import explanation
@@ -210,8 +210,8 @@ def test_an_effect_stands_only_for_those_that_the_model_has_not():
         ("warm_up+thermal_bias", 0.2),
         ("thermal_bias+bias_drift", 0.1),
     )
-    finding = Diagnosis(statement=statement_of(made(*names), cosine))
+    finding = SimpleNamespace(statement=statement_of(made(*names), cosine))
     assert [len(part.names) for part in finding.statement.certain] == [2, 2]
     found = [get_effect(name) for name in ("bias_drift", "thermal_bias")]
-    said = stands_for(Diagnosis(verdict="unknown", finding=finding, found=found))
+    said = stands_for(SimpleNamespace(verdict="unknown", finding=finding, found=found))
     assert said == ["In the model thermal bias stands for warm up as well."]

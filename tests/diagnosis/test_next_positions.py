@@ -9,7 +9,6 @@ from norm_model import SHOWN, nine
 from usual import GRAVITY, NINE, ROBOT, G
 
 from accelstudy.adjustment.quality import solve
-from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.next_positions import CANDIDATE_SCHEME, _rows, next_positions
@@ -113,7 +112,7 @@ def test_effects_of_time_are_told_apart_by_repeats_later():
             scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
         )
     )
-    fit = fit_campaign(campaign, NINE, get_approach("robot"))
+    fit = fit_campaign(campaign, NINE, ROBOT)
     examined = examine(solve(fit.model, fit.approach, fit.observed))
     drift, warm = (examined.candidates[name][0] for name in ("bias_drift", "warm_up"))
     found = next_positions(examined.frame, (drift,), (warm,))

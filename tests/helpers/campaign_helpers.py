@@ -1,15 +1,12 @@
 """A campaign as a sensor of the nine parameters would give it."""
 
 import numpy as np
+from usual import NINE
 
-from accelstudy.approaches import get_approach
 from accelstudy.campaign.session import Campaign
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
-NINE = get_model("bias-scale-nonorthogonality")
-GRAVITY, ROBOT = get_approach("gravity"), get_approach("robot")
 _GOLDEN = (1 + 5**0.5) / 2
 _AXES = np.array([[0, 1, _GOLDEN], [0, 1, -_GOLDEN], [1, _GOLDEN, 0], [1, -_GOLDEN, 0],
                   [_GOLDEN, 0, 1]])  # fmt: skip

@@ -143,8 +143,8 @@ def main(*arguments):
     parts = [name for name in arguments if name != "--renew"] or ([] if renew else [*PARTS])
     if not parts or not {*parts} <= PARTS.keys():
         sys.exit(f"name parts of {', '.join(PARTS)}")
-    if not DATA.is_dir():
-        print(f"{', '.join(OF_DATA)}: not compared; there is no {DATA}: set ACCELSTUDY_SHARED")
+    if not DATA.is_dir() and (without := [part for part in parts if part in OF_DATA]):
+        print(f"{', '.join(without)}: not compared; there is no {DATA}: set ACCELSTUDY_SHARED")
         parts = [part for part in parts if part not in OF_DATA]
     import_all()
     with ProcessPoolExecutor(int(os.environ.get("CORES", 2)), FORK) as pool:

@@ -240,7 +240,7 @@ def real_data(folder) -> Texts:
     """What the page about public measurements quotes of the others."""
     from real_data import texts
 
-    yield from texts(folder)
+    yield from texts()
 
 
 # --- studies -------------------------------------------------------------------------------------

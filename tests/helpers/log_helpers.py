@@ -22,21 +22,24 @@ G = 9.81
 def session(seed=1, holds=8, sigma=0.02, still=400, moving=200, forces=None):
     """A log (n, 3), and the first and the end sample of each hold.
 
-    `holds` is their number or, where their forces are given, without meaning; `still` is the number
-    of samples of a hold, or those of several, which take turns.
+    The holds have the given forces (m, 3) or, without these, random ones, `holds` of them; `still`
+    is the number of samples of a hold, or those of several, which take turns.
     """
     rng = np.random.default_rng(seed)
     pieces, edges, n = [], [], 0
     for i, rest in enumerate(np.resize(still, holds if forces is None else len(forces))):
-        force = rng.standard_normal(3) if forces is None else forces[i]
-        force = force * (G / np.linalg.norm(force) if forces is None else 1)
+        if forces is None:
+            force = rng.standard_normal(3)
+            force *= G / np.linalg.norm(force)
+        else:
+            force = forces[i]
         shake = 4 * np.sin(np.arange(moving)[:, None] * rng.uniform(0.05, 0.2, 3))
         pieces += [force + shake, np.tile(force, (rest, 1))]
         edges.append((n + moving, n + moving + rest))
         n += moving + rest
     pieces.append(pieces[0])
-    forces = np.concatenate(pieces)
-    return forces + sigma * rng.standard_normal(forces.shape), np.array(edges)
+    log = np.concatenate(pieces)
+    return log + sigma * rng.standard_normal(log.shape), np.array(edges)
 
 
 def table(forces, **more):

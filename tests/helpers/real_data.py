@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from places import DATA
 from scipy import optimize
+from usual import NINE
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit
@@ -18,9 +18,7 @@ from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
 from accelstudy.diagnosis.result import Diagnosis
 from accelstudy.effects import get_effect
-from accelstudy.sensors.models import get_model
 
-NINE = get_model("bias-scale-nonorthogonality")
 WHITE, UNKNOWN = "white", "not given"
 SIGMAS = {"xsens-mti": ("", WHITE, UNKNOWN)}
 """Which sigmas a campaign is diagnosed with; the others with that of its import."""
@@ -29,7 +27,7 @@ LONGEST = "lis3dh-phone"
 """Its diagnosis takes longer than all others, so that it belongs to the part `logs`."""
 
 
-def texts(_folder: Path) -> Iterator[tuple[str, str]]:
+def texts() -> Iterator[tuple[str, str]]:
     """All that the page quotes, but for the measurement that takes longest."""
     rows, small = [], []
     for name, data in public_data().items():
@@ -44,8 +42,8 @@ def texts(_folder: Path) -> Iterator[tuple[str, str]]:
     yield "limits", lines(limit_rows())
     for name, sigma in QUOTED.items():
         yield name, lines(verdict(name, sigma))
-    innalabs, parts = diagnosed("innalabs-49"), (nonlinearity(), blocks())
-    numbers = {**parts[0], **parts[1], **y_axis(innalabs)}
+    innalabs = diagnosed("innalabs-49")
+    numbers = {**nonlinearity(), **blocks(), **y_axis(innalabs)}
     numbers["effects that no campaign shows"] = ", ".join(map(words, innalabs.invisible))
     yield "numbers", lines(f"{what}: {said}" for what, said in numbers.items())
 
@@ -62,12 +60,12 @@ def lines(said):
 
 @cache
 def imported(name):
-    return import_log(public_file(name, DATA), import_settings(name))[0]
+    return import_log(public_file(name, DATA), import_settings(name))
 
 
 @cache
 def diagnosed(name: str, sigma: str = "") -> Diagnosis:
-    campaign = imported(name)
+    campaign, _ = imported(name)
     if sigma == WHITE:
         campaign = replace(campaign, sigma_force=0.000296, sigma_dof=None)
     elif sigma == UNKNOWN:
@@ -109,7 +107,7 @@ def limit_rows():
 
 def nonlinearity():
     """F tests of the norm, by a solver that shares nothing with the diagnosis, and the latter."""
-    forces, g = imported("ck-explorer").forces, 9.80665
+    forces, g = imported("ck-explorer")[0].forces, 9.80665
 
     def squares(*forms):
         def misclosures(p):
@@ -125,10 +123,10 @@ def nonlinearity():
     n, base = len(forces), squares()
     terms = {"quadratic terms": forces**2 / g, "cubic terms": forces**3 / g**2,
              "scale asymmetries": 2 * np.maximum(forces, 0) - forces}  # fmt: skip
-    said = {f"F of {name}": number((base / squares(form) - 1) * (n - 12) / 3)
-            for name, form in terms.items()}  # fmt: skip
-    for name, left in (("before", base), ("after", squares(terms["quadratic terms"]))):
-        said[f"rms {name}"] = number(1e3 * float(np.sqrt(left / n)))
+    left = {name: squares(form) for name, form in terms.items()}
+    said = {f"F of {name}": number((base / one - 1) * (n - 12) / 3) for name, one in left.items()}
+    for name, one in (("before", base), ("after", left["quadratic terms"])):
+        said[f"rms {name}"] = number(1e3 * float(np.sqrt(one / n)))
     d = diagnosed("ck-explorer")
     (y,) = (value for name, value, *_ in d.found[0].parameters if name == "k2_y")
     said["reading of y less"] = number(-1e3 * y * g)
@@ -146,7 +144,7 @@ def blocks():
     off = samples - samples.mean(axis=1, keepdims=True)
     beside = np.sum(off[:, 1:] * off[:, :-1], axis=1) / np.sum(off**2, axis=1)
     order, correlated = np.argsort(sd), beside.mean(axis=1)
-    accuracy = import_log(path, import_settings("ck-explorer"))[1].noise.accuracy
+    accuracy = imported("ck-explorer")[1].noise.accuracy
     return {
         "least sd": number(sd.min()), "largest sd": number(sd.max()),
         "correlation in noisy blocks": number(correlated[order[-20:]].mean()),

@@ -9,7 +9,7 @@ from usual import GRAVITY, NINE, PAPER, G
 from accelstudy.basics.units import GON
 from accelstudy.design.estimability import estimability
 from accelstudy.leveling.angles import specific_force
-from accelstudy.leveling.sensitivity import leveling_sensitivity, sample_leveling
+from accelstudy.leveling.sensitivity import leveling_function, leveling_sensitivity
 from accelstudy.leveling.shapley import linear_shapley
 from accelstudy.leveling.shares import leveling_shares, leveling_slope, order_changes
 from accelstudy.schemes import get_scheme
@@ -110,7 +110,7 @@ def shares_of(scheme, roll, pitch):
 def test_the_slope_is_the_derivative():
     attitude = np.array([30.0, -20.0]) * GON
     f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
-    mean, function = np.concatenate([f_s[0], PAPER]), sample_leveling(attitude, NINE)
+    mean, function = np.concatenate([f_s[0], PAPER]), leveling_function(attitude, NINE)
     step = 1e-5 * np.eye(len(NAMES))
     numeric = (function(mean + step) - function(mean - step)).T / 2e-5
     slope = leveling_slope(NINE, PAPER, f_s, G)[0]
@@ -162,7 +162,7 @@ def test_near_the_pole_shares_are_not_defined():
         f_s = NINE.sense(np.array(specific_force(*attitude, G))[None], PAPER)
         mean = np.concatenate([f_s[0], PAPER])
         slope = leveling_slope(NINE, PAPER, f_s, G)[0]
-        offsets = sample_leveling(attitude, NINE)(
+        offsets = leveling_function(attitude, NINE)(
             mean + sigma * rng.standard_normal((20_000, len(mean)))
         )
         linear = np.sqrt((slope**2) @ sigma**2)

@@ -133,11 +133,8 @@ def test_a_users_file_is_read_and_an_unknown_sensor_names_those_there_are(tmp_pa
 
 
 def test_a_sensor_of_which_only_the_noise_is_known_keeps_it_however_long_the_hold():
-    assert (
-        sheet_of_sigma(0.002).sigma_mean(1.0)
-        == sheet_of_sigma(0.002).sigma_mean(100.0, 1000.0)
-        == 0.002
-    )
+    sheet = sheet_of_sigma(0.002)
+    assert sheet.sigma_mean(1.0) == sheet.sigma_mean(100.0, 1000.0) == 0.002
 
 
 # --- from what was measured ----------------------------------------------------------------------

@@ -13,6 +13,7 @@ from page_helpers import assert_told_alike, numbers
 from pictures import BATCH, MADE_BY, REPORTS, overview, same_picture, seen, stale
 from places import ROOT
 from stand_ins import drawn
+from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON
@@ -20,10 +21,8 @@ from accelstudy.design.estimability import estimability
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.leveling.error import cap_forces, tilt_error
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-NINE = get_model("bias-scale-nonorthogonality")
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/commands.sh"))
 KEPT = {
     "lot": "tutorial-lot", "sweep": "tutorial-sweep", "effect": "tutorials",

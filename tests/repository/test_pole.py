@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from places import ROOT
 from scipy.spatial.transform import Rotation
+from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
@@ -18,7 +19,6 @@ from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
-NINE = get_model("bias-scale-nonorthogonality")
 SHEET = DataSheet(
     "test", velocity_random_walk=2e-3, bias_instability=1e-3, bias_per_kelvin=2e-4,
     scale_per_kelvin=1e-4, repeatability=3e-3,

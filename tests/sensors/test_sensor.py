@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from usual import G
 
-from accelstudy.basics.units import MGON, STANDARD_GRAVITY
+from accelstudy.basics.units import MGON
 from accelstudy.effects import Effect, HoldConditions, get_effect, register
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
 from accelstudy.sensors.sensor import SensorModel
 
-G = STANDARD_GRAVITY
 NINE = "bias-scale-nonorthogonality"
 TWELVE = "bias-scale-nonorthogonality-crossaxis"
 # Realistic sizes by unit: 0.5 m/s² of bias, 2 % of scale and nonlinearity, 2 gon of angle.

@@ -64,8 +64,8 @@ def tables(folder):
 
 
 @pytest.fixture(scope="module")
-def evidence(tables):
-    """Function that gives the evidence where the study, its tables or `by_scheme` are others."""
+def data(tables):
+    """Function that gives the data where the study, its tables or `by_scheme` are others."""
     usual = ClaimData(make_study(**KEYS), tables, tables["estimates"])
 
     def of(by_scheme=usual.by_scheme, noise=(), **changed):
@@ -78,17 +78,17 @@ def evidence(tables):
 
 
 @pytest.fixture(scope="module")
-def judged(evidence):
-    return judge(evidence()).set_index("claim")
+def judged(data):
+    return judge(data()).set_index("claim")
 
 
-def claim_of(name, evidence):
+def claim_of(name, data):
     """The row of one claim of the paper."""
     (claim,) = (each for each in claim_table()["paper"] if each["claim"] == name)
-    return judge_claim(claim, evidence)
+    return judge_claim(claim, data)
 
 
-def test_order_of_the_inputs(tables, judged, evidence):
+def test_order_of_the_inputs(tables, judged, data):
     """At a roll of 50 gon and a pitch of 25 s_y and s_z overtake b_y and b_z; elsewhere none."""
     claim = judged.loc["order-of-inputs"]
     assert claim["verdict"] == NOT_REPRODUCED
@@ -98,7 +98,7 @@ def test_order_of_the_inputs(tables, judged, evidence):
 
     shapley = tables["shapley"]
     same = shapley.assign(shapley_effect=shapley["total_effect"])
-    claim = claim_of("order-of-inputs", evidence(shapley=same))
+    claim = claim_of("order-of-inputs", data(shapley=same))
     assert (claim["verdict"], claim["ours"]) == (REPRODUCED, 0)
 
 
@@ -111,14 +111,14 @@ def test_order_of_the_inputs(tables, judged, evidence):
     (0, (-5, 5), NOT_REPRODUCED),
     (41, (-10, 65), REPRODUCED),  # single simulations spread over the paper's number
 ])  # fmt: skip
-def test_verdict_on_a_reduction(tables, judged, evidence, mean, central, verdict):
+def test_verdict_on_a_reduction(tables, judged, data, mean, central, verdict):
     low, high = central
     single = {"single_low": low, "single_high": high, "percentile": 12.34}
     summary = tables["summary"].copy()
     at = (summary["approach"] == "robot") & summary["parameter"].str.startswith("b_")
     factor = (100 - mean) / (100 - judged.loc["reduction-bias", "ours"])
     summary.loc[at, "sd_posteriori_mean"] *= factor
-    changed = evidence(by_scheme=evidence().by_scheme.assign(**single), summary=summary)
+    changed = data(by_scheme=data().by_scheme.assign(**single), summary=summary)
     claim = claim_of("reduction-bias", changed)
     assert claim["verdict"] == verdict
     assert claim["ours"] == pytest.approx(mean, abs=1e-9)
@@ -129,8 +129,8 @@ def test_verdict_on_a_reduction(tables, judged, evidence, mean, central, verdict
     assert said in claim["sentence"]
 
 
-def test_verdict_on_accuracy_near_level(evidence):
-    claim = claim_of("level-roll", evidence(noise={"sensor": {"sigma_mps2": 0.004}}))
+def test_verdict_on_accuracy_near_level(data):
+    claim = claim_of("level-roll", data(noise={"sensor": {"sigma_mps2": 0.004}}))
     assert claim["verdict"] == NOT_REPRODUCED
     assert claim["ours"] == pytest.approx(25.97, rel=0.01)
 
@@ -142,18 +142,18 @@ def test_verdict_on_accuracy_near_level(evidence):
     ("nearly-uncorrelated", 1.0, 0.0, REPRODUCED),
     ("nearly-uncorrelated", 1.0, 0.2, NOT_REPRODUCED),
 ])  # fmt: skip
-def test_verdict_on_the_correlation(tables, evidence, claim, factor, rest, verdict):
+def test_verdict_on_the_correlation(tables, data, claim, factor, rest, verdict):
     table = tables["correlations"]
     scales = table["parameter_1"].str.startswith("s_") & table["parameter_2"].str.startswith("s_")
     adjustment = table["adjustment"] * np.where(scales, factor, 1) + np.where(scales, 0, rest)
-    changed = evidence(correlations=table.assign(adjustment=adjustment))
+    changed = data(correlations=table.assign(adjustment=adjustment))
     assert claim_of(claim, changed)["verdict"] == verdict
 
 
-def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
+def test_a_scheme_without_redundancy_has_no_reduction(tables, data):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
-    usual = evidence()
+    usual = data()
     other = ClaimData(usual.study, {**tables, "summary": summary}, usual.estimates)
     reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
     assert set(reductions["scheme"]) == {"mclaren-24"}
@@ -163,8 +163,8 @@ def test_a_scheme_without_redundancy_has_no_reduction(tables, evidence):
 # --- for people ----------------------------------------------------------------------------------
 
 
-def test_every_claim_is_on_the_page_and_in_the_markdown(judged, evidence):
-    claims, schemes = judged.reset_index(), evidence().by_scheme.assign(scheme="<b>&</b>")
+def test_every_claim_is_on_the_page_and_in_the_markdown(judged, data):
+    claims, schemes = judged.reset_index(), data().by_scheme.assign(scheme="<b>&</b>")
     page, text = claims_page(claims, schemes), claims_markdown(claims)
     for row in claims.to_dict("records"):
         for words in (row["statement"], row["sentence"], row["verdict"]):
@@ -177,7 +177,7 @@ def test_every_claim_is_on_the_page_and_in_the_markdown(judged, evidence):
     assert not re.search(r"(src|href)=[\"']https?:", page)
 
 
-def test_claims_as_the_workflow_judges_them(tables, folder, judged, evidence, tmp_path):
+def test_claims_as_the_workflow_judges_them(tables, folder, judged, data, tmp_path):
     """From files to files, with estimates of other cells in them."""
     outputs = {
         "claims": tmp_path / "claims.parquet",
@@ -190,5 +190,5 @@ def test_claims_as_the_workflow_judges_them(tables, folder, judged, evidence, tm
     )  # fmt: skip
     claims = read_table(outputs["claims"])
     pd.testing.assert_frame_equal(claims.set_index("claim"), judged, check_dtype=False)
-    assert len(read_table(outputs["by_scheme"])) == len(evidence().by_scheme)
+    assert len(read_table(outputs["by_scheme"])) == len(data().by_scheme)
     assert outputs["html"].read_text(encoding="utf-8").lower().startswith("<!doctype html>")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 from study_helpers import grid, make_cells, plain, run_study
+from usual import STANDARD_ERRORS
 
 from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, controlled
 from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles, share_below
 from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import TILT, simulated_statistics
 
-STANDARD_ERRORS = 4.5
 OFTEN = 200
 """Samples over which errors are compared with the scatter, to 5 %."""
 

@@ -11,13 +11,13 @@ import pytest
 from scipy.special import gammaln
 from scipy.stats import binom
 from study_helpers import NINE, grid, run_study
+from usual import STANDARD_ERRORS
 
 from accelstudy.study import replicates as module
 from accelstudy.study.compiling import calibrator
 from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import coverage_columns
 
-STANDARD_ERRORS = 4.5
 REPLICATES = 1000
 SCHEMES = ["mclaren-24", "rings-24", "faces-edges-18", "rhombicuboctahedron-24", "faces-6"]
 MCLAREN = f"{NINE}/mclaren-24"

@@ -93,16 +93,11 @@ def test_different_formulas_have_different_keys():
         *("bias", "saturation", "saturation[k_sat_z]", "saturation[k_sat_x]", "learned"),
         *("learned(coordinate=yaw)", "learned(target=scale)", "learned(length=0.25)"),
     )
-    kinds = [type(get_effect(spec)) for spec in specs]
-    keys = [formula_cache.key_of(kind) for kind in kinds]
+    key_of, kinds = formula_cache.key_of, [type(get_effect(spec)) for spec in specs]
+    keys = [key_of(kind) for kind in kinds]
     assert None not in keys
-    assert (
-        len({*keys, formula_cache.key_of(*kinds), formula_cache.key_of(*kinds[::-1])})
-        == len(specs) + 2
-    )
-    assert (
-        formula_cache.key_of(type(get_effect("saturation(knee=9)"))) == keys[1]
-    )  # settings are symbols
+    assert len({*keys, key_of(*kinds), key_of(*kinds[::-1])}) == len(specs) + 2
+    assert key_of(type(get_effect("saturation(knee=9)"))) == keys[1]  # settings are symbols
 
 
 def test_what_is_not_of_the_package_is_not_kept():
@@ -119,7 +114,7 @@ def test_what_is_not_of_the_package_is_not_kept():
 
 @pytest.fixture
 def copied(tmp_path, monkeypatch):
-    """A copy of the package, of whose files keys are formula_cache."""
+    """A copy of the package, of whose files keys are made."""
     for room in formula_cache.ROOMS:
         shutil.copytree(PACKAGE / room, tmp_path / "package" / room)
     init = tmp_path / "package" / "__init__.py"

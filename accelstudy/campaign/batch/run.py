@@ -32,7 +32,7 @@ def run_task(
 
     Parameters
     ----------
-    task : Task
+    task : CampaignEntry
     folder : path
         For what `write_calibration` writes; an imported campaign goes to its subfolder campaign.
     public : path

@@ -135,9 +135,8 @@ def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
     cap = cap_forces(MAX_TILT_GON * GON, LOSS_ATTITUDES, calibration.gravity)
     forces, readings, terms = _readings(calibration, cap)
     corrected = (readings - terms @ offsets.T) / gains
-    error = wrap_angle(
-        angles_of(calibration.usual_layout.axes.to_frd(corrected)) - angles_of(forces)
-    )
+    frame = calibration.usual_layout.axes
+    error = wrap_angle(angles_of(frame.to_frd(corrected)) - angles_of(forces))
     return np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
 
 

@@ -254,14 +254,14 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
     InputError
         If the forces are nowhere near gravity and no unit explains it.
     """
-    errors = tuple(_mendings(campaign, attitude and campaign.angles is not None))
+    errors = tuple(_corrections(campaign, attitude and campaign.angles is not None))
     forces = errors[-1].campaign.forces if errors else campaign.forces
     where, si = f"{campaign.name}: fx, fy, fz", conversion_of("m/s^2")
     check_size(where, forces, campaign.gravity, "m/s^2", si)
     return Recognition(errors) if errors else None
 
 
-def _mendings(campaign: Campaign, attitude: bool) -> Iterator[Correction]:
+def _corrections(campaign: Campaign, attitude: bool) -> Iterator[Correction]:
     """Undo gross errors one after the other, first those that all positions have."""
     sensor = yield from _everywhere(campaign, attitude)
     # A sensor that is mounted askew is no reason to reorder its positions.
@@ -289,9 +289,9 @@ def _undo(
     """Yield what helps most first, until nothing helps clearly; return the sensor after it."""
     for _ in range(MAX_ERRORS):
         helps = [
-            (mending, after)
-            for mending in chain.from_iterable(each(sensor) for each in hypotheses)
-            if _is_clear(mending, sensor, after := replace(sensor, campaign=mending.campaign))
+            (correction, after)
+            for correction in chain.from_iterable(each(sensor) for each in hypotheses)
+            if _is_clear(correction, sensor, after := replace(sensor, campaign=correction.campaign))
         ]
         if not helps:
             break
@@ -301,26 +301,20 @@ def _undo(
     return sensor
 
 
-def _is_clear(mending: Correction, before: RealSensor, after: RealSensor) -> bool:
-    """Whether a mending clearly improves what was clearly wrong; no sensor is mirrored."""
-    if mending.left_out:
+def _is_clear(correction: Correction, before: RealSensor, after: RealSensor) -> bool:
+    """Whether a correction clearly improves what was clearly wrong; no sensor is mirrored."""
+    if correction.left_out:
         return True
-    if mending.changed is None:
-        turned_over = mending.matrix is not None and np.linalg.det(mending.matrix) < 0
+    if correction.changed is None:
+        turned_over = correction.matrix is not None and np.linalg.det(correction.matrix) < 0
         if turned_over and before.free.is_mirrored:
             return after.misfit < before.misfit
         # Single positions may be wrong as well: it is enough that most others fit then.
         gained = before.misfit > MIN_RATIO * after.misfit
         return bool(gained or before.usual_distance > MIN_RATIO * after.usual_distance)
-    was, now = (np.median(sensor.distance[mending.changed]) for sensor in (before, after))
-    return bool(
-        was
-        > max(
-            MIN_RATIO * now,
-            MIN_RATIO**2 * after.usual_distance,
-            MIN_POSITION_ERROR * before.gravity,
-        )
-    )
+    was, now = (np.median(sensor.distance[correction.changed]) for sensor in (before, after))
+    usual, least = MIN_RATIO**2 * after.usual_distance, MIN_POSITION_ERROR * before.gravity
+    return bool(was > max(MIN_RATIO * now, usual, least))
 
 
 # --- What would mend a campaign, the simplest first -----------------------------------------------
@@ -335,14 +329,14 @@ def axes(sensor: RealSensor) -> Iterator[Correction]:
     # An ideal sensor with any bias is near enough to compare all quickly.
     tried, misses = [], []
     for shown in SIGNED_PERMUTATIONS:
-        for mending in _undone(campaign, matrix_of(shown).T):
-            error = mending.campaign.forces - ideal
+        for correction in _undone(campaign, matrix_of(shown).T):
+            error = correction.campaign.forces - ideal
             bias = np.median(error, axis=0)
             distance = np.linalg.norm(error - bias, axis=1)
             misses.append(float(np.mean(np.minimum(distance, campaign.gravity))))
             moved = sum(abs(axis) != i for i, axis in enumerate(shown, 1))
             changes = (moved, sum(axis < 0 for axis in shown), float(np.linalg.norm(bias)))
-            tried.append((changes, mending))
+            tried.append((changes, correction))
     near = [
         one for one, miss in zip(tried, misses, strict=True) if miss < MAX_AXIS_RATIO * min(misses)
     ]

@@ -87,10 +87,8 @@ def public_path(name: str, folder: str | Path) -> Path:
     """
     import pooch
 
-    data, folder = (
-        _public_data(name),
-        Path(folder).expanduser(),
-    )  # in a configuration no shell expands it
+    data = _public_data(name)
+    folder = Path(folder).expanduser()  # in a configuration no shell expands it
     for path in sorted(folder.rglob(data.file_name)):
         if path.is_file() and pooch.file_hash(str(path)) == data.sha256:
             return path

@@ -132,7 +132,7 @@ def parse_settings(
 ) -> ImportSettings:
     """Check settings; raise `InputError` with one line that names the source and the key.
 
-    `names` are those of keys that are not from the source, see `checked`.
+    `names` are those of keys that are not from the source, see `validate`.
     """
     return validate(ImportSettings, content, source, names=names)
 

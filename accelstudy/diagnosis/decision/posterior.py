@@ -359,7 +359,7 @@ def posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterio
     count : int, sets of candidates that are refitted, the most probable to first order
     """
     tried = [single, *sorted(case.sets, key=lambda one: -one.log_weight)[:count]]
-    refitted = [_refit(case, one) for one in tried]
+    refitted = [_weigh_by_refit(case, one) for one in tried]
     alone, solution = refitted[0]
     weighed = [one for one, _ in refitted]
     if solution is not None:
@@ -368,7 +368,7 @@ def posterior_by_refits(case: Case, single: Explanation, count: int) -> Posterio
     return Posterior.of([*weighed, *others, *case.noises])
 
 
-def _refit(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
+def _weigh_by_refit(case: Case, one: Explanation) -> tuple[Explanation, Solution | None]:
     """Weigh an explanation by its refit instead of by first order."""
     fit = case.refit(one.causes)
     if fit is None:

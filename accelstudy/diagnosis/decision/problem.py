@@ -185,10 +185,9 @@ def pose(base: BaseFit) -> Problem:
     if is_exact(first):
         return problem
     noisier = problem.unequal_axes
+    beats_named = noisier > problem.best_odds(problem.named_field)
     # Something unknown is asked last, as it takes longest.
-    if noisier > problem.best_odds(problem.named_field) and noisier > problem.best_odds(
-        problem.field
-    ):
+    if beats_named and noisier > problem.best_odds(problem.field):
         sigma = np.sqrt(problem.axes.ratios)
         mean = np.mean(np.sqrt(first.variances[:, :3]))
         shaped = np.broadcast_to(mean * sigma / np.mean(sigma), (len(first.variances), 3))

@@ -27,7 +27,7 @@ RANGE_FACTOR = 1.6
 
 def refit(base: Solution, chosen: Sequence[Hypothesis]) -> Solution | None:
     """Fit with effects added and bumped positions left out; None if it has no solution."""
-    effects = [h.distinguishable for h in chosen if h.distinguishable is not None]
+    effects = [effect for h in chosen if (effect := h.distinguishable) is not None]
     together = (*base.model.effects, *effects)
     try:
         model = SensorModel(composition_name(together), together) if effects else base.model

@@ -57,7 +57,7 @@ class Finding:
     ----------
     verdict : str, "no_effect", "named", "narrowed", "learned", "gross_error", "noise_model" or
         "unknown"
-    frame : Frame, of the fit with what was chosen, or of the base fit
+    frame : SessionFit, of the fit with what was chosen, or of the base fit
     reason : Reason or None
     chosen : tuple of Cause; of the unknown, what is certain
     posterior : Posterior or None, where something is missing

@@ -283,11 +283,9 @@ def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> s
         for kind in dict.fromkeys(map(_kind, one.causes)):
             kinds[kind] += one.posterior
     worth = sorted(((k, p) for k, p in kinds.items() if p >= MIN_SAID), key=lambda item: -item[1])
-    return (
-        f"Most probable{' beside it' if certain else ''}: {_with_probabilities(worth)}."
-        if worth
-        else ""
-    )
+    if not worth:
+        return ""
+    return f"Most probable{' beside it' if certain else ''}: {_with_probabilities(worth)}."
 
 
 def stands_for(diagnosis: Diagnosis) -> list[str]:

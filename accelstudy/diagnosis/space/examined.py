@@ -36,7 +36,7 @@ class ExaminedFit:
 
     Attributes
     ----------
-    frame : Frame
+    frame : SessionFit
     candidates : dict of name to shapes, what may be missing
     invisible : tuple of str, effects of rank 0
     untestable : dict of effect to the reason why it cannot be tested

@@ -64,7 +64,7 @@ class SessionFit:
 
     @classmethod
     def of(cls, solution: Solution) -> SessionFit:
-        """Frame of a calibration at its solution."""
+        """Session of a calibration, at its solution."""
         ideal, forces = ideal_residuals(solution)
         observed, model = solution.observed, solution.model
         if observed.angles is not None and solution.approach.uses_angles:
@@ -206,7 +206,7 @@ def signatures(
     forces : (n, 3) array, m/s², in sensor axes
     angles : (n, 2) array, rad, attitude
     g : float, m/s²
-    hold : Columns, with two further axes
+    hold : HoldColumns, with two further axes
 
     Returns
     -------

@@ -81,7 +81,7 @@ class LearnedShapes(Shapes):
 
         Parameters
         ----------
-        frame : Frame
+        frame : SessionFit
         attitude : Spaces or None, what repeated positions of one attitude have in common
         """
         places: list[Place] = []
@@ -176,7 +176,7 @@ class LearnedShapes(Shapes):
         return {place: log_sum(logs[..., some]) for place, some in of_place.items()}
 
     def place_densities_of(self, evidence: Evidence, z: Array) -> dict[Place, float]:
-        """Return the same of residuals z (m,)."""
+        """Log density of residuals z (m,) under the shapes of each place, times its prior."""
         each = self.place_densities(evidence, self.parts(z), z @ z)
         return {place: float(log) for place, log in each.items()}
 
@@ -322,7 +322,7 @@ def function_rows(frame: SessionFit, target: str, functions: Array) -> Array:
 
     Parameters
     ----------
-    frame : Frame
+    frame : SessionFit
     target : str
     functions : (n, a, k) array, k functions of each of a arguments
     """

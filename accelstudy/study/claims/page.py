@@ -43,16 +43,15 @@ def claim_rows(claims: pd.DataFrame) -> Rows:
     for claim in claims.to_dict("records"):
         unit = "" if claim["unit"] in ("1", "ratio") else f" {claim['unit']}"
         spread = interval(claim["ci95_low"], claim["ci95_high"])
+        ours = f"{number(claim['ours'])}{unit}" + (f" ({spread})" if spread else "")
         row = {
             "section": claim["section"],
             "claim": claim["statement"],
             "paper": "–" if pd.isna(claim["paper"]) else f"{number(claim['paper'])}{unit}",
-            "ours (95 % interval)": f"{number(claim['ours'])}{unit}",
+            "ours (95 % interval)": ours,
             "verdict": claim["verdict"],
             "why": claim["sentence"],
         }
-        if spread:
-            row["ours (95 % interval)"] += f" ({spread})"
         rows.append(row)
     return rows
 

@@ -1,4 +1,4 @@
-"""What the claims are about, measured: functions of the evidence that `claims.yaml` names.
+"""What the claims are about, measured: functions of the data that `claims.yaml` names.
 
 Each returns `value`, with `low` and `high` where there is a 95 % interval, in the unit of the
 claim, and further numbers that its rule or its sentence uses.
@@ -140,14 +140,14 @@ def estimate(value: float, half: float, **others: Any) -> Numbers:
 
 
 def sd_of_tilt(
-    evidence: ClaimData,
+    data: ClaimData,
     angle: str = "roll",
     at_roll: float = 0,
     at_pitch: float = 0,
     noise: float = 1,
 ) -> Numbers:
     """Standard deviation, mgon, of an angle from simulated readings in an attitude given in gon."""
-    study = evidence.study
+    study = data.study
     rng = np.random.default_rng(np.random.SeedSequence([study.seed, 31]))
     attitude = np.array([at_roll, at_pitch]) * GON
     force = np.array(specific_force(attitude[0], attitude[1], study.gravity_mps2))
@@ -158,19 +158,19 @@ def sd_of_tilt(
     return estimate(sd, Z95 * sd / np.sqrt(2 * DRAWS), theory=theory)
 
 
-def sd_ratio_of_noise(evidence: ClaimData, times: float, at_pitch: float) -> Numbers:
+def sd_ratio_of_noise(data: ClaimData, times: float, at_pitch: float) -> Numbers:
     """Standard deviation of roll at some times the noise, over that at the noise of the study."""
-    one = sd_of_tilt(evidence, at_pitch=at_pitch)["value"]
-    many = sd_of_tilt(evidence, at_pitch=at_pitch, noise=times)
+    one = sd_of_tilt(data, at_pitch=at_pitch)["value"]
+    many = sd_of_tilt(data, at_pitch=at_pitch, noise=times)
     return {name: many[name] / one for name in ("value", "low", "high")}
 
 
 # --- section 3.2: which inputs make roll and pitch uncertain -------------------------------------
 
 
-def effect_of_force(evidence: ClaimData, force: str, at_roll: float) -> Numbers:
+def effect_of_force(data: ClaimData, force: str, at_roll: float) -> Numbers:
     """Total effect, %, of one force on roll, among the forces alone."""
-    study, settings, table = evidence.study, evidence.settings, evidence.tables["sensitivity"]
+    study, settings, table = data.study, data.settings, data.tables["sensitivity"]
     at = (table["roll_gon"] == at_roll) & (table["pitch_gon"] == 0)
     table = table[at & (table["analysis"] == "forces")]
     if table.empty:  # not on the grid of the study
@@ -181,7 +181,7 @@ def effect_of_force(evidence: ClaimData, force: str, at_roll: float) -> Numbers:
 
 
 def largest_effect(
-    evidence: ClaimData,
+    data: ClaimData,
     output: str,
     inputs: Sequence[str],
     max_roll: float = TILT,
@@ -189,7 +189,7 @@ def largest_effect(
     beside: str = "",
 ) -> Numbers:
     """Largest total effect, %, of the inputs that begin so; `everywhere`: over the whole grid."""
-    grid = evidence.tables["sensitivity"]
+    grid = data.tables["sensitivity"]
     grid = grid[(grid["analysis"] == "gravity") & (grid["pitch_gon"] >= 0) & grid["defined"]]
     grid = grid[grid["output"] == output]
     of = grid["input"].str.startswith(tuple(inputs))
@@ -205,14 +205,14 @@ def _largest(rows: pd.DataFrame) -> Numbers:
     return estimate(100 * float(row["total_effect"]), 100 * float(row["ci95"]))
 
 
-def order_of_inputs(evidence: ClaimData) -> Numbers:
+def order_of_inputs(data: ClaimData) -> Numbers:
     """Share of attitudes, %, at which Shapley effects rank the inputs otherwise, and which."""
-    shares, texts = zip(*(_order(evidence, approach) for approach in APPROACHES), strict=True)
+    shares, texts = zip(*(_order(data, approach) for approach in APPROACHES), strict=True)
     return {"value": shares[0], **dict(zip(APPROACHES, texts, strict=True))}
 
 
-def _order(evidence: ClaimData, approach: str) -> tuple[float, str]:
-    table, attitude = evidence.tables["shapley"], ["output", "roll_gon", "pitch_gon"]
+def _order(data: ClaimData, approach: str) -> tuple[float, str]:
+    table, attitude = data.tables["shapley"], ["output", "roll_gon", "pitch_gon"]
     rows = table[(table["analysis"] == approach) & table["defined"].astype(bool)]
     points = 100 * float((rows["shapley_effect"] - rows["total_effect"]).abs().max())
     text = f"no share changes by more than {points:.2g} percentage points"
@@ -231,36 +231,36 @@ def _order(evidence: ClaimData, approach: str) -> tuple[float, str]:
 
 
 def mean_sd(
-    evidence: ClaimData, effect: str, approach: str = "gravity", scheme: str = ""
+    data: ClaimData, effect: str, approach: str = "gravity", scheme: str = ""
 ) -> pd.DataFrame:
     """Mean sd a posteriori of the parameters of an effect, its standard error `se`, and `truth`."""
-    rows = evidence.rows("summary", approach, scheme).set_index("parameter")
+    rows = data.rows("summary", approach, scheme).set_index("parameter")
     names = {"sd_posteriori_mean": "sd", "sd_posteriori_se": "se", "truth": "truth"}
     parameters = [parameter.name for parameter in get_effect(effect).parameters]
     return rows.loc[parameters, [*names]].rename(columns=names).astype(float).abs()
 
 
-def mean_reduction(evidence: ClaimData, effect: str, scheme: str = "") -> Numbers:
+def mean_reduction(data: ClaimData, effect: str, scheme: str = "") -> Numbers:
     """Reduction, %, of the mean sd a posteriori of an effect by the robot, in a scheme."""
-    below, above = (mean_sd(evidence, effect, each, scheme).mean() for each in APPROACHES)
+    below, above = (mean_sd(data, effect, each, scheme).mean() for each in APPROACHES)
     left = 100 * above["sd"] / below["sd"]
     error = float(np.hypot(above["se"] / above["sd"], below["se"] / below["sd"]))
     return estimate(100 - left, Z95 * left * error)
 
 
-def reduction(evidence: ClaimData, effect: str) -> Numbers:
+def reduction(data: ClaimData, effect: str) -> Numbers:
     """Return `mean_reduction` in the scheme of the claims, and what single simulations show."""
-    rows = evidence.single_simulations(f"reduction-{effect}")
+    rows = data.single_simulations(f"reduction-{effect}")
     names = sorted(rows.index[rows["paper"].between(rows["single_low"], rows["single_high"])])
     named = f" ({', '.join(names)})" if 0 < len(names) <= 4 else ""
-    single = rows.loc[evidence.settings.scheme.name, ["single_low", "single_high", "percentile"]]
+    single = rows.loc[data.settings.scheme.name, ["single_low", "single_high", "percentile"]]
     where = f"{len(names)} of {len(rows)} schemes{named}"
-    return {**mean_reduction(evidence, effect), **single, "where": where}
+    return {**mean_reduction(data, effect), **single, "where": where}
 
 
-def single_reductions(evidence: ClaimData, effect: str, scheme: str, paper: float) -> Numbers:
+def single_reductions(data: ClaimData, effect: str, scheme: str, paper: float) -> Numbers:
     """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
-    pair = [evidence.sigmas[evidence.settings.cell(each, scheme)] for each in APPROACHES]
+    pair = [data.sigmas[data.settings.cell(each, scheme)] for each in APPROACHES]
     gravity, robot = (sigmas[..., cell.columns_of(effect)].mean(axis=2) for cell, sigmas in pair)
     n = min(gravity.shape[1], robot.shape[1])
     ratio, linear = robot[:, :n] / gravity[:, :n]
@@ -277,7 +277,7 @@ def _ends(values: Iterable[float]) -> Numbers:
 
 
 def correlations(
-    evidence: ClaimData,
+    data: ClaimData,
     approach: str = "gravity",
     scheme: str = "",
     first: str = "",
@@ -288,7 +288,7 @@ def correlations(
 
     Without pairs of which both begin with `but_of`, if it is given.
     """
-    rows = evidence.rows("correlations", approach, scheme)
+    rows = data.rows("correlations", approach, scheme)
     one, other = rows["parameter_1"].astype(str), rows["parameter_2"].astype(str)
     chosen = (one != other) & one.str.startswith(first) & other.str.startswith(second)
     if but_of:
@@ -296,34 +296,34 @@ def correlations(
     return rows["adjustment"][chosen].abs().to_numpy(float)
 
 
-def scale_pairs(evidence: ClaimData, approach: str, scheme: str = "") -> Array:
+def scale_pairs(data: ClaimData, approach: str, scheme: str = "") -> Array:
     """Mean |correlation| of each pair of scales."""
-    return correlations(evidence, approach, scheme, "s_", "s_")
+    return correlations(data, approach, scheme, "s_", "s_")
 
 
-def scale_correlation(evidence: ClaimData) -> Numbers:
+def scale_correlation(data: ClaimData) -> Numbers:
     """Mean correlation of the scales, gravity-based, and its range over the schemes."""
-    means = evidence.single_simulations("scale-correlation-gravity")["mean"]
-    value = float(scale_pairs(evidence, "gravity").mean())
+    means = data.single_simulations("scale-correlation-gravity")["mean"]
+    value = float(scale_pairs(data, "gravity").mean())
     return {"value": value, "least": means.min(), "most": means.max()}
 
 
-def scale_correlation_ratio(evidence: ClaimData) -> Numbers:
+def scale_correlation_ratio(data: ClaimData) -> Numbers:
     """Mean correlation of the scales, gravity-based over robot-aided."""
-    pairs = {approach: scale_pairs(evidence, approach) for approach in APPROACHES}
+    pairs = {approach: scale_pairs(data, approach) for approach in APPROACHES}
     means = {approach: float(each.mean()) for approach, each in pairs.items()}
     ends = {"least": pairs["robot"].min(), "most": pairs["robot"].max()}
     return {"value": means["gravity"] / means["robot"], **means, **ends}
 
 
-def largest_correlation(evidence: ClaimData, **pairs: str) -> Numbers:
+def largest_correlation(data: ClaimData, **pairs: str) -> Numbers:
     """Largest gravity-based correlation of pairs as in `correlations`."""
-    return {"value": float(correlations(evidence, **pairs).max())}
+    return {"value": float(correlations(data, **pairs).max())}
 
 
-def truth_over_sd(evidence: ClaimData, effect: str) -> Numbers:
+def truth_over_sd(data: ClaimData, effect: str) -> Numbers:
     """True parameters of an effect over their mean sd a posteriori, gravity-based."""
-    rows = mean_sd(evidence, effect)
+    rows = mean_sd(data, effect)
     ratios = (rows["truth"] / rows["sd"]).to_numpy()
     value = float(np.exp(np.log(ratios).mean()))
     half = Z95 * value * float((rows["se"] / rows["sd"]).mean())
@@ -331,9 +331,9 @@ def truth_over_sd(evidence: ClaimData, effect: str) -> Numbers:
     return estimate(value, half, orders_off=orders_off, **dict(zip("xyz", ratios, strict=True)))
 
 
-def sd_a_posteriori(evidence: ClaimData, effect: str) -> Numbers:
+def sd_a_posteriori(data: ClaimData, effect: str) -> Numbers:
     """Mean sd a posteriori of an effect's parameters, gravity-based, also in % of the truth."""
-    rows = mean_sd(evidence, effect)
+    rows = mean_sd(data, effect)
     value, half = float(rows["sd"].mean()), Z95 * float(rows["se"].mean())
     return estimate(value, half, percent=100 * value / rows["truth"].min())
 
@@ -341,15 +341,15 @@ def sd_a_posteriori(evidence: ClaimData, effect: str) -> Numbers:
 # --- slips ---------------------------------------------------------------------------------------
 
 
-def redundancy(evidence: ClaimData) -> Numbers:
+def redundancy(data: ClaimData) -> Numbers:
     """Redundancy with the robot; that without it stands where the paper's number does."""
     paper, value = (
-        float(evidence.rows("cells", approach)["redundancy"].iloc[0]) for approach in APPROACHES
+        float(data.rows("cells", approach)["redundancy"].iloc[0]) for approach in APPROACHES
     )
     return {"paper": paper, "value": value}
 
 
-def misclosure_as_printed(evidence: ClaimData, at_roll: float) -> Numbers:
+def misclosure_as_printed(data: ClaimData, at_roll: float) -> Numbers:
     """Misclosure, gon, of a perfect sensor in the first condition of equation (10)."""
-    force = specific_force(at_roll * GON, 0.0, evidence.study.gravity_mps2)
+    force = specific_force(at_roll * GON, 0.0, data.study.gravity_mps2)
     return {"value": float(np.arctan2(force[1], -force[2]) / GON - at_roll)}

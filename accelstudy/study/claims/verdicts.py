@@ -42,16 +42,16 @@ def judge_claims(
     provenance : see `accelstudy.files.tables.origin`
     """
     read = {name: read_table(tables[name]) for name in TABLES}
-    evidence = ClaimData(study, read, read_table(estimates, ESTIMATED))
-    claims = judge(evidence)
+    data = ClaimData(study, read, read_table(estimates, ESTIMATED))
+    claims = judge(data)
     write_table(outputs["claims"], claims, provenance)
-    write_table(outputs["by_scheme"], evidence.by_scheme, provenance)
+    write_table(outputs["by_scheme"], data.by_scheme, provenance)
     with whole_file(outputs["html"]) as path:
-        path.write_text(claims_page(claims, evidence.by_scheme), encoding="utf-8")
+        path.write_text(claims_page(claims, data.by_scheme), encoding="utf-8")
 
 
-def judge(evidence: ClaimData) -> pd.DataFrame:
-    """Judge all claims by all evidence.
+def judge(data: ClaimData) -> pd.DataFrame:
+    """Judge all claims by all data.
 
     Returns
     -------
@@ -60,15 +60,15 @@ def judge(evidence: ClaimData) -> pd.DataFrame:
         ci95_low and ci95_high, verdict, sentence, and of single simulations single_low, single_high
         and percentile, NaN where they are not asked for.
     """
-    return pd.DataFrame([judge_claim(claim, evidence) for claim in claim_table()["paper"]])
+    return pd.DataFrame([judge_claim(claim, data) for claim in claim_table()["paper"]])
 
 
-def judge_claim(claim: Mapping[str, Any], evidence: ClaimData) -> dict[str, Any]:
+def judge_claim(claim: Mapping[str, Any], data: ClaimData) -> dict[str, Any]:
     """Judge a claim; return its row."""
     ((name, arguments),) = claim["quantity"].items()
     numbers: Numbers = dict.fromkeys(("low", "high", *SINGLE), np.nan)
     numbers["paper"] = float(claim.get("paper", "nan"))
-    numbers |= getattr(quantities, name)(evidence, **arguments)
+    numbers |= getattr(quantities, name)(data, **arguments)
     sentence = claim["sentence"].format(**numbers)
     verdict = SLIP
     if rule := claim.get("rule"):

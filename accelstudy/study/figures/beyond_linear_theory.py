@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from accelstudy.drawing import style
 from accelstudy.study.figures.factors import NOISES
@@ -117,8 +118,6 @@ def bias_and_excess(cells: DataFrame, summary: DataFrame) -> DataFrame:
         of linear theory, less 1), and `bias_half` and `excess_half`: half the width of intervals
         that hold all numbers of their column together with a probability of 95 %.
     """
-    from scipy import special
-
     compared = (cells["control"] == "linear") & (cells["n_converged"] > 1)
     compared &= cells["gravity_error_mps2"] == 0
     rows = summary[summary["cell"].isin(cells["cell"][compared])]
@@ -130,6 +129,6 @@ def bias_and_excess(cells: DataFrame, summary: DataFrame) -> DataFrame:
     rows = rows.assign(bias=rows["bias"] / rows["sd_empirical"], excess=relative - 1)
     known = np.isfinite(errors["bias"]) & np.isfinite(errors["excess"])
     both_tails = 0.05 / max(int(known.sum()), 1)
-    sigmas = special.stdtrit(rows["n_converged"] - 1, 1 - both_tails / 2)
+    sigmas = scipy.special.stdtrit(rows["n_converged"] - 1, 1 - both_tails / 2)
     halves = {f"{name}_half": sigmas * error for name, error in errors.items()}
     return rows.assign(**halves)[known]

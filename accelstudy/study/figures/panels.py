@@ -138,12 +138,11 @@ def by_cell(table: DataFrame, column: str) -> dict[str, float]:
 
 def in_shown_units(table: DataFrame, *columns: str) -> DataFrame:
     """Table whose columns, in the recorded unit of the column `unit`, are in the units shown."""
-    factors = {unit: float(style.in_shown_unit(1.0, unit)[0]) for unit in table["unit"].unique()}
+    shown = {unit: style.in_shown_unit(1.0, unit) for unit in table["unit"].unique()}
+    factors = {unit: float(factor) for unit, (factor, _) in shown.items()}
     factor = table["unit"].map(factors).astype(float)
     numbers = {name: table[name].astype(float) * factor for name in columns}
-    return table.assign(
-        **numbers, unit=[style.in_shown_unit(1.0, unit)[1] for unit in table["unit"]]
-    )
+    return table.assign(**numbers, unit=[shown[unit][1] for unit in table["unit"]])
 
 
 def in_group_order(table: DataFrame) -> DataFrame:
