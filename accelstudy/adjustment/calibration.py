@@ -86,7 +86,7 @@ def whitened_jacobian(
 
 @dataclass(frozen=True)
 class CalibrationProblem:
-    """Observed sessions in the form in which `adjust` takes them.
+    """Observed sessions as the linearised problem that `adjust` solves.
 
     `observed` holds the forces (R, n, 3) and, if the approach uses them, the angles (R, n, 2).
     `direct` holds what is known of the parameters directly, (R, u), and `weights` (u,) its weights:
@@ -106,7 +106,7 @@ class CalibrationProblem:
     def of(
         cls, model: SensorModel, approach: Approach, observed: Observations
     ) -> CalibrationProblem:
-        """Arrange what was observed."""
+        """Arrange the observations of sessions for the adjustment."""
         forces = np.asarray(observed.forces, dtype=float)
         n = forces.shape[1]
         common = observed.common if approach.uses_angles else None
@@ -151,7 +151,7 @@ class CalibrationProblem:
 
     @property
     def with_gravity(self) -> bool:
-        """Whether gravity is observed, and the last of the parameters."""
+        """Whether gravity is an observation, and with that the last parameter."""
         return self.conditions.equations.estimates_gravity
 
     @cached_property
@@ -211,7 +211,7 @@ class Block:
 
     @classmethod
     def of(cls, result: Adjustment) -> Block:
-        """Take from an adjustment what a study needs."""
+        """Reduce an adjustment to the numbers that a study needs."""
         q = result.cofactors[result.converged]
         sigma = np.sqrt(np.diagonal(q, axis1=1, axis2=2))
         return cls(

@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-6
-"""Convergence: the last step is below this fraction of a standard deviation."""
+"""Fraction of a standard deviation below which the last step of a converged replicate is."""
 ROUNDING = 64
-"""The last step need not be below so many roundings of the largest observation."""
+"""Roundings of the largest observation below which the last step need not be."""
 PIVOT_TOLERANCE = 1e-12
-"""A normal matrix, scaled to unit diagonal, is singular when a Cholesky pivot is below this."""
+"""Cholesky pivot of a normal matrix, scaled to unit diagonal, below which it is singular."""
 
 # glibc returns freed blocks above a threshold to the system. To fetch them again page by page in
 # each iteration takes a quarter of the time. One large block that is freed untouched raises the
@@ -318,7 +318,7 @@ def _factor_and_design(at: Linearisation, bq: Array) -> tuple[Array, Array]:
 
 
 def _times(b: Array, q: Array) -> Array:
-    """B Q, (c, o, R, n)."""
+    """Product B Q, (c, o, R, n)."""
     return b * q[:, None] if q.ndim == 2 else np.einsum("corn,opn->cprn", b, q)
 
 

@@ -37,7 +37,7 @@ class RandomEffects:
 
     @cached_property
     def scatter(self) -> float:
-        """Additional scatter, an sd."""
+        """Standard deviation of the additional scatter."""
         return self._scatter_of(self.dof) if self.dof else 0.0
 
     @cached_property
@@ -75,7 +75,7 @@ class RandomEffects:
         return low, high
 
     def _scatter_of(self, squares: float) -> float:
-        """Scatter with which the weighted squares are as many as given."""
+        """Scatter with which the weighted squares have a given sum."""
         if self.squares(0.0) <= squares:
             return 0.0
         most = float(np.ptp(self.values))

@@ -1,1 +1,1 @@
-"""The functions for programs: few, and thin over the rooms that do the work."""
+"""The classes of results that the public functions return, and how their arguments are read."""

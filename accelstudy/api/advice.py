@@ -1,4 +1,4 @@
-"""Advice in a running session."""
+"""The result of `accelstudy.advise`: advice in a running session."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from accelstudy.sequential.promise import Promise
 from accelstudy.sequential.running import read_as_it_is
 
 TYPES = (".yaml", ".yml")
-"""Endings of files of a type."""
+"""Endings of a file that describes a type of sensors."""
 
 
 class SessionAdvice(Result):
@@ -181,7 +181,7 @@ class Adviser:
 
 
 def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:
-    """What an earlier calibration, or a type, says; None without one."""
+    """Prior knowledge by an earlier calibration or a type of sensors; None without either."""
     if given is None:
         return None
     if given.suffix in TYPES:

@@ -1,4 +1,4 @@
-"""Calibrations of a program."""
+"""The result of `accelstudy.calibrate`, and how campaigns and models are named by a program."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Calibration(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What its user should know, of the campaign and of the calibration."""
+        """Warnings of the campaign and of the calibration."""
         return (*self.content["warnings"], *self.content["quality"]["warnings"])
 
     @property
@@ -243,5 +243,5 @@ def resolve(
 
 
 def fit_of(campaign: Any, model: str, approach: str | None, prior: Any = None) -> CampaignFit:
-    """Adjust a campaign, of which the keywords of `calibrate` say how."""
+    """Adjust a campaign by the keywords of `calibrate`."""
     return fit_campaign(*resolve(campaign, model, approach, prior))

@@ -1,4 +1,4 @@
-"""Campaigns of a program: found in logs, or simulated."""
+"""Campaigns that are found in logs, or simulated, for the public functions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _NUMBER = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 
 @dataclass(frozen=True)
 class Import:
-    """Logs, and how campaigns are made of them.
+    """Log files, and the settings by which campaigns are made of them.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ def settings_of(
 
 
 def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
-    """Files that are meant by files, folders and patterns.
+    """Files named by paths of files and folders, and by patterns.
 
     Those of a folder or a pattern come in the order of their names, and pos2 before pos10. So do
     files in the order of the alphabet, which is how a shell lists them.

@@ -1,4 +1,4 @@
-"""Diagnoses of a program."""
+"""The result of `accelstudy.diagnose`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from accelstudy.sensors.frames import FRD, axes_note
 
 
 class Diagnosis(Result):
-    """What a campaign says that a model lacks.
+    """A diagnosis: which effects, seen in a campaign, a model lacks.
 
     Attributes
     ----------

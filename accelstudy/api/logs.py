@@ -1,4 +1,4 @@
-"""Logs of a program: a file, or a table in memory, and how it is read."""
+"""The result of `accelstudy.read_log`: a file or a table in memory, and its layout."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from accelstudy.pages.notebook import notebook_html
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Log:
-    """A log, and how it is read; the numbers of a file stay there until they are needed.
+    """A log with its layout; the numbers of a file are read when they are needed.
 
     Attributes
     ----------

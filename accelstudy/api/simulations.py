@@ -1,4 +1,4 @@
-"""A study in memory."""
+"""The result of `accelstudy.simulate`: a study in memory."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
     "scheme": ("schemes", get_scheme),
     "approach": ("approaches", get_approach),
 }
-"""What there may be several of: its key in a grid of a study, and what a name stands for."""
+"""Arguments that may be several: the key in a grid of a study, and the lookup of a name."""
 
 
 class Simulation(Result):

@@ -32,9 +32,9 @@ Columns = Mapping[str, Sequence[Any]]
 """The table of positions as it is in its file, by name: text from CSV, values from Parquet."""
 
 MOST_NAMED = 5
-"""Unknown columns of which each has a line."""
+"""Largest number of unknown columns with a warning each."""
 MAX_GRAVITIES = 1000
-"""Times gravity; a mean beyond it is no measurement."""
+"""Multiple of gravity beyond which a mean is no measurement."""
 _OF_HEADER = {
     "name": "name",
     "sensor": "sensor",
@@ -385,7 +385,7 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
 
 
 def _content_of(campaign: Campaign) -> dict[str, Any]:
-    """Content of `campaign.yaml`; what it does not say is None, or empty."""
+    """Content of `campaign.yaml` for a campaign."""
     content: dict[str, Any] = {"schema_version": 1}
     for attribute, key in _OF_HEADER.items():
         value = getattr(campaign, attribute)

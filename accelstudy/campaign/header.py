@@ -112,7 +112,7 @@ COLUMNS = {
 documented."""
 KNOWN = tuple(name for column in COLUMNS.values() for name in column.names)
 FORMER = tuple(f"{what}_f{axis}" for what in ("slope", "sd_slope") for axis in "xyz")
-"""Columns of files that earlier versions wrote, and that are left out without a word."""
+"""Columns that earlier versions wrote; they are ignored without a warning."""
 
 
 Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
@@ -130,7 +130,7 @@ def _delimiter(value: Any) -> Any:
 
 
 def _usual_spelling(*units: str) -> Callable[[Any], Any]:
-    """What reads a unit by any spelling that the name of a column may have: m/s2, µs."""
+    """Make a validator that takes a unit in any usual spelling: m/s2, µs."""
 
     def read(value: Any) -> Any:
         unit = parse_unit(value) if isinstance(value, str) else None
@@ -143,7 +143,7 @@ _IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
 
 
 class LogLayout(ConfigSection):
-    """How the numbers of a log are read: what `import` was told, and `apply` needs again.
+    """Layout of a log: how `import` read its numbers, and `apply` reads them again.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """
@@ -178,7 +178,7 @@ class LogLayout(ConfigSection):
 
     @property
     def axes(self) -> Frame:
-        """The frame."""
+        """Frame of the axes of the log."""
         return parse_frame(self.frame)
 
 
@@ -210,7 +210,7 @@ class _Gravity(ConfigSection):
 
 
 class _SensorNoise(ConfigSection):
-    """A-priori noise of the sensor; without it, the residuals tell it."""
+    """A-priori noise of the sensor; without it the noise is estimated from the residuals."""
 
     sigma_mps2: SigmaForce = Field(description="standard deviation of a position mean, per axis")
     degrees_of_freedom: Positive | None = Field(
@@ -219,7 +219,7 @@ class _SensorNoise(ConfigSection):
 
 
 class _Robot(ConfigSection):
-    """The robot; exactly when the table has its angles."""
+    """The robot, whose section stands in the header exactly if the table has angles."""
 
     angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
 

@@ -1,4 +1,4 @@
-"""A calibrated sensor beside the one that is calibrated, which tells roll and pitch of each hold.
+"""A reference sensor: it is calibrated, and gives roll and pitch of each hold.
 
 Its readings have noise, independent from hold to hold. Its calibration has errors, the same in all
 holds: with the covariance matrix C = L Lᵀ of its parameters they are J L c, with the derivatives J
@@ -27,7 +27,7 @@ MIN_POLE_DISTANCE = 1e-4
 
 
 class ReferenceSensor(ConfigSection):
-    """A calibrated sensor whose roll and pitch the table has; instead of a robot."""
+    """A reference sensor, whose roll and pitch stand in the table of positions."""
 
     calibration: str = Field(description="campaign of its calibration")
     frame: Annotated[str, AfterValidator(lambda name: parse_frame(name).name)] = Field(
@@ -48,12 +48,12 @@ class ReferenceSensor(ConfigSection):
 
     @property
     def model(self) -> SensorModel:
-        """Its sensor model."""
+        """Sensor model of the reference."""
         return compose("+".join(self.effects), tuple(self.effects))
 
     @property
     def axes(self) -> Frame:
-        """The frame."""
+        """Frame of the axes of the reference."""
         return parse_frame(self.frame)
 
     @cached_property

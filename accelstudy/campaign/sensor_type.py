@@ -1,4 +1,4 @@
-"""What other sensors of a type tell of the next one: the file that `accelstudy lot` writes."""
+"""Prior knowledge of a sensor by others of its type: the file that `accelstudy lot` writes."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ TYPE_FILE = "type.yaml"
 TYPE_KEYS = ("schema_version", "models", "sensors", "parameters", "plugins")
 """Keys of a file of a type that data sheets do not have."""
 MIN_SENSORS = 5
-"""Sensors whose scatter tells how far the next one may be away."""
+"""Least number of sensors whose scatter is a prior for the next one."""
 
 
 @dataclass(frozen=True)
 class SensorType:
-    """What sensors of a type tell of the next one.
+    """Prior knowledge of a sensor by others of its type.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class TypicalParameter(BaseModel):
 
 
 class TypeFile(BaseModel):
-    """What is known of the next sensor of a type, beside the keys of a data sheet."""
+    """Content of a file of a type, without the keys of a data sheet."""
 
     schema_version: Annotated[Literal[1], Number] = Field(description="of this format")
     models: dict[str, Any] = Field(description="model of the type, without sudden effects")
@@ -71,7 +71,7 @@ class TypeFile(BaseModel):
 
 
 def read_type(path: str | Path, model: SensorModel) -> SensorType:
-    """Read what is known of the next sensor of a type.
+    """Read prior knowledge of a sensor from the file of its type.
 
     Raises
     ------
@@ -102,5 +102,5 @@ def read_type(path: str | Path, model: SensorModel) -> SensorType:
 
 
 def with_type(campaign: Campaign, path: str | Path | None, model: SensorModel) -> Campaign:
-    """Campaign of a sensor whose type is known; as it is if there is no file of its type."""
+    """Add prior knowledge by the file of a type to a campaign, if there is such a file."""
     return campaign if path is None else replace(campaign, sensor_type=read_type(path, model))

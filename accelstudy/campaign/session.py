@@ -111,12 +111,12 @@ class Campaign:
 
     @property
     def prior(self) -> str | None:
-        """File that tells what is known a priori; None if there is none."""
+        """Path of the file with prior knowledge; None if there is none."""
         return None if self.sensor_type is None else self.sensor_type.file
 
     @property
     def hold(self) -> HoldConditions:
-        """What is known of the holds besides the forces, as the effects take it."""
+        """Conditions of the holds, such as time and temperature, as the effects take them."""
         # The position before a hold acts on it, whether that position is used or not.
         whole, used = self._rows()
         session = HoldConditions(time=whole.get("time"), temperature=whole.get("temperature"))

@@ -30,7 +30,7 @@ from accelstudy.simulation.sessions import Noise, session
 Array = NDArray[np.float64]
 
 STREAMS = ("sensor", "effects", "order", "noise", "sd", "gross")
-"""What is drawn. Each has its own stream of random numbers, so that none changes another."""
+"""Streams of random numbers, one for each kind of draw, so that none changes another."""
 
 ORDERS = ("scheme", "random")
 

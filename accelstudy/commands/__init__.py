@@ -1,1 +1,1 @@
-"""The command line: a file each for a command and its options."""
+"""The command line: commands made of the public functions."""

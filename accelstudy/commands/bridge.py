@@ -224,7 +224,7 @@ def inputs_of(verb: Callable[..., Any], given: Mapping[str, Any]) -> list[Path]:
 
 
 def _paths(value: Any) -> list[Path]:
-    """Paths that were given."""
+    """Paths among the arguments of a command."""
     if isinstance(value, tuple):
         return [path for one in value for path in _paths(one)]
     return [value] if isinstance(value, Path) else []

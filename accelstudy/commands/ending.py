@@ -1,4 +1,4 @@
-"""How a command ends that something stops: one line on standard error, and an exit status."""
+"""Errors and interruptions of a command: one line on standard error, and an exit status."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import click
 from accelstudy.basics.errors import InputError
 
 INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
+"""Exit status of a command that Ctrl-C ended, by the convention of shells."""
 
 
 @contextmanager

@@ -16,7 +16,7 @@ LEVELED = (
     "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the calibrated force in "
     "frd (guide 'On a device'); `accelstudy apply` gives them with their sigmas"
 )
-"""What to do instead of `--level`."""
+"""Replacement of the option `--level`, which earlier versions had."""
 
 
 def run_check_sigmas(**given: Any) -> None:

@@ -54,7 +54,7 @@ def per_axis(name: str, unit: str, symbol: str) -> tuple[Parameter, ...]:
 
 
 def after(when: Number, moment: Number, xp: Any) -> Number:
-    """1 after a moment, 0 before."""
+    """Step function of time: 1 after a moment, 0 before it."""
     sign = xp.sign(when - moment)
     return (sign + xp.abs(sign)) / 2
 
@@ -97,12 +97,12 @@ class Effect(WithSettings):
 
     @property
     def is_course(self) -> bool:
-        """Whether the sensor changes with time or temperature by it, whatever the attitude."""
+        """Whether the effect changes with time or temperature, in any attitude."""
         return self.part == "sensor" and (self.family in COURSES or self.sudden)
 
     @property
     def equation(self) -> str:
-        """What the effect adds, for people."""
+        """Formula of the effect, for people."""
         output, axes, reading = expressions(self)
         parts = (*output, *(part for row in axes for part in row), *reading)
         texts = [_text(part) for part in parts if part]
@@ -154,7 +154,7 @@ class Effect(WithSettings):
         return (self,)
 
     def possible(self, hold: HoldConditions) -> bool:
-        """Whether its settings can be, as far as the holds tell."""
+        """Whether the settings of the effect are possible in given holds."""
         return True
 
     def between(self, other: Effect, hold: HoldConditions) -> Sequence[Effect]:

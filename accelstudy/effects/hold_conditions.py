@@ -16,7 +16,7 @@ REFERENCE_TEMPERATURE = 20.0
 MIN_STEP = 0.02
 """m/s², a change of force from hold to hold below this counts as noise and not as a step."""
 OF_ALL = ("course", "full_range")
-"""Attributes of `HoldConditions` that are one for the whole session."""
+"""Attributes of `HoldConditions` with one value for the whole session."""
 
 
 @dataclass(frozen=True)

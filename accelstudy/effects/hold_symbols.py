@@ -1,4 +1,4 @@
-"""What is known of the holds, as symbols."""
+"""The conditions of holds as symbols."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ TARGETS = {
 }
 """What depends on the coordinate, with its components and their unit."""
 OF_EACH = ("force", "previous")
-"""Coordinates that each axis has its own of."""
+"""Coordinates of which each axis has its own."""
 
 
 class Learned(Effect):
@@ -87,12 +87,12 @@ class Learned(Effect):
 
     @property
     def words(self) -> Mapping[str, str]:
-        """Coordinate and target, as the spec has them."""
+        """Coordinate and target in the words of the spec."""
         return {"coordinate": self.coordinate, "target": self.target}
 
     @property
     def equation(self) -> str:
-        """What it adds, for people."""
+        """Formula of the learned function, for people."""
         of = "h_i(c), c the " + self.coordinate
         times = {"scale": " f_i", "square": " f_i²", "nonorthogonality": " f_j", "mounting": " × f"}
         return of.replace(",", times.get(self.target, "") + ",", 1)
@@ -151,7 +151,7 @@ class Learned(Effect):
         return [sine - mean if mean else sine for sine, mean in all_of_them]
 
     def _of(self, c: Number, p: Sequence[Number], xp: Any) -> Number:
-        """Return h of a coordinate, by its weights."""
+        """Evaluate h at a coordinate with given weights."""
         return sum(w * phi for w, phi in zip(p, self._functions(c, xp), strict=True))
 
     def _parts(self, p: Sequence[Number]) -> list[Sequence[Number]]:

@@ -26,7 +26,7 @@ class ThermalBias(Effect):
 
     @property
     def equation(self):
-        """What it adds; the lag is named where there is one."""
+        """Formula of the effect; it names the lag if there is one."""
         lag = "b_T,i (T_τ − T0), T_τ behind T by the lag τ"
         return lag if self.settings["tau"] else "b_T,i (T − T0)"
 

@@ -1,1 +1,1 @@
-"""Calibrations of one sensor at several times, and whether it is still what it was."""
+"""Calibrations of one sensor at several times: comparison of two, history of more."""

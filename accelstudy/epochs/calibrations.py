@@ -42,11 +42,11 @@ from accelstudy.simulation.sessions import Noise
 Array = NDArray[np.float64]
 
 STATES = {True: "unchanged", False: "changed"}
-"""States by whether the calibrations agree, as `pages.BADGES` has them."""
+"""States of a result by whether the calibrations agree."""
 POSITIONS = 60
 """Attitudes of the calibration that leaves out effects."""
 STEP = 1e-2
-"""Step of its derivatives, of the sigmas."""
+"""Step of numerical derivatives, in sigmas."""
 GOLDEN = (np.sqrt(5) - 1) / 2
 PANELS = 3
 """Panels side by side."""
@@ -75,7 +75,7 @@ class Calibrations(Result):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters that all have."""
+        """Parameters that all calibrations have."""
         return self.model.parameters
 
     @property
@@ -89,7 +89,7 @@ class Calibrations(Result):
         return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
 
     def left_out(self, one: SensorCalibration) -> list[str]:
-        """Effects that a calibration has, and another one lacks."""
+        """Effects of a calibration that the common model lacks."""
         common = [effect.spec for effect in self.model.effects]
         return [effect.spec for effect in one.model.effects if effect.spec not in common]
 
@@ -101,7 +101,7 @@ class Calibrations(Result):
     @property
     @abstractmethod
     def statements(self) -> Sequence[tuple[str, ...]]:
-        """What each parameter does, in words."""
+        """Changes of each parameter, in words."""
 
     def _write(self, folder: Path, figures: Mapping[str, Callable[[], Figure]]) -> None:
         """Write the page with figures, and the JSON file."""

@@ -31,7 +31,7 @@ from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.pages import render_lines
 
 MIN_DIFFERENCE = 1e-12
-"""rad, difference that is rounding alone."""
+"""rad, largest difference that rounding may cause."""
 
 
 class Comparison(Calibrations):

@@ -23,20 +23,17 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize, special, stats
 from scipy.stats import qmc
 
+from accelstudy.adjustment.quality import noncentrality
 from accelstudy.positions.choice import first_best
 
 Array = NDArray[np.float64]
 
 LEVEL = 0.05
 """Level of the test, and of the search for what changed as a whole."""
-POWER = 0.8
-"""Probability with which a detectable change is found."""
 POINTS = 10
 """Binary logarithm of the number of variances that are tried for each estimated one."""
 MIN_PROBABILITY = 1e-300
-"""Probability of which there is a logarithm."""
-MIDPOINTS = 200
-"""Number of variances in the power of a test that has estimated one."""
+"""Least probability of which the logarithm is taken."""
 FREEDOM_TOLERANCE = 1e-7
 """Relative error of ν and of the quantile that it follows from."""
 STATISTIC_TOLERANCE = 1e-9
@@ -60,7 +57,7 @@ class Test:
 
     @property
     def congruent(self) -> bool:
-        """Whether nothing has to have changed."""
+        """Whether the differences are compatible with no change."""
         return self.p_value >= LEVEL
 
 
@@ -144,29 +141,13 @@ class Differences:
     def detectable(self) -> Array:
         """Changes (p,) of one parameter alone that the test finds with a probability of `POWER`."""
         p, nu = self.test.dof
-        return np.sqrt(noncentrality(p, nu) / np.diag(np.linalg.inv(self.covariance)))
+        size = noncentrality(p, LEVEL, noise_dof=nu)
+        return np.sqrt(size / np.diag(np.linalg.inv(self.covariance)))
 
     def _explains_most(self, left: Sequence[int]) -> int:
         """Place of the parameter without which the others are the most congruent."""
         rest = [np.sum(self.of([i for i in left if i != one])._split[0]) for one in left]
         return first_best(rest, STATISTIC_TOLERANCE * rest[0])
-
-
-def noncentrality(p: int, nu: float, level: float = LEVEL) -> float:
-    """Noncentrality of a change that a test with p and ν degrees of freedom finds with `POWER`."""
-    if np.isinf(nu):
-        limit = stats.chi2.isf(level, p)
-    else:  # by the mean over χ²(ν): the noncentral F of SciPy has no numbers for some ν
-        evenly = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
-        limit = p * stats.f.isf(level, p, nu) * stats.chi2.ppf(evenly, nu) / nu
-
-    def missed(size: float) -> float:
-        return float(np.mean(stats.ncx2.cdf(limit, p, size))) - (1 - POWER)
-
-    most = 1e4
-    while missed(most) > 0:
-        most *= 10
-    return float(optimize.brentq(missed, 1e-6, most))
 
 
 def dof_of_squares(

@@ -27,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, optimize, stats
 
+from accelstudy.adjustment.quality import POWER, noncentrality
 from accelstudy.adjustment.random_effects import RandomEffects
-from accelstudy.epochs.congruence import LEVEL, POWER, dof_of_squares, f_tail, noncentrality
+from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class ParameterCourse:
 
     @cached_property
     def mean(self) -> RandomEffects:
-        """The same without a rate."""
+        """Mean value, as of `line` without a rate."""
         return RandomEffects(self.values, self.variances, np.ones((len(self.years), 1)))
 
     @property
@@ -123,7 +124,7 @@ class ParameterCourse:
         return self._exceeds(self.mean, level), self.rate.p_value, self._exceeds(self.line, level)
 
     def found(self, level: float) -> tuple[str, ...]:
-        """What it does, at some level: it drifts, scatters, both, or changed in an unknown way."""
+        """Findings at some level: drifts, scatters, both, or changed; empty for none."""
         change, drift, scatter = (p <= level for p in self.p_values(level))
         if not change:
             return ()
@@ -135,7 +136,7 @@ class ParameterCourse:
         other = self._other_dof(self.mean, level)
         # Squares about the mean that a rate of 1 adds.
         each = RandomEffects(self.years, self.variances, self.mean.design).squares(0.0)
-        return float(np.sqrt(noncentrality(self.mean.dof, other, level) / each))
+        return float(np.sqrt(noncentrality(self.mean.dof, level, noise_dof=other) / each))
 
     def detectable_scatter(self, level: float) -> float:
         """Scatter that by itself is found to be a change with a probability of `POWER`.

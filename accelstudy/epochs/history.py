@@ -93,7 +93,7 @@ class History(Calibrations):
 
     @cached_property
     def courses(self) -> tuple[ParameterCourse, ...]:
-        """Each parameter over time."""
+        """Courses of the parameters over time."""
         years = [(date - self.dates[-1]).total_seconds() / YEAR for date in self.dates]
         each = zip(self.estimates.T, np.square(self.sigmas).T, strict=True)
         return tuple(ParameterCourse(np.array(years), *parameter, self.dof) for parameter in each)
@@ -230,7 +230,7 @@ class History(Calibrations):
 
     @property
     def _at(self) -> NDArray[np.datetime64]:
-        """Dates as figures take them."""
+        """Dates for the axis of a figure."""
         return np.array(self.dates, dtype="datetime64[us]")
 
     def _draw_line(self, ax: Axes, k: int) -> None:

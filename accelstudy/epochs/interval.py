@@ -33,13 +33,13 @@ Array = NDArray[np.float64]
 DRAWS = 4000
 SEED = 1
 MAX_YEARS = 10.0
-"""Years beyond which nothing is promised."""
+"""Years after the last calibration up to which a date is given."""
 SHOWN_YEARS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 """Years at which errors are told."""
 WRONG = "#C2247A"
-"""Colour of what must not be exceeded."""
+"""Colour of the accuracy that must not be exceeded."""
 LINE_POINTS = 50
-"""Points of a line."""
+"""Number of points of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Interval:
     confidence: float
 
     def error(self, years: float) -> float:
-        """Tilt error that is not exceeded with the probability, so many years later, rad."""
+        """Tilt error after some years that is not exceeded with the probability, rad."""
         a, b, c = self._squares
         larger = np.max(a + b * years + c * years**2, axis=1)
         return float(np.sqrt(np.quantile(np.maximum(larger, 0.0), self.confidence)))

@@ -59,12 +59,12 @@ class Tilt:
     causes: tuple[str, ...]
 
     def with_noise(self, factor: float) -> Tilt:
-        """The same with the noise of all observations multiplied by a factor."""
+        """Return the tilt with the noise of all observations multiplied by a factor."""
         factors = np.array([factor if cause == NOISE else 1.0 for cause in self.causes])
         return replace(self, form=self.form * np.outer(factors, factors))
 
     def of(self, cause: str) -> Tilt:
-        """What one cause leaves by itself."""
+        """Return the tilt that one cause leaves by itself."""
         own = [i for i, each in enumerate(self.causes) if each == cause]
         return Tilt(self.form[:, own][:, :, own], (cause,) * len(own))
 

@@ -1,1 +1,1 @@
-"""Lots: what many sensors of one type say together about what their model lacks."""
+"""Lots: many sensors of one type, evaluated together for the effects that their model lacks."""

@@ -26,16 +26,16 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 DRAWS = 1000
-"""Sets of residuals without any effect, of each campaign."""
+"""Number of simulated sets of residuals without any effect, for each campaign."""
 MIN_VARIANCE = 1e-300
-"""Variance that can be divided by."""
+"""Least variance that is divided by."""
 COMMON = f"{UNKNOWN}(position → reading)"
-"""Name of what the mean of all sensors shows, whatever it is."""
+"""Name of an unnamed effect that the mean of all sensors shows."""
 
 
 @dataclass(frozen=True)
 class SensorEvidence:
-    """What one campaign says, as log odds against nothing.
+    """Evidence of one campaign, as log odds against nothing missing.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ def _same(sensors: Iterable[SensorEvidence], one: str, other: str) -> bool:
 
 
 def name_words(name: str) -> str:
-    """Name in words."""
+    """Name of an effect, or of something unknown, in words."""
     if not name.startswith(UNKNOWN):
         return words(name)
     return f"something without a name {name.removeprefix(UNKNOWN)}"

@@ -31,7 +31,7 @@ from accelstudy.sensors.sensor import SensorModel
 LEVEL_OF_REST = 0.01
 """Level of the test whether the model of a lot lacks more than what was found."""
 MAX_PASSES = 3
-"""Most times that what was found is added to the model."""
+"""Largest number of passes that add effects to the model."""
 
 
 @dataclass(frozen=True, eq=False)

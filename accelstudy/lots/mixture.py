@@ -240,7 +240,7 @@ def _with(names: Names, name: str) -> Names:
 
 
 def _subsets(names: Names) -> list[Names]:
-    """What a sensor may have of some effects: at most two."""
+    """Subsets of some effects that a sensor may have: up to two effects."""
     return [s for r in range(min(len(names), 2) + 1) for s in combinations(names, r)]
 
 
@@ -252,7 +252,7 @@ def _nodes(size: int) -> tuple[Array, Array]:
 
 
 def _log_of_rest(share: Array) -> Array:
-    """Log of the share that does not have an effect, −inf where all do."""
+    """Logarithm of 1 − share; −inf where the share is 1."""
     with np.errstate(divide="ignore"):
         return np.log1p(-share)
 

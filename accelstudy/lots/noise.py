@@ -26,23 +26,23 @@ from accelstudy.diagnosis.rules import RULES
 Array = NDArray[np.float64]
 
 LEAST_SIGMA = 1e-9
-"""m/s², of readings that are their own model."""
+"""m/s², least noise, for readings without any residual."""
 FREEDOMS = (RULES.freedom_given, 60.0, 20.0, 8.0, RULES.freedom_doubted)
-"""ν of a lot, the most first; with the last one sensors have nothing in common."""
+"""Values of ν to choose from; with the last one the sensors have nothing in common."""
 MIN_LOG_RATIO = 1.0
-"""Difference of log likelihoods that says nothing."""
+"""Difference of log likelihoods below which neither of two explanations is preferred."""
 ODD_SHARE, ODD_FREEDOM = 0.1, 1.0
 """Share of sensors whose variance may be anything, and ν of these."""
 MIN_SENSORS = 3
-"""Sensors that tell a noise in common."""
+"""Least number of sensors whose noise is compared."""
 STEP = 0.1
-"""Of the logarithm of c² in the search for its most probable value: there may be several maxima."""
+"""Step of log c² in the search for its most probable value, as there may be several maxima."""
 NOISE_TOLERANCE = 0.02
 """Relative change below which the noise of a lot is found."""
 MAX_REFITS = 8
-"""Most calibrations of all sensors for it."""
+"""Largest number of calibrations of all sensors in that search."""
 STATED, WITHIN, NOTHING = "stated", "within holds", "nothing"
-"""What tells the noise of a campaign by itself."""
+"""Sources of the noise of a single campaign."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class NoisePrior:
 
 
 def stated_sigma(fit: BaseFit) -> tuple[str, float]:
-    """Return what tells the noise of a campaign by itself, and the sigma that it says, m/s²."""
+    """Return the source of the noise of a campaign by itself, and its sigma, m/s²."""
     if fit.level.known:
         return STATED, fit.sigma
     return (NOTHING, 1.0) if fit.within is None else (WITHIN, float(np.sqrt(np.mean(fit.within))))

@@ -42,16 +42,16 @@ its noise, and half by the noise of the lot."""
 FALSE_ODD = 0.05
 """False discovery rate of odd sensors."""
 MAX_ODD_SHARE = 0.1
-"""Share of the sensors up to which what they have makes them odd, and is no matter of the type."""
+"""Share of the sensors up to which an effect makes them odd, and does not belong to the type."""
 MIN_RIVAL = 0.02
-"""Least posterior of what may be there in place of something else."""
+"""Least posterior probability of a rival."""
 MIN_CERTAIN = 0.95
-"""Posterior from which on one name is told without those that it may be confused with."""
+"""Posterior probability from which on a name is stated without its rivals."""
 UNTOLD, RESEMBLES = 6.0, 0.05
 """Noncentrality of what an effect leaves beside another one, absolute and as a share of its own, up
 to which they are told together: on average the right one is 0.95 probable then."""
 MAX_SETS = 12
-"""Most probable sets of effects whose sizes are looked at."""
+"""Number of most probable sets of effects whose sizes are estimated."""
 EFFECT = "effect"
 WEIGHTS = {
     EFFECT: 1.0,
@@ -63,15 +63,15 @@ WEIGHTS = {
 }
 """Prior weights of what the model of a lot may lack, relative to one effect of the catalogue."""
 ODD = "odd"
-"""Name of what a sensor has that the model and the other sensors have not."""
+"""Name of an effect that one sensor has, and neither the model nor the other sensors."""
 IMPOSSIBLE = -30.0
-"""Log odds of what cannot be."""
+"""Log odds of an impossible hypothesis."""
 MIN_HAVING = 0.5
 """Posterior probability from which a sensor counts among those that have an effect."""
 
 
 class LotEffect(NamedTuple):
-    """Something that the model of the lot lacks.
+    """An effect, or something unnamed, that the model of the lot lacks.
 
     Attributes
     ----------
@@ -148,13 +148,13 @@ class Pass:
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
-        """Names that mean the same in this lot, by the one that stands for them."""
+        """Classes of names that mean the same in this lot, by the first of each."""
         of_mean = {} if self.mean is None else {COMMON: (COMMON,)}
         return lot_classes(self.evidence) | of_mean
 
     @cached_property
     def _stands(self) -> dict[str, str]:
-        """The name that stands for each one."""
+        """First name of the class of each name."""
         return {name: first for first, members in self.classes.items() for name in members}
 
     @cached_property
@@ -246,7 +246,7 @@ class Pass:
 
     @cached_property
     def found(self) -> list[LotEffect]:
-        """What is missing and has a name that is sure enough.
+        """Missing effects whose names are sure enough.
 
         What few sensors have makes these odd.
         """
@@ -256,7 +256,8 @@ class Pass:
         for name, given in self.given.items():
             if name in taken or name in self._rare or given < MIN_RIVAL:
                 continue
-            alike = [name] if given >= MIN_CERTAIN else [name, *self._rivals(name)]
+            rivals = [] if given >= MIN_CERTAIN else self._rivals(name)
+            alike = [name, *(rival for rival in rivals if rival not in taken)]
             posterior = min(self.mixture.of_any(alike) / self.wrong, 1.0)
             if posterior >= RULES.sure:
                 taken.update(alike)
@@ -284,7 +285,7 @@ class Pass:
 
     @cached_property
     def _rare(self) -> set[str]:
-        """What few sensors have, if it is one of the lot."""
+        """Classes that few sensors have, if the lot has them."""
         surely = {
             name: np.sum(
                 self.mixture.having(name) > MIN_HAVING * max(self.mixture.of_any([name]), 1e-300)
@@ -295,7 +296,7 @@ class Pass:
 
     @property
     def _few(self) -> float:
-        """Sensors up to which what they have makes them odd."""
+        """Number of sensors up to which an effect makes them odd."""
         return max(1, MAX_ODD_SHARE * len(self.sensors))
 
     @property
@@ -305,7 +306,7 @@ class Pass:
 
     @cached_property
     def odd(self) -> list[SensorState]:
-        """Odd sensors, the surest first; of those that are told, 5 of 100 are told wrongly.
+        """Odd sensors, the surest first; 5 of 100 are expected to be wrong.
 
         A sensor is odd by whatever nothing accounts for that is found in the lot. If that makes
         more than few sensors odd, the lot has something that has no sure name, and what is rare
@@ -341,7 +342,7 @@ class Pass:
         return [i for i, each in enumerate(self.evidence) if each.campaign not in odd]
 
     def without_odd(self) -> Pass:
-        """The same without the sensors that are odd."""
+        """Return the pass without the odd sensors."""
         if not self.odd:
             return self
         usual, anything = self.usual, LotTest(self.anything.logs)
@@ -383,7 +384,7 @@ class Pass:
 def _evidence_of_mean(
     sensors: Sequence[Sensor], said: Sequence[SensorEvidence], whole: SensorModel, seed: int
 ) -> SensorEvidence | None:
-    """Weigh the mean of sensors; None if there is none of their model."""
+    """Weigh the mean of sensors; None if their model allows no mean."""
     # What happens to each sensor at a time of its own has no mean.
     if any(effect.sudden for effect in whole.effects) or not (mean := mean_sensor(sensors, said)):
         return None
@@ -393,7 +394,7 @@ def _evidence_of_mean(
 
 
 def _kind(name: str) -> str:
-    """Which of `WEIGHTS` something has; things of one kind share it evenly."""
+    """Key of `WEIGHTS` for a name; names of one kind share that weight evenly."""
     if name in WEIGHTS:
         return name
     return UNKNOWN if name.startswith(UNKNOWN) else EFFECT

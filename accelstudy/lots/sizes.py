@@ -44,11 +44,11 @@ size."""
 SHARES = (0.9, 0.35)
 """ρ from which the search begins, for each effect."""
 MIN_FREEDOM = 20
-"""Degrees of freedom that tell the noise."""
+"""Least degrees of freedom of an estimate of the noise."""
 MAX_STEPS = 60
 """Most steps of the search for μ and ρ."""
 LIKELIHOOD_TOLERANCE = 1e-3
-"""Change of the log likelihood below which they are found."""
+"""Change of the log likelihood below which the search ends."""
 
 
 # --- what one campaign says of parameters -------------------------------------------------------
@@ -137,7 +137,7 @@ class ShapeEquations(NamedTuple):
 
 
 class SensorEquations(NamedTuple):
-    """What a sensor tells of the parameters of some effects, side by side.
+    """Normal equations of a sensor for the parameters of some effects, side by side.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class SensorEquations(NamedTuple):
 
 
 def sensor_equations(sensor: Sensor, specs: Sequence[str]) -> SensorEquations:
-    """Say what a sensor tells of effects with their settings; nothing of what it cannot show."""
+    """Set up the equations of a sensor for some effects; zeros where it cannot show one."""
     effects = [get_effect(spec) for spec in specs]
     if sensor.model is None:
         k = sum(len(effect.parameters) for effect in effects)
@@ -243,7 +243,7 @@ class TypicalSet:
 
 @dataclass(frozen=True, eq=False)
 class TypeSizes:
-    """What all sensors of a lot tell of the sizes of effects.
+    """The equations of all sensors of a lot for the sizes of effects.
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ class TypeSizes:
         asked: Sequence[Names],
         usual: Sequence[int],
     ) -> TypeSizes:
-        """Gather what sensors tell of effects.
+        """Gather the equations of sensors.
 
         The noise is that which the one or two effects leave that explain most.
 
@@ -303,12 +303,12 @@ class TypeSizes:
         return replace(raw, normal=raw.normal / variance, right=raw.right / variance)
 
     def only(self, places: Sequence[int]) -> TypeSizes:
-        """Return what some of the sensors tell, all of which are usual."""
+        """Return the equations of some of the sensors, all of which are usual."""
         at = [*places]
         return replace(self, normal=self.normal[at], right=self.right[at], usual=np.arange(len(at)))
 
     def _variance(self, squares: float, redundancy: int) -> float:
-        """Noise that the one or two effects leave that explain most."""
+        """Noise variance that the best one or two effects leave."""
         left = [squares / redundancy]
         for names in (s for r in (1, 2) for s in combinations(self.columns, r)):
             at = np.concatenate([self.columns[name] for name in names])

@@ -49,7 +49,7 @@ TITLES = {
 
 
 def get_model(text: str, extra: Mapping[str, SensorModel] | None = None) -> SensorModel:
-    """Return the model that a person wrote.
+    """Return a model by its name, its effects, or a YAML file.
 
     Parameters
     ----------

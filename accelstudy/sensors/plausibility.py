@@ -17,7 +17,7 @@ from accelstudy.effects import Effect, get_effect
 Array = NDArray[np.float64]
 
 MAX_FACTOR = 20.0
-"""A parameter is implausible beyond so many times the typical size of cheap equipment."""
+"""Multiple of the typical size of cheap equipment beyond which a parameter is implausible."""
 MIN_SIGMAS = 3.0
 """Standard deviations by which an estimate must be beyond its bound."""
 LARGEST = {

@@ -76,7 +76,7 @@ class SensorModel:
 
     @property
     def stays(self) -> NDArray[np.bool_]:
-        """Which parameters, (u,), belong to the sensor and not to the rig."""
+        """Whether each parameter, (u,), belongs to the sensor and not to the rig."""
         return np.array([e.part == "sensor" for e in self.effects for _ in e.parameters], bool)
 
     @cached_property

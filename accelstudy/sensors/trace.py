@@ -24,7 +24,7 @@ from accelstudy.symbolic.tracing import (
 )
 
 HOLD = "hold_"
-"""Before the names of columns of `HoldConditions`, in those of their symbols."""
+"""Prefix of the symbols of columns of `HoldConditions`."""
 
 
 class SensorFormulas:
@@ -58,7 +58,7 @@ class SensorFormulas:
         self._readings = self.reading_errors(self.force[:2])
 
     def _adding(self, force: Sequence[Any], last: bool) -> list[Any]:
-        """Add what effects make of a force, those that act last or the others."""
+        """Sum the outputs of the effects that act last, or of all others."""
         total = list(force)
         for effect, p in self._effects:
             if effect.last == last:

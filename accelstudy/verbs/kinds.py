@@ -50,7 +50,7 @@ class Kind(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
 
 
 class Names(Kind):
-    """A name that a registry knows; whether there is such a thing, the registry says.
+    """A name that stands in a registry.
 
     Parameters
     ----------

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from accelstudy.epochs.congruence import LEVEL, POWER, Differences, dof_of_squares
+from accelstudy.adjustment.quality import POWER
+from accelstudy.epochs.congruence import LEVEL, Differences, dof_of_squares
 
 N = 1000
 STANDARD_ERRORS = 3.3

@@ -10,9 +10,10 @@ from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, write_document
 
 import accelstudy
+from accelstudy.adjustment.quality import POWER
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
-from accelstudy.epochs.congruence import LEVEL, POWER
+from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.course import ParameterCourse
 
 N = 500

@@ -3,6 +3,7 @@
 from accelstudy.adjustment.quality.components import VarianceComponents, variance_components
 from accelstudy.adjustment.quality.prediction import HeldOut, held_out
 from accelstudy.adjustment.quality.redundancy import (
+    POWER,
     Redundancy,
     Reliability,
     noncentrality,
@@ -29,6 +30,7 @@ from accelstudy.adjustment.quality.tests import (
 )
 
 __all__ = [
+    "POWER",
     "GlobalTest",
     "HeldOut",
     "PositionTests",

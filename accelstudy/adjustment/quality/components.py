@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 MAX_STEPS = 300
 MAX_FITS = 10
 STEP_TOLERANCE = 1e-6
-"""Convergence with given derivatives: a step below this fraction of a standard deviation."""
+"""Fraction of a standard deviation below which a step with given derivatives is the last."""
 REFIT_TOLERANCE = 1e-3
-"""Convergence with adjustments repeated: changes of a factor below this fraction of sigma."""
+"""Fraction of its sigma below which the change of a factor by a new adjustment is the last."""
 
 
 @dataclass(frozen=True)

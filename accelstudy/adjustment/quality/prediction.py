@@ -111,7 +111,7 @@ def _refitted(problem: CalibrationProblem, c: int) -> tuple[Array, Array, Array]
 
 
 def _derived(solution: Solution) -> tuple[Array, Array, Array]:
-    """The same by the derivatives at the common solution: dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
+    """Results as of `_refitted` by derivatives at the common solution, dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
     n, c = solution.misclosures.shape
     root, rank = solution.root
     root = np.where((rank == c)[:, None, None], root, np.nan)

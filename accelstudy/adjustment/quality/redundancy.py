@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import optimize, special, stats
 
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.basics.units import GON
@@ -16,6 +16,11 @@ from accelstudy.leveling.angles import roll_pitch, tilt_slope
 from accelstudy.leveling.error import MAX_TILT_GON, cap_forces
 
 Array = NDArray[np.float64]
+
+POWER = 0.8
+"""Probability with which a detectable error or change is found."""
+MIDPOINTS = 200
+"""Number of nodes over an estimated variance, for the power of a test."""
 
 
 @dataclass(frozen=True)
@@ -64,15 +69,33 @@ class Reliability:
     leveling: Array
 
 
-def noncentrality(dof: int, alpha: float = 0.001, power: float = 0.8) -> float:
-    """λ0 at which a χ² test of level `alpha` has `power`; 17.075 by default for one dof."""
-    return float(special.chndtrinc(special.chdtri(dof, alpha), dof, 1 - power))
+def noncentrality(
+    dof: int, alpha: float = 0.001, power: float = POWER, noise_dof: float = np.inf
+) -> float:
+    """λ0 at which a test of level `alpha` has `power`; 17.075 by default for one dof.
+
+    The test is χ² where the noise is known; else F, whose noise has `noise_dof` degrees of freedom.
+    """
+    if np.isinf(noise_dof):
+        return float(special.chndtrinc(special.chdtri(dof, alpha), dof, 1 - power))
+    # A mean over χ²(ν), as the noncentral F of SciPy has no numbers for some ν.
+    evenly = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
+    ratios = stats.chi2.ppf(evenly, noise_dof) / noise_dof
+    limits = dof * stats.f.isf(alpha, dof, noise_dof) * ratios
+
+    def missed(size: float) -> float:
+        return float(np.mean(stats.ncx2.cdf(limits, dof, size))) - (1 - power)
+
+    most = 1e4
+    while missed(most) > 0:
+        most *= 10
+    return float(optimize.brentq(missed, 1e-6, most))
 
 
 def reliability(
     solution: Solution,
     alpha: float = 0.001,
-    power: float = 0.8,
+    power: float = POWER,
     max_tilt: float = MAX_TILT_GON * GON,
     attitudes: int = 64,
 ) -> Reliability:

@@ -17,9 +17,9 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 NO_POWER = 2
-"""With this redundancy or less the global test finds next to nothing."""
+"""Redundancy up to which the global test has next to no power."""
 HARDLY_KNOWN = 8
-"""With fewer degrees of freedom of σ0 it accepts residuals of 2.5 times σ0 and more."""
+"""Degrees of freedom of σ0; with fewer the global test accepts residuals of 2.5 σ0 and more."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class GlobalTest:
 
     @property
     def powerless(self) -> bool:
-        """Whether something is so little that the test hardly ever rejects."""
+        """Whether the test has next to no power."""
         return bool(self.lacking)
 
     @property

@@ -60,7 +60,7 @@ class Entry(ConfigSection):
 
     @property
     def kind(self) -> str:
-        """Which of `KINDS` it is."""
+        """Kind of the source, one of `KINDS`."""
         return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
     @property
@@ -75,7 +75,7 @@ class Entry(ConfigSection):
         return matches(self.source, wanted) if self.public is None else None
 
     def as_params(self) -> dict[str, Any]:
-        """What was given, as parameters of a rule; the format of a log says the rest."""
+        """Keys that were given, as parameters of a rule."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def files(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Calibrate one campaign of a batch; a bad one is reported and does not stop the others."""
+"""Calibration of one campaign of a batch; a failure is reported and does not stop the others."""
 
 from __future__ import annotations
 

@@ -95,13 +95,13 @@ class Assessment:
 
     @property
     def warnings(self) -> list[str]:
-        """What of the calibration can only come from a gross error; empty for a plausible one."""
+        """Signs of a gross error; empty for a plausible calibration."""
         gross = self.gross_error
         return [*self.implausible, *([] if gross is None else [gross.reason])]
 
     @property
     def state(self) -> str:
-        """State of the calibration, the first that applies.
+        """State of the calibration: the first that applies of those below.
 
         `IMPLAUSIBLE` if no sensor has such parameters or the data look grossly wrong, `REJECTED` if
         the residuals refute the stated noise, `UNCHECKED` if nothing could have refuted it, else

@@ -37,15 +37,15 @@ from accelstudy.symbolic.tracing import derivative, symbols
 Array = NDArray[np.float64]
 
 MAX_SOLUTION_ERROR = 1e-6
-"""m/s², error of the solution where it takes steps."""
+"""m/s², largest error of a solution by Newton steps."""
 MAX_STEPS = 25
-"""Steps after which there is no solution."""
+"""Newton steps after which there is no solution."""
 FORCES = (0.5, 1.0, 1.5)
 """Parts of g at which the steps are counted."""
 DIRECTIONS = 60
 """Directions in which they are counted."""
 MAX_ROUNDING_ERROR = 1e-5
-"""m/s², of all in single precision, at 1 g."""
+"""m/s², bound of all rounding errors in single precision, at 1 g."""
 FORCE = tuple(f"f_{axis}" for axis in AXES)
 LAGGED_TEMPERATURE, SESSION_TIME = "temperature_lagged_", "time_kept"
 """Names in C: of a temperature that follows with a lag, before its time constant, and of the time
@@ -197,7 +197,7 @@ def _entries(name: str, vector: Any) -> dict[str, Any]:
 
 
 def _assigned(values: Mapping[str, Any], sign: str) -> list[str]:
-    """Give names values, with what the values share calculated once."""
+    """Write assignments in C, with common subexpressions calculated once."""
     shared, results = sp.cse(list(values.values()), list=True)
     lines = [f"const accel_real {name} = {_c(value)};" for name, value in shared]
     return lines + [f"{n} {sign} {_c(v)};" for n, v in zip(values, results, strict=True)]

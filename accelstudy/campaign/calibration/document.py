@@ -239,7 +239,7 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
 
 
 def json_number(value: Any) -> float | None:
-    """Number for JSON, which knows no NaN."""
+    """Convert a number for JSON: NaN becomes None."""
     return None if value is None or not np.isfinite(value) else float(value)
 
 

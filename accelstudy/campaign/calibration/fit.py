@@ -37,7 +37,7 @@ MAX_CONDITION = 10.0
 not converge."""
 
 UNIT_SIGMA = 1e-3
-"""m/s², stands in for an unknown sigma; only sigmas a posteriori have a meaning then."""
+"""m/s², in place of an unknown sigma; only sigmas a posteriori have a meaning then."""
 CHEAP_SIGMA = 1e-2
 """m/s², of the means of a cheap sensor: what positions must determine a model by where neither the
 campaign nor residuals tell the noise."""
@@ -138,7 +138,7 @@ class CampaignFit:
 
     @property
     def is_noise_known(self) -> bool:
-        """Whether the noise that is quoted is no estimate."""
+        """Whether the quoted noise is known, and no estimate."""
         return bool(np.isinf(self.dof))
 
     @property
@@ -226,7 +226,7 @@ def campaign_noise(campaign: Campaign) -> Noise:
 
 
 def _known_parameters(campaign: Campaign) -> Known:
-    """What is known a priori of the parameters."""
+    """Prior knowledge of the parameters by the type of the sensor."""
     return {} if campaign.sensor_type is None else campaign.sensor_type.known
 
 
@@ -393,7 +393,7 @@ def campaign_estimability(
 
 
 def _cause(campaign: Campaign, theory: Estimability, diagnosing: bool) -> str:
-    """Say what may keep an adjustment from converging."""
+    """Name the probable reason why an adjustment does not converge."""
     gross = recognise(campaign)
     more = "none is recognised here" if diagnosing else "`accelstudy diagnose` looks for more"
     if diagnosing and gross is not None:

@@ -39,7 +39,7 @@ SATURATED_SHARE = 0.999
 """A reading beyond this part of the sensor's range is saturated: the last count is often below the
 range."""
 MANY_SIGMAS = 2.2
-"""Sigmas that hold 95 % with 12 degrees of freedom; with more, 2 of them hold 93 % and above."""
+"""Number of sigmas that hold 95 % with 12 degrees of freedom; 2 hold 93 % or more beyond."""
 NEAR_POLE = "near_pole"
 """Column that says whether a row is too close to the roll pole for its sigmas."""
 OPTIONS = {

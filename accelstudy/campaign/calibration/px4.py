@@ -38,7 +38,7 @@ LOSS_ATTITUDES = 200
 MIN_LOSS = 0.01 * MGON
 """Error of an angle below which nothing is lost."""
 DEGREE = 3
-"""Of the polynomials of PX4 in the temperature."""
+"""Degree of the polynomials of PX4 in the temperature."""
 
 
 def px4_parameters(calibration: SensorCalibration) -> str:
@@ -141,7 +141,7 @@ def _loss(calibration: SensorCalibration) -> tuple[Array, Array]:
 
 
 def _alone(calibration: SensorCalibration) -> Iterator[tuple[str, SensorCalibration]]:
-    """Each effect with a calibration that has it alone."""
+    """Yield each effect, with a calibration that has this effect alone."""
     for effect, own in calibration.model.parts:
         model, values = compose(effect.spec, (effect.spec,)), calibration.parameters[own]
         yield effect.name, replace(calibration, model=model, parameters=values)

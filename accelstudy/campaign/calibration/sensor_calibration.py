@@ -1,4 +1,4 @@
-"""A calibration as it stays with the sensor: it is applied to readings, and levels with them."""
+"""A calibration without the effects of the rig, which corrects readings and levels with them."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ Array = NDArray[np.float64]
 
 NO_CALIBRATION = "not a calibration.json of accelstudy"
 RANGE_MARGIN = 0.1
-"""A log may leave a range by this part of its width without a warning."""
+"""Part of the width of a range by which a log may leave it without a warning."""
 REDUNDANCY, VARIANCE = Range(0, 10**9), Range(-1e18, 1e18)
 LEAST_VARIANCE = 1e-40
-"""SI; no estimate is as sure."""
+"""SI, variance below that of any estimate."""
 LEAST_REGULAR = 1e12
 """Condition of a matrix beyond which it has no inverse."""
 CORRELATION_TOLERANCE = 1e-6
-"""Parts of a correlation by which a matrix may miss what it should be."""
+"""Numerical tolerance of the checks of a correlation matrix."""
 FORCES = {"fx_mps2": "forward", "fy_mps2": "right", "fz_mps2": "down"}
 """Ranges of the calibrated forces, and where they point."""
 KNOWN = {"temperature": "temperature_degC", "time": "time_s", "vibration": "vibration_mps2"}
@@ -57,14 +57,14 @@ USUAL = {
     "time": (0.0, 0.0),
     "vibration": (0.0, 0.0),
 }
-"""Ranges of a calibration that does not say its own."""
+"""Ranges of a calibration that states none."""
 LEVELS = 5
-"""Values of a condition that matters."""
+"""Number of values of a condition that matters."""
 
 
 @dataclass(frozen=True, eq=False)
 class SensorCalibration:
-    """A calibration as it stays with the sensor, without the effects of the rig.
+    """A calibration without the effects of the rig, which corrects readings.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class SensorCalibration:
 
     @cached_property
     def conversion(self) -> Conversion:
-        """From readings, as a device has them, to m/s²."""
+        """Conversion from raw readings to m/s²."""
         layout = self.usual_layout
         return conversion_of(layout.unit, layout.scale, layout.offset)
 
@@ -216,7 +216,7 @@ class SensorCalibration:
         return angles_of(corrected), np.sqrt(variance)
 
     def _continue_drifts(self, forces: Array, hold: HoldConditions | None) -> tuple[Array, Array]:
-        """Change readings as if drifts had gone on, since the model lets them go on.
+        """Extrapolate drifts in the readings beyond the session, as the model does.
 
         A drift is known within its session only. After it the sensor keeps the value at its end.
 
@@ -370,13 +370,13 @@ def read_calibration_content(path: str | Path) -> Any:
 
 
 def file_of(given: Any, name: str) -> Path:
-    """Path of a calibration.json, of which the folder may be given."""
+    """Path of a calibration.json, given by itself or by its folder."""
     path = path_of(name, given)
     return path / "calibration.json" if path.is_dir() else path
 
 
 def sensor_of(given: Any, name: str = "calibration") -> SensorCalibration:
-    """Return what stays with the sensor, of a calibration or of the path of its file or folder."""
+    """Return the part of a calibration that belongs to the sensor, by object or path."""
     if isinstance(given, str | PathLike):
         return read_calibration(file_of(given, name))
     sensor = getattr(given, "sensor", None)

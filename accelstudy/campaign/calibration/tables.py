@@ -1,4 +1,4 @@
-"""Logs with all their columns, as they are written; cells of text stay text, as they were read."""
+"""Output of logs with all their columns; cells of text stay as they were read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.parquet import write_parquet
 
 ROWS = 2**16
-"""Rows that are worked on together, where what is made of them on the way takes memory."""
+"""Rows that are processed together, so that memory does not grow with the table."""
 
 
 def write_table(path: str | Path, table: pa.Table) -> None:

@@ -22,7 +22,7 @@ from accelstudy.sensors.plausibility import USUAL_CAUSE
 
 TEMPLATE = "campaign/calibration/wording.txt.j2"
 ANGLES = {"nonorthogonality", "cross_axis_misalignment"}
-"""Effects that a model has unless it takes the axes to be at right angles."""
+"""Effects of which a model needs one, or it takes the axes to be at right angles."""
 
 
 def parameter_lines(content: Mapping[str, Any]) -> list[str]:

@@ -262,7 +262,7 @@ def recognise(campaign: Campaign, attitude: bool = True) -> Recognition | None:
 
 
 def _corrections(campaign: Campaign, attitude: bool) -> Iterator[Correction]:
-    """Undo gross errors one after the other, first those that all positions have."""
+    """Yield the corrections of gross errors, first of those that all positions have."""
     sensor = yield from _everywhere(campaign, attitude)
     # A sensor that is mounted askew is no reason to reorder its positions.
     sensor = sensor.free if sensor.is_askew else sensor
