@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -27,8 +26,8 @@ MAX_VECTOR_POINTS = 1000
 """An artist with more points or lines is drawn as an image inside of the SVG."""
 
 
-def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str, dpi: int) -> str:
-    """Write a figure as SVG and PNG, each whole or not at all.
+def save(figure: Figure, path: str | Path, title: str, dpi: int) -> None:
+    """Write a figure as SVG or PNG, by the ending of the path, whole or not at all.
 
     The same figure gives the same bytes. The canvases are called directly, because
     `Figure.savefig` would draw each of them twice.
@@ -36,30 +35,22 @@ def save(figure: Figure, svg_path: str | Path, png_path: str | Path, title: str,
     Parameters
     ----------
     figure : Figure
-    svg_path, png_path : str or Path
+    path : str or Path
     title : str, for the metadata
-    dpi : int, of the PNG
-
-    Returns
-    -------
-    str, the figure as an SVG element that can stand in a page
+    dpi : int, of a PNG
     """
-    buffer = io.StringIO()
-    metadata = {"Date": None, "Creator": None, "Title": title}
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        FigureCanvasSVG(figure).print_svg(buffer, metadata=metadata)  # type: ignore[no-untyped-call]
-        figure.set_layout_engine("none")  # laid out once, alike in both
-        figure.set_dpi(dpi)
-        with whole_file(png_path) as path:
+    with mpl.rc_context(STYLE), whole_file(path) as whole:  # type: ignore[arg-type]
+        if Path(path).suffix == ".svg":
+            metadata = {"Date": None, "Creator": None, "Title": title}
+            FigureCanvasSVG(figure).print_svg(whole, metadata=metadata)  # type: ignore[no-untyped-call]
+        else:
+            figure.set_dpi(dpi)
             FigureCanvasAgg(figure).print_png(  # type: ignore[no-untyped-call]
-                path,
+                whole,
                 metadata={"Software": None, "Title": title},
                 pil_kwargs={"compress_level": COMPRESSION},
             )
-    text = buffer.getvalue()
-    with whole_file(svg_path) as path:
-        path.write_text(text, encoding="utf-8")
-    return text[text.index("<svg") :]
+    figure.set_layout_engine("none")  # laid out once, alike in all files
 
 
 def save_all(
@@ -85,7 +76,10 @@ def _element(draw: Callable[[], Figure], folder: Path, name: str, dpi: int) -> s
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = draw()
         _simplify(figure)
-        return save(figure, folder / f"{name}.svg", folder / f"{name}.png", name, dpi)
+        for kind in ("svg", "png"):
+            save(figure, folder / f"{name}.{kind}", name, dpi)
+        text = (folder / f"{name}.svg").read_text("utf-8")
+        return text[text.index("<svg") :]
     except OSError:  # such as a full disk, which is no failure of the figure
         raise
     except Exception as error:

@@ -159,7 +159,8 @@ class Plan(Result):
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = new_figure(*self.size)
             self.draw(figure.subplots())
-        save(figure, folder / "plan.svg", folder / "plan.png", "Plan", DPI)
+        for name in ("plan.svg", "plan.png"):
+            save(figure, folder / name, "Plan", DPI)
 
     def _write_positions(self, path: Path) -> None:
         """Write the recommended positions as a scheme, in the order in which to take them."""

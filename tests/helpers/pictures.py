@@ -15,6 +15,7 @@ import hashlib
 import json
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -199,8 +200,12 @@ def make_anew():
             texts[name] = seen(page)
         for name, (page, size) in OF_STUDIES.items():
             photograph(browser, PAPER / page, PICTURES / f"{name}.png", size)
-    for name in of_study(PAPER).keys() - OF_STUDIES.keys():
-        shrink(PAPER / "figures" / f"{name}.png", PICTURES / f"{name}.png")
+    drawn = [
+        f"results/paper/figures/{name}.png" for name in of_study(PAPER).keys() - OF_STUDIES.keys()
+    ]
+    subprocess.run(["snakemake", "--cores", "2", *drawn], cwd=ROOT, check=True)
+    for path in drawn:
+        shrink(ROOT / path, PICTURES / Path(path).name)
     keep({name: fingerprint(text) for name, text in (texts | of_study(SMALL)).items()})
 
 

@@ -12,20 +12,23 @@ STAND_IN = "<svg></svg>"
 
 def element(_, folder, name, dpi=0):
     """Write files in place of a figure, and return the element that stands for it on the page."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.svg").write_text(STAND_IN, encoding="utf-8")
-    (folder / f"{name}.png").write_bytes(bytes(2000))
+    for path in (folder / f"{name}.svg", folder / f"{name}.png"):
+        write(path)
     return STAND_IN
+
+
+def write(path):
+    """Write a file in place of a figure."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(STAND_IN.encode() if path.suffix == ".svg" else bytes(2000))
 
 
 @contextmanager
 def composed(*rendered):
     """Let all figures of pages be composed; those of some names are rendered, too."""
 
-    def save(figure, svg_path, png_path, title, dpi):
-        if title in rendered:
-            return SAVE(figure, svg_path, png_path, title, dpi)
-        return element(figure, svg_path.parent, title)
+    def save(figure, path, title, dpi):
+        SAVE(figure, path, title, dpi) if title in rendered else write(path)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(saving, "_element", ELEMENT)

@@ -33,7 +33,7 @@ def folder(tmp_path_factory):
 def test_the_configuration_is_a_study_with_figures(folder):
     study = read_study(folder / "config" / "config.yaml")
     assert study.study == "My-sensor-2-0"
-    assert {"closed-forms", "leveling-overview", "sweep-positions"} <= {*figure_names(study)}
+    assert {"leveling-overview", "sweep-positions"} <= {*figure_names(study)}
 
 
 def test_nothing_is_overwritten(folder):

@@ -224,11 +224,9 @@ def test_one_figure_is_drawn_alone(finished):
     folder = finished / "results" / "tiny" / "figures"
     for path in folder.iterdir():
         path.unlink()
-    text = succeed(finished, "results/tiny/figures/closed-forms.svg")
+    text = succeed(finished, "results/tiny/figures/leveling-overview.png")
     assert jobs(text) == {"figure": 1}
-    assert {path.name for path in folder.iterdir()} == {
-        f"closed-forms.{kind}" for kind in ("svg", "png", "rst")
-    }
+    assert [path.name for path in folder.iterdir()] == ["leveling-overview.png"]
 
 
 def test_with_one_model_schemes_fan_out(tmp_path):
@@ -312,8 +310,8 @@ def check_report(folder, results):
         assert figure.name in text
         assert get_figure(figure.stem).title in text
         assert get_figure(figure.stem).category in text
-    assert "closed-forms" in {figure.stem for figure in figures}
-    assert "Empirical standard deviation of each parameter" in text  # its caption
+    assert "leveling-overview" in {figure.stem for figure in figures}
+    assert "decide by it where one calibration must do" in text  # its caption
     assert "1 mgon = 0.0009" in text  # what a caption says of the study
 
 

@@ -2,16 +2,14 @@ rule figure:
     input:
         unpack(lambda w: {t: f"{RESULTS}/{t}.parquet" for t in get_figure(w.figure).tables}),
     output:
-        svg=report(
-            f"{RESULTS}/figures/{{figure}}.svg",
+        report(
+            f"{RESULTS}/figures/{{figure}}.{{kind}}",
             caption="../report/caption.rst",
             category=lambda wildcards: get_figure(wildcards.figure).category,
             labels=lambda wildcards: {"content": get_figure(wildcards.figure).title},
         ),
-        png=f"{RESULTS}/figures/{{figure}}.png",
-        caption=f"{RESULTS}/figures/{{figure}}.rst",
     log:
-        f"{RESULTS}/logs/figures/{{figure}}.log",
+        f"{RESULTS}/logs/figures/{{figure}}.{{kind}}.log",
     priority: 1
     conda:
         "../envs/accelstudy.yaml"
@@ -21,7 +19,7 @@ rule figure:
         angle_unit=UNIT,
         version=VERSION,
     message:
-        "Draw {wildcards.figure}"
+        "Draw {wildcards.figure}.{wildcards.kind}"
     script:
         "../scripts/figure.py"
 

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 from accelstudy.files.tables import read_table
 from accelstudy.jobs import job
 from accelstudy.study.config import Study
@@ -10,5 +8,5 @@ with job(snakemake):
         snakemake.wildcards.figure,
         {name: read_table(path) for name, path in snakemake.input.items()},
         Study.model_validate(snakemake.config),
-        Path(snakemake.output.svg).parent,
+        snakemake.output[0],
     )

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from accelstudy.basics.registry import Registry
 from accelstudy.basics.units import angle_note, angles_in
-from accelstudy.files.outputs import whole_file
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -121,20 +120,17 @@ def draw(name: str, tables: Tables, study: Study) -> Figure:
         return get_figure(name).draw(tables, study)
 
 
-def write_figure(name: str, tables: Tables, study: Study, folder: str | Path) -> None:
-    """Draw a figure, and write it into a folder under its name: as SVG, as PNG, and its caption.
+def write_figure(name: str, tables: Tables, study: Study, path: str | Path) -> None:
+    """Draw a figure, and write it as SVG or PNG, by the ending of the path.
 
-    Each file is whole or not there at all, and the same tables give the same bytes. Parameters as
-    in `draw`; an error that arises names the figure.
+    The file is whole or not there at all, and the same tables give the same bytes. Parameters as in
+    `draw`; an error that arises names the figure.
     """
     from accelstudy.drawing.saving import save
     from accelstudy.drawing.style import DPI
 
-    svg, png, rst = (Path(folder, f"{name}.{kind}") for kind in ("svg", "png", "rst"))
     try:
-        save(draw(name, tables, study), svg, png, get_figure(name).title, DPI)
+        save(draw(name, tables, study), path, get_figure(name).title, DPI)
     except Exception as error:
         error.add_note(f"The figure {name!r} could not be drawn.")
         raise
-    with whole_file(rst) as path:
-        path.write_text(f"{caption(name, study)}\n", encoding="utf-8")

@@ -23,20 +23,16 @@ RING: style.Style = {
 PLACE = ["output", "roll_gon", "pitch_gon", "input"]
 
 
-def effects_over_roll(
-    tables: Tables, study: Study, number: int, output: str, approach: str
-) -> Figure:
-    """Figure {number}: total effects on {output}, calibration by {approach}.
+def effects_over_roll(tables: Tables, study: Study, number: int, output: str) -> Figure:
+    """Figure {number}: total effects on {output}, gravity-based calibration.
 
     Total effects of the measured forces and of the calibration parameters on {output}, with the
-    standard deviations of the calibration by gravity alone (figures 5 and 6) or with the robot;
-    one column for each pitch that is not negative. The scale is logarithmic above 1 % and linear
-    below. Bars are 95 % confidence intervals, an effect within its own counts as zero, and inputs
-    below 1 % everywhere are left out. The parameters are sampled independently, although those of a
-    calibration are correlated. With the robot the share of the non-orthogonality is smaller and
-    that of the measured forces larger, because it improves the angles most.
+    standard deviations of the calibration by gravity alone; one column for each pitch that is not
+    negative. The scale is logarithmic above 1 % and linear below. Bars are 95 % confidence
+    intervals, an effect within its own counts as zero, and inputs below 1 % everywhere are left
+    out. The parameters are sampled independently, although those of a calibration are correlated.
     """
-    table = read_shares(tables["sensitivity"], approach)
+    table = read_shares(tables["sensitivity"], "gravity")
     table = table[(table["output"] == output) & (table["pitch_gon"] >= 0)]
     table = table.assign(value=100 * table["share"], half=100 * table["ci95"], overtakes=False)
     drawn = table.groupby("input")["value"].transform("max") >= MIN_PERCENT
@@ -46,10 +42,8 @@ def effects_over_roll(
 
 
 for _number, _output in ((5, "roll"), (6, "pitch")):
-    for _approach, _end in (("gravity", ""), ("robot", "-robot")):
-        _name = f"figure-{_number}{_end}"
-        _chosen: style.Style = {"number": _number, "output": _output, "approach": _approach}
-        register(_name, "sensitivity", category="Paper", **_chosen)(effects_over_roll)
+    _chosen: style.Style = {"number": _number, "output": _output}
+    register(f"figure-{_number}", "sensitivity", category="Paper", **_chosen)(effects_over_roll)
 
 
 @register("shapley", "shapley", category="Paper")
