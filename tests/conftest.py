@@ -17,7 +17,7 @@ saving._element = stand_ins.element  # unless a test asks for `composed` or `dra
 LONGEST = (
     "test_every_path.py", "test_plan.py", "test_workflow.py", "test_results.py",
     "test_diagnosis_output.py", "test_golden.py", "test_figures.py", "test_lots.py",
-    "test_strangers.py", "test_explorer.py", "test_optimal.py", "test_diagnosis.py",
+    "test_installed.py", "test_explorer.py", "test_optimal.py", "test_diagnosis.py",
     "test_designs.py", "test_campaign_batch.py", "test_stopping.py",
     "test_hidden_physics.py",
 )  # fmt: skip

@@ -10,6 +10,7 @@ from quality_helpers import SIGMA, draw
 from stand_ins import composed
 from usual import BOTH, GRAVITY, NINE, ROBOT
 
+import accelstudy as acs
 from accelstudy.adjustment import calibrate, calibration
 from accelstudy.adjustment.quality import (
     held_out,
@@ -25,7 +26,6 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.evidence import detection
 from accelstudy.diagnosis.evidence.noise_models import (
@@ -149,10 +149,8 @@ def test_memory_of_the_quality_is_linear_in_the_positions(approach):
 
 
 def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
-    campaign, _ = simulate_campaign(
-        CampaignSettings(
-            seed=3, scheme="fibonacci-1200", gross_errors=("outlier_position(position=77)",)
-        )
+    campaign = acs.simulate_campaign(
+        seed=3, scheme="fibonacci-1200", gross_errors=("outlier_position(position=77)",)
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
     with composed("residuals"):
@@ -176,11 +174,9 @@ def complement(columns):
 @pytest.fixture(scope="module", params=["gravity", "robot"])
 def examined(request):
     """A campaign with a repeated scheme, all columns and observed gravity."""
-    campaign, _ = simulate_campaign(
-        CampaignSettings(
-            seed=4, scheme="fibonacci-15", repeats=2, approach=request.param,
-            temperature=(10.0, 40.0), temperature_order="random",
-        ),
+    campaign = acs.simulate_campaign(
+        seed=4, scheme="fibonacci-15", repeats=2, approach=request.param,
+        temperature=(10.0, 40.0), temperature_order="random",
     )  # fmt: skip
     fit = fit_campaign(replace(campaign, sigma_gravity=1e-3), NINE, get_approach(request.param))
     return examine(solve(NINE, fit.approach, fit.observed, fit.adjustment))
@@ -274,9 +270,7 @@ def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):
     monkeypatch.setattr(pipeline, "Chance", partial(detection.Chance, simulations=20))
 
     def run(n):
-        campaign, _ = simulate_campaign(
-            CampaignSettings(seed=4, scheme=f"fibonacci-{n}", approach="robot")
-        )
+        campaign = acs.simulate_campaign(seed=4, scheme=f"fibonacci-{n}", approach="robot")
         return diagnose(campaign, NINE)
 
     few, many = FEW // 2, MANY // 2

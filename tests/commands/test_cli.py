@@ -212,13 +212,6 @@ def test_unknown_names_and_files(arguments, expected):
     assert expected in refusal(*arguments)
 
 
-def test_usage_errors():
-    for arguments in (["scheme"], ["plan"], ["cells"], ["nothing"], ["schemes", "--nothing"]):
-        result = call(*arguments)
-        assert result.exit_code == 2
-        assert "Usage:" in result.stderr
-
-
 def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
     """Only InputError is the user's to mend."""
 

@@ -7,10 +7,10 @@ import pytest
 from diagnosis_helpers import explanation
 from usual import GRAVITY, NINE, G
 
+import accelstudy as acs
 from accelstudy.adjustment.quality import solve
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.gross_errors.recognition import recognise
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Case, Posterior
 from accelstudy.diagnosis.decision.problem import fit_base, pose
 from accelstudy.diagnosis.decision.refits import refit
@@ -26,8 +26,9 @@ from accelstudy.leveling.angles import specific_force
 
 def session(n, rng, approach="gravity"):
     """A session of n random attitudes, a minute each, of a sensor with usual errors."""
-    settings = CampaignSettings(scheme=f"random-{n}", order="random", approach=approach, sigma=1e-3)
-    campaign = simulate_campaign(settings)[0]
+    campaign = acs.simulate_campaign(
+        scheme=f"random-{n}", order="random", approach=approach, sigma=1e-3
+    )
     up = rng.standard_normal((n, 3))
     up *= G / np.linalg.norm(up, axis=1, keepdims=True)
     if campaign.angles is not None:

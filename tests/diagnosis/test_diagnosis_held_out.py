@@ -5,8 +5,8 @@ import pytest
 from diagnosis_helpers import design, posed, shuffled, some_holds
 from usual import GRAVITY, NINE, ROBOT, G
 
+import accelstudy as acs
 from accelstudy.basics.wording import words
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis import held_out
 from accelstudy.diagnosis.decision.posterior import Alternatives
 from accelstudy.diagnosis.decision.refits import refit
@@ -101,11 +101,11 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
     At many temperatures, with a robot, a linear effect is told from a quadratic one: by its name.
     """
     effect, order, approach = case
-    settings = CampaignSettings(
+    measured = acs.simulate_campaign(
         scheme="fibonacci-30", order="random", approach=approach, effects=(effect,), yaw="random",
         temperature=(15.0, 40.0), temperature_order=order, seed=3,
     )  # fmt: skip
-    found = diagnose(simulate_campaign(settings)[0], NINE)
+    found = diagnose(measured, NINE)
     assert found.verdict == "named"
     assert found.gap.confirmed
     assert set(found.gap.names) == GROUPS[case]
@@ -116,12 +116,12 @@ def test_a_name_is_confirmed_only_where_no_other_could_leave_the_same(case):
 
 def test_no_name_is_confirmed_where_the_fit_leaves_more_than_the_stated_noise():
     """Sigma is half of the true one: that, or something unlisted, may make the name."""
-    settings = CampaignSettings(
+    measured = acs.simulate_campaign(
         scheme="fibonacci-18", repeats=3, order="random", approach="robot", yaw="random",
         effects=("thermal_bias",), noise_effects=("noise_level(kappa=4)",),
         temperature=(15.0, 40.0), temperature_order="random", seed=3,
     )  # fmt: skip
-    found = diagnose(simulate_campaign(settings)[0], NINE)
+    found = diagnose(measured, NINE)
     assert (found.verdict, found.found[0].name) == ("named", "thermal_bias")
     assert found.gap.confirmed
     assert found.gap.statement == "effect"

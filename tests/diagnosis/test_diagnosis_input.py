@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from usual import GRAVITY, NINE, ROBOT
 
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosis_document
 from accelstudy.diagnosis.report.words import verdict_lines
@@ -97,7 +97,7 @@ def test_what_does_not_change_shows_nothing(robot, tmp_path):
 
 def test_no_effect_is_silently_absent(gravity):
     """Every effect is in the model, tested, invisible, or untestable with the reason."""
-    few, _ = simulate_campaign(CampaignSettings(scheme="icosahedron-12", approach="gravity"))
+    few = acs.simulate_campaign(scheme="icosahedron-12", approach="gravity")
     for measured in (gravity, few, replace(gravity, temperature=None, time=None)):
         examined = examine_campaign(measured, NINE)
         tested = {*examined.candidates}
@@ -147,12 +147,10 @@ def test_one_repeat_or_none_is_enough_and_no_robot_too_good(repeat_first, sigma_
 
 def test_positions_that_are_needed_to_hold_some_out_are_counted():
     """Gravity: 9 + 3 parameters and 3 to spare are 15 conditions, and 3 to predict make 18."""
-    measured, _ = simulate_campaign(
-        CampaignSettings(
-            **{"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "size": 4.0},
-            **{"effects": ("thermal_scale",), "temperature": (10.0, 40.0)},
-            temperature_order="random",
-        )
+    measured = acs.simulate_campaign(
+        **{"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "size": 4.0},
+        **{"effects": ("thermal_scale",), "temperature": (10.0, 40.0)},
+        temperature_order="random",
     )
     found = diagnose(measured, NINE)
     assert [f.name for f in found.found] == ["thermal_scale"]
@@ -219,7 +217,7 @@ SETTINGS = st.fixed_dictionaries(
 def test_every_campaign_has_a_verdict_or_a_reason(keys):
     """Nothing but `InputError`; a sentence, and a document that JSON takes and the schema fits."""
     try:
-        found = diagnose(simulate_campaign(CampaignSettings(**keys))[0], NINE)
+        found = diagnose(acs.simulate_campaign(**keys), NINE)
     except InputError:
         return
     text = json.dumps({**diagnosis_document(found), "calibration": None}, allow_nan=False)

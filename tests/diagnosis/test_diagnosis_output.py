@@ -18,7 +18,7 @@ from places import ROOT
 from stand_ins import composed
 from usual import NINE, ROBOT
 
-import accelstudy
+import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number
@@ -26,7 +26,6 @@ from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import JudgedNoise, fit_campaign
 from accelstudy.campaign.calibration.output import write_calibration
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
@@ -70,7 +69,7 @@ HEADLINES = {
 
 def simulated(case, folder):
     settings = {"scheme": "fibonacci-36", "seed": 5, **CASES[case]}
-    campaign, _ = simulate_campaign(CampaignSettings(name=case, **settings))
+    campaign = acs.simulate_campaign(name=case, **settings)
     if case == "learned":
         turn = np.sin(np.asarray(campaign.yaw))[:, None]
         campaign = replace(campaign, forces=campaign.forces + turn * np.array([8e-3, 0, 0]))
@@ -90,7 +89,7 @@ def written(tmp_path_factory):
     @cache
     def get(case):
         simulated(case, root / case)
-        diagnosed = accelstudy.diagnose(root / case, replicates=100)
+        diagnosed = acs.diagnose(root / case, replicates=100)
         folder = root / f"{case}-out"
         with composed(*RENDERED.get(case, ())):
             diagnosed.save(folder)
@@ -244,10 +243,12 @@ def test_noise_alone_is_blamed_only_where_it_is_probable():
     """A test of the noise fails by a drift too small to show as one; and by noise that is large."""
     keys = {"scheme": "fibonacci-16", "approach": "gravity", "order": "random", "seed": 2}
     hold = {"temperature": (15, 40), "temperature_order": "random", "vibration": (0, 2)}
-    drift = CampaignSettings(**keys, **hold, effects=("warm_up",), size=0.1)
-    noise = CampaignSettings(scheme="fibonacci-36", **hold, noise_effects=("noise_level(kappa=4)",))
-    for settings, sure in ((drift, False), (noise, True)):
-        found = diagnose(simulate_campaign(settings)[0], NINE)
+    drift = acs.simulate_campaign(**keys, **hold, effects=("warm_up",), size=0.1)
+    noise = acs.simulate_campaign(
+        scheme="fibonacci-36", **hold, noise_effects=("noise_level(kappa=4)",)
+    )
+    for measured, sure in ((drift, False), (noise, True)):
+        found = diagnose(measured, NINE)
         assert found.verdict == "noise_model"
         assert (found.found[0].posterior >= RULES.sure) == sure
         assert ("sensor model is adequate" in verdict_lines(found)[0]) == sure
@@ -337,8 +338,7 @@ def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
 
 @pytest.mark.usefixtures("composed")
 def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
-    settings = CampaignSettings(scheme="d-optimal-10", approach="gravity")
-    diagnosis = diagnose(simulate_campaign(settings)[0], NINE)
+    diagnosis = diagnose(acs.simulate_campaign(scheme="d-optimal-10", approach="gravity"), NINE)
     assert diagnosis.base.redundancy == 1
     write_diagnosis(diagnosis, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

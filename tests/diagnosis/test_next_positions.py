@@ -8,9 +8,9 @@ from diagnosis_helpers import shuffled
 from norm_model import SHOWN, nine
 from usual import GRAVITY, NINE, ROBOT, G
 
+import accelstudy as acs
 from accelstudy.adjustment.quality import solve
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.next_positions import CANDIDATE_SCHEME, _rows, next_positions
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.leveling.angles import specific_force
@@ -107,10 +107,8 @@ def test_candidates_show_an_effect_as_an_adjustment_with_it_does(name):
 
 
 def test_effects_of_time_are_told_apart_by_repeats_later():
-    campaign, _ = simulate_campaign(
-        CampaignSettings(
-            scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
-        )
+    campaign = acs.simulate_campaign(
+        scheme="fibonacci-30", interval=60.0, effects=("bias_drift: 1e-5, 1e-5, 1e-5",)
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
     examined = examine(solve(fit.model, fit.approach, fit.observed))

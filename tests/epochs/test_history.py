@@ -9,10 +9,9 @@ from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 from session_helpers import NINE, SENSOR, write_document
 
-import accelstudy
+import accelstudy as acs
 from accelstudy.adjustment.quality import POWER
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.epochs.congruence import LEVEL
 from accelstudy.epochs.course import ParameterCourse
 
@@ -206,12 +205,12 @@ def test_dates_come_from_the_campaigns(tmp_path):
     calibrations = []
     for k, date in enumerate(YEARS[:3]):
         folder = tmp_path / f"session-{k}"
-        write_campaign(simulate_campaign(CampaignSettings(seed=k))[0], folder)
+        write_campaign(acs.simulate_campaign(seed=k), folder)
         with (folder / "campaign.yaml").open("a", encoding="utf-8") as file:
             file.write(f"date: {date}\n")
         write_campaign(read_campaign(folder), folder)
-        calibrations.append(accelstudy.calibrate(folder, model="bias", approach="gravity"))
-    content = accelstudy.history(calibrations).content
+        calibrations.append(acs.calibrate(folder, model="bias", approach="gravity"))
+    content = acs.history(calibrations).content
     assert [c["date"][:10] for c in content["calibrations"]] == list(YEARS[:3])
     header = folder / "campaign.yaml"
     header.write_text(header.read_text(encoding="utf-8").replace(date, "spring"), encoding="utf-8")

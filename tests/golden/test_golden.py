@@ -9,7 +9,6 @@ import pytest
 from golden import compare, kept_of, report, same_number
 from golden_parts import OF_DATA, PAGES, PARTS, QUICK
 from places import ROOT, needs_data
-from transcript import commands_of_page, masked
 
 from accelstudy.commands.main import main
 
@@ -121,31 +120,3 @@ def test_a_difference_is_told_by_its_line(now, lines):
     differences, merged = compare(KEPT, now)
     assert [each.line for each in differences] == lines
     assert merged == (now if lines else KEPT)  # renewing changes no line that agrees
-
-
-def test_a_difference_shows_both_lines_and_how_far_a_number_moved():
-    ((one,), _) = compare("b_x = 0.50 ± 0.01\n", "b_x = 0.55 ± 0.01\n")
-    assert str(one) == "1\n  expected b_x = 0.50 ± 0.01\n  got      b_x = 0.55 ± 0.01"
-    assert one.change == pytest.approx(0.05 / 0.55)
-    ((other,), _) = compare("ACCEPTED 0.50\n", "REJECTED 0.55\n")
-    assert other.change is None
-
-
-# --- what readers type ---------------------------------------------------------------------------
-
-
-def test_what_depends_on_the_place_is_masked(tmp_path):
-    text = f"{tmp_path}/log.csv of {ROOT}, 0.12345678901234567 and 0.5"
-    assert masked(text, tmp_path) == "FOLDER/log.csv of ROOT, 0.123456789012 and 0.5"
-
-
-def test_commands_of_a_page_are_those_that_a_reader_types():
-    typed = ["accelstudy a --out \\", "  b   # why", "for i in 1 2; do", "  accelstudy c", "done"]
-    block = "".join(f"    {line}\n" for line in typed)
-    python = "import accelstudy\n\nprint(1)\n"
-    fences = f"```sh\nnot this\n```\n\n```python\n{python}```\n"
-    assert commands_of_page(f"Type\n\n{block}\nfor\n\n    printed\n\n{fences}") == [
-        "accelstudy a --out b",
-        "for i in 1 2; do accelstudy c; done",
-        python,
-    ]

@@ -1,4 +1,4 @@
-"""The generator of the hidden-effect study: rotations, sizes, noise, and its independence."""
+"""The generator of the hidden-effect study: sizes, places, noise, and its independence."""
 
 import ast
 from dataclasses import replace
@@ -10,20 +10,16 @@ from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.header import COLUMNS
 from accelstudy.diagnosis.space.frame import signature
 from accelstudy.effects import effect_names, get_effect
 from studies.hidden import physics
 from studies.hidden.physics.designs import APPROACHES, Course, session
 from studies.hidden.physics.generate import Case, generate
-from studies.hidden.physics.geometry import GRAVITY, in_turned_frame, joints_of, rotated
-from studies.hidden.physics.gross import visible_gross
+from studies.hidden.physics.geometry import GRAVITY, joints_of
 from studies.hidden.physics.kinds import (
     EFFECTS,
     NOWHERE,
     OF_ROBOT,
-    OUTPUTS,
     OUTSIDE,
     UNFORESEEN,
     Cause,
@@ -58,37 +54,6 @@ def test_the_generator_knows_nothing_of_what_it_judges():
     )  # fmt: skip
     own = Path(physics.__file__).parent
     assert [one for one in imports(own) if not one[1].startswith(allowed)] == []
-
-
-def test_rotations_are_rotations():
-    rng = np.random.default_rng(1)
-    vectors, turns = rng.standard_normal((2, 5, 3))
-    for turned in (
-        rotated(np.eye(3), turns[0]),
-        np.array([in_turned_frame(v, axis, 0.7) for axis in (0,) for v in np.eye(3)]),
-    ):
-        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-14)
-        assert np.linalg.det(turned) == pytest.approx(1)
-    # A quarter turn about z takes x to y; seen from a frame so turned, y is where x was.
-    np.testing.assert_allclose(
-        rotated(np.eye(3)[0], np.pi / 2 * np.eye(3)[2]), [0, 1, 0], atol=1e-14
-    )
-    np.testing.assert_allclose(in_turned_frame(np.eye(3)[1], 2, np.pi / 2), [1, 0, 0], atol=1e-14)
-    np.testing.assert_allclose(rotated(rotated(vectors, turns), -turns), vectors, atol=1e-14)
-
-
-@pytest.mark.parametrize("design", ["long-60", "snub-24"])
-def test_a_campaign_can_be_written_and_read(design, tmp_path):
-    for approach in APPROACHES:
-        campaign, _ = generate(Case("null", design, approach, True), seeded(4))
-        write_campaign(campaign, tmp_path / approach)
-        again = read_campaign(tmp_path / approach)
-        for name in COLUMNS:
-            one, other = getattr(campaign, name), getattr(again, name)
-            assert (one is None) == (other is None), name
-            if one is not None:
-                np.testing.assert_allclose(other, one, err_msg=name)
-        assert (again.angles is None) == (approach == "gravity")
 
 
 @pytest.mark.parametrize("approach", APPROACHES)
@@ -285,44 +250,6 @@ def test_a_place_is_what_the_physics_depends_on_and_what_it_changes(name):
     assert np.max(abs(elsewhere - changed)) > 1e-3
 
 
-@pytest.mark.parametrize("name", [k for k, v in PLACED.items() if v.place[0] in
-                                  ("force", "previous", "next")])  # fmt: skip
-def test_a_force_acts_in_its_hold_the_one_before_it_or_the_one_after(name):
-    kind, rng = PLACED[name], np.random.default_rng(19)
-    own, forces = holds(rng)
-    settings, moved = kind.draw(own, rng), forces.copy()
-    moved[0, 20] = -moved[0, 20, ::-1]
-    assert kind.target in OUTPUTS
-    cause = Cause(kind, settings, np.ones((1, 3)))
-    apart = cause.change(moved, own) - cause.change(forces, own)
-    where = {*np.flatnonzero(np.any(apart[0] != 0, axis=-1))}
-    scaled = {20} if kind.place[1] == "scale" else set()
-    assert where <= {"force": {20}, "previous": {21} | scaled, "next": {19, 20}}[kind.place[0]]
-    assert where
-
-
-def test_gross_errors_are_what_they_are_called():
-    for name in visible_gross("spread-24", "robot"):
-        case = Case("gross", "spread-24", "robot", True)
-        right, _ = generate(case, seeded(11))
-        wrong, truth = generate(replace(case, gross=name), seeded(11))
-        assert truth.gross["name"] == name
-        norms, others = (np.linalg.norm(c.forces, axis=1) for c in (right, wrong))
-        changed = np.flatnonzero(np.any(right.forces != wrong.forces, axis=1))
-        if name == "axis_error":
-            np.testing.assert_allclose(norms, others)
-            assert len(changed) == right.n_positions
-        elif name == "row_order":
-            np.testing.assert_allclose(np.sort(norms), np.sort(others))
-            assert 2 <= len(changed) <= 6
-            np.testing.assert_array_equal(right.angles, wrong.angles)
-        elif name == "unit_error":
-            factor = truth.gross["settings"].get("force", 1.0)
-            np.testing.assert_allclose(others, norms * factor)
-        else:
-            assert list(changed + 1) == [truth.gross["settings"]["position"]]
-
-
 @pytest.mark.parametrize("kind", [None, *NOISES])
 def test_the_noise_is_what_it_is_said_to_be(kind):
     own, rng = session("repeats-30"), np.random.default_rng(12)
@@ -362,27 +289,6 @@ def test_what_is_only_rounding_of_the_readings_cannot_be_seen(share, seen):
     assert (shape is not None) == seen
 
 
-@pytest.mark.parametrize(("kind", "design", "approach"), [
-    ("triple_product", "circles-24", "robot"),  # one of its three factors is zero in each position
-    ("tightening_cable", "spread-24", "gravity"),  # no yaw, so no cable is wound
-    ("wound_supply", "spread-24", "gravity"),
-])  # fmt: skip
-def test_what_does_nothing_in_a_session_cannot_be_seen(kind, design, approach):
-    of_design, effect = oracle(design, approach), OUTSIDE[kind]
-    settings = effect.draw(of_design.session, np.random.default_rng(1))
-    assert of_design.shape(effect, settings) is None
-    assert kind not in visible_outside(design, approach)
-
-
-def test_samples_within_the_holds_tell_the_noise():
-    own = session("spread-24")
-    campaign, _ = generate(
-        Case("one", "spread-24", "gravity", True, ("bias_drift",), (1e6,)), seeded(13)
-    )
-    mean_sd = np.sqrt(np.mean(campaign.sd**2) / campaign.n_samples[0])
-    assert mean_sd == pytest.approx(own.sigma, rel=0.02)
-
-
 # --- the oracle ----------------------------------------------------------------------------------
 
 
@@ -414,24 +320,3 @@ def test_pairs_hold_what_a_least_squares_fit_of_both_effects_explains():
         fitted = both @ np.linalg.lstsq(both, z, rcond=1e-2)[0]
         assert found[k] == pytest.approx(fitted @ fitted, rel=1e-6)
         assert pairs.dims[k] == np.linalg.matrix_rank(both, tol=1e-2)
-
-
-def test_the_oracle_tells_two_effects():
-    names = ("hysteresis", "encoder_offset")
-    case = Case("two", "yaw-50", "robot", True, names, (300.0, 300.0))
-    truth = generate(case, seeded(17))[1]
-    assert [set(one) for one in truth.oracle.best] == [{"hysteresis"}, {"encoder_offset"}]
-    assert [effect.lam for effect in truth.effects] == [300.0, 300.0]
-
-
-def test_a_sensor_clips_what_it_would_read():
-    """With its bias and scale and another effect, whichever comes first."""
-    own, scale = session("spread-24"), np.array([0.03, 0, -0.02])
-    sensor = Sensor(np.array([0.3, -0.2, 0.1]), scale)
-    square = Cause(EFFECTS["quadratic_scale"], {}, np.full((1, 3), 5e-3))
-    clipping = Cause(EFFECTS["saturation"], {"knee": 8.0}, np.ones((1, 3)))
-    free = observe(own, sensor, [square])[0]
-    assert np.sum(abs(free) > 8) > 5
-    for causes in ([square, clipping], [clipping, square]):
-        found = observe(own, sensor, causes)[0]
-        np.testing.assert_allclose(found, np.clip(free, -8, 8), rtol=0, atol=1e-14)

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import accelstudy as acs
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.lots.evidence import Sensor, SensorEvidence
@@ -107,7 +107,7 @@ def test_the_noise_of_a_type_is_found_beside_an_odd_sensor(freedom):
 
 def test_the_mean_has_weights_by_known_noise_and_its_variance():
     """Readings that differ by ±1 in units of their own noise, and those of two that have none."""
-    base, _ = simulate_campaign(CampaignSettings(name="s", seed=1))
+    base = acs.simulate_campaign(name="s", seed=1)
     sigmas = np.array([1e-3, 2e-3, 2e-3, 4e-3])
     signs = np.array([1.0, -1.0, 1.0, -1.0])
     campaigns = [

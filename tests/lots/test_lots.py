@@ -8,9 +8,9 @@ import pytest
 from calling import refusal, succeed
 from page_helpers import assert_sound, text_of
 
+import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.output import own_names
 from accelstudy.lots.parameters import TypeParameter
@@ -25,7 +25,7 @@ def test_names_of_campaigns_are_their_own():
 
 
 def test_a_campaign_that_does_not_determine_the_model_says_nothing():
-    campaign, _ = simulate_campaign(CampaignSettings(name="few", scheme="faces-6"))
+    campaign = acs.simulate_campaign(name="few", scheme="faces-6")
     sensor = Sensor(campaign, None, get_approach("gravity"))
     silent = sensor.evidence()
     assert (silent.odds, silent.tested) == ({}, {})
@@ -80,13 +80,13 @@ def test_the_command_says_what_a_lot_lacks(tmp_path):
     """
     for i in range(N_LOT):
         effect = "quadratic_scale" if i == N_LOT - 1 else "thermal_bias: 0.0003, -0.0003, 0.0003"
-        settings = CampaignSettings(
+        one = acs.simulate_campaign(
             name=f"sensor-{i}", seed=i, effects=(effect,), temperature=(15, 35),
             temperature_order="random",
         )  # fmt: skip
-        write_campaign(simulate_campaign(settings)[0], tmp_path / f"sensor-{i}")
+        write_campaign(one, tmp_path / f"sensor-{i}")
     folders = sorted(tmp_path.glob("sensor-*"))
-    few = simulate_campaign(CampaignSettings(name="few", scheme="faces-6", approach="gravity"))[0]
+    few = acs.simulate_campaign(name="few", scheme="faces-6", approach="gravity")
     copy = replace(read_campaign(folders[0]), name="copy")
     for made in (few, copy):
         write_campaign(made, tmp_path / made.name)

@@ -10,13 +10,13 @@ import pytest
 import yaml
 from calling import refusal, succeed
 
+import accelstudy as acs
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.lots.noise import NoisePrior
 from accelstudy.lots.output import Lot
 from accelstudy.lots.type_file import write_type
@@ -101,18 +101,13 @@ def test_a_sensor_that_is_not_of_the_type_is_refused():
 
 
 def test_each_command_takes_a_type(tmp_path):
-    made = [
-        simulate_campaign(CampaignSettings(name=f"s{i}", seed=i, approach="gravity"))[0]
-        for i in range(5)
-    ]
+    made = [acs.simulate_campaign(name=f"s{i}", seed=i, approach="gravity") for i in range(5)]
     write_campaign(made[0], tmp_path / "s0")
     of_type = type_of(made, tmp_path)
     content = yaml.safe_load(of_type.read_text(encoding="utf-8"))
     assert content["sensors"] == 5
     assert list(content["parameters"]) == list(MODEL.parameter_names)
-    faces = simulate_campaign(
-        CampaignSettings(name="faces", seed=9, approach="gravity", scheme="faces-6")
-    )[0]
+    faces = acs.simulate_campaign(name="faces", seed=9, approach="gravity", scheme="faces-6")
     write_campaign(faces, tmp_path / "faces")
     assert "do not determine" in refusal("calibrate", tmp_path / "faces", "--out", tmp_path / "c")
     given = ("--model", of_type, "--prior", of_type)

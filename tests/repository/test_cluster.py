@@ -2,9 +2,6 @@
 
 import re
 
-import cluster
-import pyarrow as pa
-import pyarrow.parquet as pq
 import yaml
 from places import ROOT
 
@@ -37,13 +34,3 @@ def test_the_profile_names_rules_that_there_are_and_groups_those_of_a_study():
 def test_another_attempt_gets_more_memory():
     assert "attempt" in profile("slurm")["default-resources"]["mem_mb"]
     assert re.search(r"mem_mb=lambda wildcards, attempt: .* \* attempt,", STUDY["simulate"])
-
-
-def test_tables_are_compared_to_the_bit(tmp_path):
-    for folder, value in (("one", 1.0), ("same", 1.0), ("other", 1.0 + 2**-52)):
-        (tmp_path / folder / "sub").mkdir(parents=True)
-        pq.write_table(pa.table({"x": [0.0, value]}), tmp_path / folder / "sub" / "t.parquet")
-    assert cluster.differences(tmp_path / "one", tmp_path / "same") == []
-    assert cluster.differences(tmp_path / "one", tmp_path / "other") == ["sub/t.parquet"]
-    (tmp_path / "same" / "sub" / "t.parquet").unlink()
-    assert cluster.differences(tmp_path / "one", tmp_path / "same") == ["sub/t.parquet"]

@@ -11,7 +11,6 @@ from pictures import (
     fingerprint,
     kept,
     of_code,
-    same_picture,
     seen,
 )
 
@@ -46,9 +45,3 @@ def test_words_and_points_count_and_last_digits_do_not(tmp_path, words, x, said)
         (tmp_path / "one.svg").write_text(SVG.format(*given), encoding="utf-8")
         texts.append(seen(tmp_path / "one.svg"))
     assert difference(fingerprint(texts[0]), texts[1]) == said
-
-
-def test_pictures_that_differ_in_a_word_differ():
-    one, other = (PICTURES / f"figure-{number}.png" for number in (5, 6))
-    assert same_picture(one, one)
-    assert not same_picture(one, other)

@@ -52,20 +52,6 @@ def test_the_environment_file_names_this_version():
     assert f"{python.partition('=')[2]}.0" in SpecifierSet(PROJECT["requires-python"])
 
 
-def test_what_the_catalogue_of_workflows_looks_for():
-    """It also checks format and style, as `make lint` and a test of the workflow do."""
-    settings = yaml.safe_load((ROOT / ".snakemake-workflow-catalog.yml").read_text())["usage"]
-    assert settings == {
-        "software-stack-deployment": {"conda": False, "apptainer": False},
-        "report": True,
-    }
-    readme = (ROOT / "README.md").read_text().lower()
-    assert all(word in readme for word in ("snakemake", "workflow"))
-    assert (ROOT / "workflow" / "Snakefile").is_file()
-    assert (ROOT / "config" / "README.md").is_file()
-    assert {path.suffix for path in (ROOT / "workflow" / "rules").iterdir()} == {".smk"}
-
-
 def test_make_targets_and_files_of_the_readme_exist():
     """Those of the other pages are checked when the site is built."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -11,6 +11,7 @@ import yaml
 from calling import call, refusal, succeed
 from study_helpers import content, grid
 
+import accelstudy as acs
 from accelstudy.adjustment.quality import solve
 from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
@@ -21,7 +22,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
 from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
 from accelstudy.drawing.style import model_title
@@ -150,7 +150,7 @@ def test_a_diagnosis_writes_the_calibration_of_what_it_found(made, diagnosed):
 @cache
 def calibration_of(**settings):
     """A campaign, its diagnosis, and the calibration that this writes."""
-    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", **settings))
+    campaign = acs.simulate_campaign(scheme="fibonacci-30", **settings)
     diagnosis = diagnose(campaign, get_model(NINE))
     return campaign, diagnosis, diagnosed_calibration(diagnosis)
 
@@ -252,7 +252,7 @@ def test_apply_mends_readings_as_the_data_were(tmp_path):
 
 def test_the_rig_stays_where_it_was(tmp_path):
     """What belongs to the rig is in no matrix."""
-    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30", order="random"))
+    campaign = acs.simulate_campaign(scheme="fibonacci-30", order="random")
     model = get_model("bias+encoder_scale+scale+nonorthogonality")
     fit = fit_campaign(campaign, model, get_approach("robot"))
     content = calibration_document(fit)
@@ -278,7 +278,7 @@ def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
 
 
 def test_a_model_that_becomes_a_registered_one_is_a_study_too():
-    campaign, _ = simulate_campaign(CampaignSettings(scheme="fibonacci-30"))
+    campaign = acs.simulate_campaign(scheme="fibonacci-30")
     diagnosis = diagnose(campaign, get_model("bias-scale"))
     assert diagnosis.extended_model.name == NINE
     overlay = study_overlay(diagnosis)
@@ -289,11 +289,10 @@ def test_a_model_that_becomes_a_registered_one_is_a_study_too():
 
 def test_a_large_effect_is_fitted_from_the_affine_part_on():
     """From the start of an ideal sensor the adjustment does not converge."""
-    settings = CampaignSettings(
+    campaign = acs.simulate_campaign(
         scheme="fibonacci-30", approach="gravity", seed=3,
         effects=("saturation(knee=5): 0.5, -0.5, -0.5",),
     )  # fmt: skip
-    campaign, _ = simulate_campaign(settings)
     fit = fit_campaign(campaign, get_model(f"{NINE}+saturation(knee=5)"), get_approach("gravity"))
     np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.01)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from docutils.core import publish_string
-from matplotlib.colors import to_rgb
 from study_helpers import NINE, content, grid, run_study
 
 from accelstudy.basics.errors import InputError
@@ -242,51 +241,6 @@ def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own()
     for name in set(effect_names()) - modelled:
         assert style.group_colour(name) == style.CAUSES[style.cause(name)]
     assert {style.cause(name) for name in set(effect_names()) - modelled} == set(style.CAUSES)
-
-
-# Machado, Oliveira & Fernandes (2009), linear RGB, severity 1.
-EYES = {
-    "normal": np.eye(3),
-    "protanopia": [[0.152286, 1.052583, -0.204868],
-                   [0.114503, 0.786281, 0.099216],
-                   [-0.003882, -0.048116, 1.051998]],
-    "deuteranopia": [[0.367322, 0.860646, -0.227968],
-                     [0.280085, 0.672501, 0.047413],
-                     [-0.011820, 0.042940, 0.968881]],
-}  # fmt: skip
-
-
-def seen(colour, eye):
-    """Colour as CIE L*a*b* to an eye (D65)."""
-    rgb = np.array(to_rgb(colour))
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
-    x, y, z = np.cbrt(to_xyz @ np.clip(np.array(EYES[eye]) @ linear, 1e-3, 1) / [0.95, 1, 1.09])
-    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
-
-
-@pytest.mark.parametrize("eye", EYES)
-def test_colours_of_causes_keep_apart(eye):
-    """A difference of 2 can be seen side by side; far apart in a figure it takes some more."""
-    others = [colour for _, colour in style.GROUPS.values()]
-    others += [*style.APPROACH_COLOURS.values(), *style.CAUSES.values()]
-    for colour in style.CAUSES.values():
-        distances = [np.linalg.norm(seen(colour, eye) - seen(o, eye)) for o in others]
-        assert sorted(distances)[1] > 15, colour
-
-
-@pytest.mark.parametrize("cmap", ["viridis", "cividis", "Blues", "RdBu_r"])
-def test_numbers_on_a_map_can_be_read(cmap):
-    """The relative luminances are compared, from CIE L*.
-
-    The threshold of WCAG 2.2 for text, 4.5, is just missed by an ink that is not black.
-    """
-    ax = style.new_figure(1, 20).subplots()
-    image = ax.imshow([[0, 1]], cmap=cmap)
-    for value in np.linspace(0, 1, 101):
-        colours = style.ink_on(image, value), image.to_rgba(value)
-        one, other = sorted(((seen(each, "normal")[0] + 16) / 116) ** 3 for each in colours)
-        assert (other + 0.05) / (one + 0.05) > 3.9
 
 
 @pytest.mark.parametrize(("model", "title"), [

@@ -8,9 +8,9 @@ from calling import call, refusal
 from places import ROOT
 from snakemake_helpers import snakemake
 
+import accelstudy as acs
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.format import write_campaign
-from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.files.reading import read_layer
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names
@@ -86,12 +86,12 @@ def test_the_noise_of_a_data_sheet_is_that_of_a_usual_hold(tmp_path):
 
 def test_a_campaign_brings_noise_gravity_positions_and_what_its_calibration_finds(tmp_path):
     effects = ("bias: 0.12, -0.07, 0.2", "scale: 0.003, -0.002, 0.001")
-    settings = CampaignSettings(
+    campaign = acs.simulate_campaign(
         name="box", scheme="fibonacci-30", effects=effects, sigma=1e-5, gravity=9.81,
         robot_sigma=MGON,
     )  # fmt: skip
     folder = tmp_path / "a box: 1"
-    write_campaign(simulate_campaign(settings)[0], folder)
+    write_campaign(campaign, folder)
     for template in TEMPLATES:
         init(tmp_path / template, "--template", template, "--sensor", folder)
     study = read_study(tmp_path / "study" / "config" / "config.yaml")
