@@ -53,9 +53,7 @@ def save(figure: Figure, path: str | Path, title: str, dpi: int) -> None:
     figure.set_layout_engine("none")  # laid out once, alike in all files
 
 
-def save_all(
-    figures: Mapping[str, Callable[[], Figure]], folder: Path, dpi: int = PAGE_DPI
-) -> dict[str, str]:
+def save_all(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> dict[str, str]:
     """Draw the figures of a page and write them under their names; returns elements for the page.
 
     If a figure fails, the others are drawn all the same. A line on the page and a warning on stderr
@@ -65,19 +63,18 @@ def save_all(
     ----------
     figures : mapping of name to a function that draws the figure
     folder : Path
-    dpi : int, of the PNG
     """
-    return {name: _element(draw, folder, name, dpi) for name, draw in figures.items()}
+    return {name: _element(draw, folder, name) for name, draw in figures.items()}
 
 
-def _element(draw: Callable[[], Figure], folder: Path, name: str, dpi: int) -> str:
+def _element(draw: Callable[[], Figure], folder: Path, name: str) -> str:
     """Return the element of one figure, or what is said in its place."""
     try:
         with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             figure = draw()
         _simplify(figure)
         for kind in ("svg", "png"):
-            save(figure, folder / f"{name}.{kind}", name, dpi)
+            save(figure, folder / f"{name}.{kind}", name, PAGE_DPI)
         text = (folder / f"{name}.svg").read_text("utf-8")
         return text[text.index("<svg") :]
     except OSError:  # such as a full disk, which is no failure of the figure

@@ -10,7 +10,7 @@ ELEMENT, SAVE = saving._element, saving.save
 STAND_IN = "<svg></svg>"
 
 
-def element(_, folder, name, dpi=0):
+def element(_, folder, name):
     """Write files in place of a figure, and return the element that stands for it on the page."""
     for path in (folder / f"{name}.svg", folder / f"{name}.png"):
         write(path)

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 MIN_DIFFERENCES = 10
 """Independent differences of neighbouring means that a trusted value needs (it is right to about
 20 %)."""
-_TOGETHER = 2**14
-"""Samples whose differences are taken together: what a processor keeps at hand is small."""
 
 
 @dataclass(frozen=True)
@@ -66,26 +64,15 @@ def pooled_deviation(
     lengths = np.array([len(record) for record in arrays])
     factors = np.array(averaging_factors(lengths.max() // 2), dtype=int)
     squares = np.zeros((len(factors), arrays[0].shape[1]))
-    for group in np.split(np.arange(len(arrays)), _starts(lengths)):
-        # Running sums of each record, and how many of its samples follow.
-        sums = np.zeros((arrays[0].shape[1], lengths[group].sum() + len(group)))
-        follow = np.concatenate([np.arange(n, -1, -1) for n in lengths[group]])
-        end = 0
-        for i in group:
-            record, first, end = arrays[i], end + 1, end + 1 + lengths[i]
-            centred = record - record.mean(axis=0)
-            centred[:, (record == record[:1]).all(axis=0)] = (
-                0.0  # not what rounding the mean leaves
-            )
-            turned = centred if frames is None else centred @ frames[i]
-            np.cumsum(turned.T, axis=1, out=sums[:, first:end])
-        for at, m in enumerate(factors[2 * factors <= lengths[group].max()]):
-            within = follow[: -2 * m] >= 2 * m
-            for channel, running in enumerate(sums):
-                first = running[m:] - running[:-m]
+    for i, record in enumerate(arrays):
+        centred = record - record.mean(axis=0)
+        centred[:, (record == record[:1]).all(axis=0)] = 0.0  # not what rounding the mean leaves
+        turned = centred if frames is None else centred @ frames[i]
+        for channel, values in enumerate(turned.T):
+            sums = np.concatenate([[0.0], np.cumsum(values)])
+            for at, m in enumerate(factors[2 * factors <= len(values)]):
+                first = sums[m:] - sums[:-m]
                 second = first[m:] - first[:-m]
-                if len(group) > 1:
-                    second *= within
                 squares[at, channel] += second @ second / (2.0 * m**2)
     fits = lengths[:, None] >= 2 * factors
     terms = np.sum(fits * (lengths[:, None] + 1 - 2 * factors), axis=0)
@@ -93,11 +80,6 @@ def pooled_deviation(
     return AllanDeviation(
         step * factors.astype(float), np.sqrt(squares / terms[:, None]), independent
     )
-
-
-def _starts(lengths: NDArray[np.int_]) -> NDArray[np.int_]:
-    """First records of groups that have some `_TOGETHER` samples each, but for the first group."""
-    return np.flatnonzero(np.diff(np.cumsum(lengths) // _TOGETHER)) + 1
 
 
 def averaging_factors(largest: int) -> list[int]:

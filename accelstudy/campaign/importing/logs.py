@@ -120,11 +120,10 @@ def write_imported(
         # Matplotlib takes longer to import than a log of usual length to read.
         from accelstudy.campaign.importing import segmentation_figure
         from accelstudy.drawing.saving import save_all
-        from accelstudy.drawing.style import DPI
 
         offset = holds.means[0] - campaign.with_left_out.forces[0]
         draw = {"segmentation": lambda: segmentation_figure.draw_segmentation(holds, offset)}
-        save_all(draw, folder, DPI)
+        save_all(draw, folder)
 
 
 # --- Kinds of logs -------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.detection import Holds
+from accelstudy.campaign.importing.recording import AXES
 from accelstudy.campaign.importing.windows import Windows
 from accelstudy.drawing.style import FULL, INK, new_figure
 
@@ -42,8 +43,8 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
     middle = (edges[:-1] + edges[1:]) / 2
     figure = new_figure(FULL, 90)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    for i, (name, colour) in enumerate(zip("xyz", _COLOURS, strict=True)):
-        _band(above, middle, low[:, i], high[:, i], colour, f"$f_{name}$")
+    for i, (name, colour) in enumerate(zip(AXES, _COLOURS, strict=True)):
+        _band(above, middle, low[:, i], high[:, i], colour, name)
     _band(below, middle, low[:, 3], high[:, 3], INK, None)
     if holds.size is None:
         label = f"threshold {holds.threshold.sd:.2g} m/s²"
@@ -62,6 +63,7 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
     what = "time / s" if holds.size is None else "sample"
     below.set(yscale="log", xlabel=what, ylabel="window sd / (m/s²)")
     below.set_xlim(0, edges[-1])
+    below.yaxis.set_major_formatter("{x:g}")  # formulas, as of powers, take a third of the time
     below.yaxis.set_minor_locator(NullLocator())
     figure.legend(loc="outside upper center", ncols=6)
     figure.align_ylabels()
@@ -69,7 +71,7 @@ def draw_segmentation(holds: Holds, offset: Array | float = 0.0) -> Figure:
 
 
 def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
-    """Least and largest values of the windows of a log in spans of time.
+    """Least and largest values of a log and its windows in spans of time.
 
     Returns
     -------
@@ -77,16 +79,17 @@ def _envelope(windows: Windows) -> tuple[Array, Array, Array]:
     low, high : (k, 4) arrays, of fx, fy, fz and of the standard deviation of the windows, m/s²;
         NaN in a gap
     """
-    centred, log = windows.centred, windows.log
-    time = log.time[centred]
+    time = windows.log.time
     count = max(1, min(_SPANS, len(time) // 4))
     edges = np.linspace(time[0], time[-1], count + 1)
     firsts = np.searchsorted(time, edges[:-1])
     filled = np.diff(firsts, append=len(time)) > 0
     low, high = np.full((2, count, 4), np.nan)
-    for i, values in enumerate([*log.forces.T, np.sqrt(windows.variance)]):
-        for ends, end_of in ((low, np.minimum), (high, np.maximum)):
-            ends[filled, i] = end_of.reduceat(values[centred], firsts[filled])
+    for i, values in enumerate([*windows.log.forces.T, windows.variance]):
+        for ends, end_of in ((low, np.fmin), (high, np.fmax)):
+            ends[filled, i] = end_of.reduceat(values, firsts[filled])
+    for ends in (low, high):
+        ends[:, 3] **= 0.5
     return edges, low, high
 
 
