@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from accelstudy.api.calibrations import as_campaign, campaign_path
+from accelstudy.api.inputs import as_campaign, campaign_path
 from accelstudy.approaches import get_approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError

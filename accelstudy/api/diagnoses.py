@@ -10,9 +10,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from numpy.linalg import LinAlgError
 
-from accelstudy.api.calibrations import Calibration
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.report import document
 from accelstudy.diagnosis.report.figures import draw_explanations
@@ -74,7 +74,7 @@ class Diagnosis(Result):
         """The calibration with what was found; raises `InputError` if there can be none."""
         try:
             content = document.diagnosed_calibration(self.result)
-            return Calibration(content, document.diagnosed_fit(self.result))
+            return Calibration(document.diagnosed_fit(self.result), content)
         except LinAlgError as error:
             raise InputError(f"the diagnosis gives no calibration: {error}") from None
 

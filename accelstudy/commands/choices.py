@@ -75,7 +75,7 @@ def effects(
         return
     if campaign is not None and scheme is not None:
         raise InputError("effects: --campaign and --scheme exclude each other; give one of them")
-    from accelstudy.api.calibrations import resolve
+    from accelstudy.api.inputs import resolve
     from accelstudy.approaches import get_approach
     from accelstudy.diagnosis import visibility
     from accelstudy.schemes import get_scheme

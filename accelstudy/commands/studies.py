@@ -73,7 +73,7 @@ def init(
 
 def sensor_of(given: str) -> NewSensor:
     """Sensor of a data sheet; or of a campaign, whose calibration is taken for the truth."""
-    from accelstudy.api.calibrations import fit_of
+    from accelstudy.api.inputs import fit_of
     from accelstudy.data_sheets import get_data_sheet
     from accelstudy.planning.question import USUAL_HOLD
     from accelstudy.sensors.models import NINE

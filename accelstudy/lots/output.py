@@ -16,7 +16,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-import accelstudy
 from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
@@ -26,15 +25,16 @@ from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, probability
 from accelstudy.campaign.batch.config import BatchConfig
 from accelstudy.campaign.batch.run import campaign_of
-from accelstudy.campaign.calibration.assessment import assess, tilt_left
+from accelstudy.campaign.calibration.assessment import tilt_left
 from accelstudy.campaign.calibration.document import json_content, write_json
+from accelstudy.campaign.calibration.figures import SUSPECT
 from accelstudy.campaign.calibration.fit import (
     CampaignFit,
     JudgedNoise,
     fit_campaign,
     usual_approach,
 )
-from accelstudy.campaign.calibration.output import SUSPECT, calibration_content
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.sensor_type import TYPE_FILE
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.decision.problem import fit_base
@@ -167,10 +167,10 @@ class Lot(Result):
         return {i: self.fitted[i] for i in self.diagnosis.usual if i in self.fitted}
 
     @property
-    def calibrations(self) -> dict[str, accelstudy.Calibration]:
+    def calibrations(self) -> dict[str, Calibration]:
         """Calibration of each sensor with all that the model lacks, by its campaign."""
         fits = self.fitted.values()
-        return {fit.campaign.name: accelstudy.Calibration(None, fit) for fit in fits}
+        return {fit.campaign.name: Calibration(fit) for fit in fits}
 
     @cached_property
     def parameters(self) -> dict[str, TypeParameter]:
@@ -318,7 +318,7 @@ class Lot(Result):
         for i, fit in self.fitted.items():
             its_own = folder / EACH / f"{i + 1:04d}-{path_name(fit.campaign.name, 'sensor')}"
             its_own.mkdir(parents=True)
-            write_json(its_own / "calibration.json", calibration_content(assess(fit)))
+            write_json(its_own / "calibration.json", Calibration(fit).content)
         steps = []
         if write_type(self, folder):
             of_type = place / TYPE_FILE

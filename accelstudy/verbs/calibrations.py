@@ -45,9 +45,11 @@ def calibrate(
     --------
         accelstudy calibrate my-campaign --out calibrated
     """
-    from accelstudy.api.calibrations import Calibration, campaign_path, fit_of
+    from accelstudy.api.inputs import campaign_path, fit_of
+    from accelstudy.campaign.calibration.result import Calibration
 
-    return Calibration(None, fit_of(campaign, model, approach, prior), campaign_path(campaign))
+    fit = fit_of(campaign, model, approach, prior)
+    return Calibration(fit, source=campaign_path(campaign))
 
 
 @verb
@@ -64,13 +66,13 @@ def read_calibration(path: str | PathLike[str]) -> Calibration:
     InputError
         If there is no such file, or it is not a calibration.
     """
-    from accelstudy.api.calibrations import Calibration
     from accelstudy.campaign.calibration import sensor_calibration
+    from accelstudy.campaign.calibration.result import Calibration
 
     file = sensor_calibration.file_of(path, "path")
     content = sensor_calibration.read_calibration_content(file)
     sensor_calibration.calibration_of(content, f"{file}: {sensor_calibration.NO_CALIBRATION}")
-    return Calibration({"warnings": [], **content})
+    return Calibration(None, {"warnings": [], **content})
 
 
 @verb
@@ -105,7 +107,7 @@ def check_sigmas(
     --------
         accelstudy check-sigmas my-campaign --replicates 500
     """
-    from accelstudy.api.calibrations import fit_of
+    from accelstudy.api.inputs import fit_of
     from accelstudy.campaign.calibration.sigma_check import check_sigmas as check
     from accelstudy.campaign.calibration.wording import what_a_check_finds
 
@@ -259,8 +261,8 @@ def diagnose(
     --------
         accelstudy diagnose my-campaign --out diagnosed
     """
-    from accelstudy.api.calibrations import campaign_path, resolve
     from accelstudy.api.diagnoses import Diagnosis
+    from accelstudy.api.inputs import campaign_path, resolve
     from accelstudy.diagnosis import pipeline
 
     # The diagnosis, not the reader, looks for wrong units and axes.

@@ -157,7 +157,7 @@ def lot(
     --------
         accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
-    from accelstudy.api.calibrations import as_campaign, chosen
+    from accelstudy.api.inputs import as_campaign, chosen
     from accelstudy.lots.output import Lot
 
     given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]

@@ -23,9 +23,8 @@ from accelstudy.adjustment.quality import (
     variance_components,
 )
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.diagnosis import pipeline
 from accelstudy.diagnosis.evidence import detection
 from accelstudy.diagnosis.evidence.noise_models import (
@@ -154,7 +153,7 @@ def test_a_page_of_many_positions_lists_those_that_fit_worst(tmp_path):
     )
     fit = fit_campaign(campaign, NINE, ROBOT)
     with composed("residuals"):
-        write_calibration(assess(fit), tmp_path)
+        Calibration(fit).write(tmp_path, tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert "200 of 1200 positions that fit worst" in page
     assert '<tr class="suspect"><td>77</td>' in page

@@ -399,12 +399,12 @@ def test_an_error_that_nobody_has_foreseen_stops_no_other(tmp_path, monkeypatch)
     write_campaign(simulated_campaign({"b_x": 0.05}), tmp_path / "campaign")
     task = task_of(campaign=str(tmp_path / "campaign"))
 
-    def broken(fit, folder):
+    def broken(calibration, folder, place):
         (folder / "report.html").write_text("half")
         (folder / "figures").mkdir()
         raise ZeroDivisionError("a\nb")
 
-    monkeypatch.setattr("accelstudy.campaign.batch.run.write_calibration", broken)
+    monkeypatch.setattr("accelstudy.campaign.batch.run.Calibration.write", broken)
     error = run_task(task, tmp_path / "out", log="results/b/logs/campaigns/campaign.log")
     assert error == (
         "internal error, please report it (ZeroDivisionError: a b); the log has the details: "

@@ -22,9 +22,8 @@ import accelstudy as acs
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON, angles_in
 from accelstudy.basics.wording import number
-from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import JudgedNoise, fit_campaign
-from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.format import write_campaign
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement_of
@@ -367,12 +366,13 @@ def test_a_figure_that_fails_takes_nothing_with_it(written, tmp_path, monkeypatc
     found = written("no_effect").found
     monkeypatch.setattr("accelstudy.diagnosis.report.figures.evidence_figure", lambda *_: 1 / 0)
     monkeypatch.setattr(
-        "accelstudy.campaign.calibration.output.correlation_figure", lambda _: 1 / 0
+        "accelstudy.campaign.calibration.result.correlation_figure", lambda _: 1 / 0
     )
     write_diagnosis(found, tmp_path / "evidence")
     assert (tmp_path / "evidence/diagnosis.json").exists()
     assert not list((tmp_path / "evidence").rglob("*.part"))
-    write_calibration(assess(fit_campaign(found.campaign, NINE, ROBOT)), tmp_path / "correlations")
+    fit = fit_campaign(found.campaign, NINE, ROBOT)
+    Calibration(fit).write(tmp_path / "correlations", tmp_path)
     failed = ("evidence", "correlations")
     for line, name in zip(capsys.readouterr().err.splitlines(), failed, strict=True):
         said = f"The figure '{name}' could not be drawn (ZeroDivisionError: division by zero)."

@@ -52,7 +52,7 @@ DRAWN = {
     "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/history.py"),
     "designs-efficiency": ("make positions", "studies/positions/efficiency.py"),
     "sequential": ("make positions", "studies/positions/stopping.py"),
-    "residuals": ("make campaigns", "accelstudy/campaign/calibration/output.py"),
+    "residuals": ("make campaigns", "accelstudy/campaign/calibration/figures.py"),
     "sweeps": ("the studies in config/sweeps", "accelstudy/study/figures/sweep.py",
                *(f"config/sweeps/{name}.yaml" for name in
                  ("gravity_error", "noise_level", "positions", "robot_accuracy"))),

@@ -12,9 +12,8 @@ from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.batch.config import CampaignEntry
-from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.output import write_calibration
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.session import Campaign
@@ -34,7 +33,7 @@ def run_task(
     ----------
     task : CampaignEntry
     folder : path
-        For what `write_calibration` writes; an imported campaign goes to its subfolder campaign.
+        For the files of a calibration; an imported campaign goes to its subfolder campaign.
     public : path
         File of public data.
     log : path
@@ -73,7 +72,8 @@ def _calibrate(
             campaign, holds = import_log(public or task.source, task.settings)
             write_imported(campaign, holds, folder / "campaign")
         approach = None if task.approach is None else get_approach(task.approach)
-        write_calibration(assess(fit_campaign(campaign, get_model(task.model), approach)), folder)
+        fit = fit_campaign(campaign, get_model(task.model), approach)
+        Calibration(fit).write(folder, Path())
         return None
     except InputError as error:
         wrong = " ".join(str(error).split()).removeprefix(f"{task.name}: ")

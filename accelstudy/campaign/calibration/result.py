@@ -1,10 +1,9 @@
-"""The result of `accelstudy.calibrate`, and how campaigns and models are named by a program."""
+"""The result of `accelstudy.calibrate`: a calibration, its tables, files and page."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +12,38 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 import accelstudy
-from accelstudy.approaches import Approach, get_approach
-from accelstudy.basics.arguments import check_type, path_of, quantity
+from accelstudy.basics.arguments import check_type, quantity
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.levels import REFUTATION_LEVEL
 from accelstudy.basics.progress import say, show, warn
+from accelstudy.basics.suggestions import HERE
 from accelstudy.basics.units import GON, InputQuantity
-from accelstudy.campaign.calibration import export, output, sensor_calibration, wording
+from accelstudy.campaign.calibration import export, sensor_calibration, wording
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
-from accelstudy.campaign.calibration.document import assessed_positions, write_json
-from accelstudy.campaign.calibration.fit import CampaignFit, fit_campaign
+from accelstudy.campaign.calibration.document import (
+    assessed_positions,
+    calibration_document,
+    quality_document,
+    write_json,
+)
+from accelstudy.campaign.calibration.figures import (
+    correlation_figure,
+    draw_residuals,
+    residual_figure,
+)
+from accelstudy.campaign.calibration.fit import CampaignFit
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, calibration_of
-from accelstudy.campaign.format import read_campaign
-from accelstudy.campaign.sensor_type import with_type
-from accelstudy.campaign.session import Campaign
+from accelstudy.drawing.saving import save_all
 from accelstudy.files.outputs import CALIBRATION
+from accelstudy.files.parquet import write_frame
 from accelstudy.leveling.error import MAX_TILT_GON
+from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 from accelstudy.sensors.frames import axes_note
-from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 
 TILT = InputQuantity("rad", "", 1e-3, np.pi / 2)
+MAX_ROWS = 200
+"""Positions up to which the page lists all of them; of more, those that fit worst."""
 
 
 class Calibration(Result):
@@ -41,8 +51,8 @@ class Calibration(Result):
 
     Attributes
     ----------
-    content : mapping, that of calibration.json
     fit : CampaignFit, the adjustment; None of a calibration that was read from a file
+    content : mapping, that of calibration.json
     source : path of the campaign, for the commands that are suggested
     """
 
@@ -50,13 +60,16 @@ class Calibration(Result):
 
     def __init__(
         self,
-        content: Mapping[str, Any] | None,
-        fit: CampaignFit | None = None,
+        fit: CampaignFit | None,
+        content: Mapping[str, Any] | None = None,
         source: Path | None = None,
     ) -> None:
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
-        self._content = output.calibration_content(self._assessment) if content is None else content
-        self.name = str(self._content["campaign"])
+        if content is None:
+            quality = quality_document(self._assessment)
+            content = {**calibration_document(self._fitted("content")), "quality": quality}
+        self._content = content
+        self.name = str(content["campaign"])
 
     @property
     def content(self) -> Mapping[str, Any]:
@@ -181,7 +194,7 @@ class Calibration(Result):
 
     def draw(self, ax: Axes) -> None:
         """Draw |f| − g of each position, mm/s²."""
-        output.draw_residuals(ax, self._fitted("plot"), self.residuals)
+        draw_residuals(ax, self._fitted("plot"), self.residuals)
 
     def _table(self) -> str:
         """Parameters with sigmas in the units that people read, then what the user should know."""
@@ -189,11 +202,42 @@ class Calibration(Result):
         return "\n".join([*wording.parameter_lines(self.content), *warnings])
 
     def write(self, folder: Path, place: Path) -> None:
-        """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit."""
+        """Write what `accelstudy calibrate` does; calibration.json alone where there is no fit.
+
+        Each file is whole or not there; calibration.json comes last. If the page fails, the numbers
+        are written all the same.
+        """
         if self.fit is not None:
-            output.write_calibration(self._assessment, folder, self.source, place)
-        # That of a diagnosis knows of what was mended.
-        write_json(folder / "calibration.json", dict(self.content))
+            self._write_page(self.fit, folder, place)
+        write_json(folder / "calibration.json", self.content)
+
+    def _write_page(self, fit: CampaignFit, folder: Path, place: Path) -> None:
+        """Write positions.parquet, figures/ and report.html."""
+        positions, lines = self.residuals, wording.verdict_lines(self._assessment)
+        drawn = save_all(
+            {
+                "residuals": lambda: residual_figure(fit, positions),
+                "correlations": lambda: correlation_figure(fit),
+            },
+            folder / "figures",
+        )
+        write_frame(folder / "positions.parquet", positions)
+        worst = positions.sort_values(
+            ["suspect", "p_value"], ascending=[False, True], kind="stable"
+        )
+        write_page(
+            folder / "report.html",
+            "campaign/calibration/report.html.j2",
+            " ".join(lines),
+            doc=self.content,
+            quality=self.content["quality"],
+            lines=lines,
+            angles_unused=fit.campaign.angles is not None and not fit.approach.uses_angles,
+            positions=worst.head(MAX_ROWS).sort_index().to_dict("records"),
+            refuted=REFUTATION_LEVEL,
+            figures=drawn,
+            next_steps=wording.next_steps(fit, self.state, self.source, place / HERE),
+        )
 
     def tell(self, place: Path) -> None:
         """Print the parameters, the verdict and what to do next."""
@@ -209,39 +253,3 @@ class Calibration(Result):
         steps = wording.next_steps(fit, self.state, self.source, place / "calibration.json")
         say(": ".join(steps[0]))
         say(f"report: {place / 'report.html'}")
-
-
-# --- what is given ------------------------------------------------------------------------------
-
-
-def as_campaign(campaign: Any, plausible: bool = True) -> Campaign:
-    """Return a campaign, read if it is given as the path of its folder."""
-    if isinstance(campaign, str | PathLike):
-        return read_campaign(path_of("campaign", campaign), plausible=plausible)
-    check_type(
-        "campaign", campaign, Campaign, expected="a Campaign, as find_holds returns, or a path"
-    )
-    return campaign
-
-
-def campaign_path(campaign: Any) -> Path | None:
-    """Path of a campaign, for the commands that are suggested; None if it is in memory."""
-    return None if isinstance(campaign, Campaign) else Path(campaign)
-
-
-def chosen(model: str, approach: str | None) -> tuple[SensorModel, Approach | None]:
-    """Return the model and the approach that are named."""
-    return get_model(model), None if approach is None else get_approach(approach)
-
-
-def resolve(
-    campaign: Any, model: str, approach: str | None, prior: Any = None, plausible: bool = True
-) -> tuple[Campaign, SensorModel, Approach | None]:
-    """Read the campaign, the model, the approach and what is known of the sensor a priori."""
-    names = chosen(model, approach)
-    return with_type(as_campaign(campaign, plausible), prior, names[0]), *names
-
-
-def fit_of(campaign: Any, model: str, approach: str | None, prior: Any = None) -> CampaignFit:
-    """Adjust a campaign by the keywords of `calibrate`."""
-    return fit_campaign(*resolve(campaign, model, approach, prior))
