@@ -135,7 +135,7 @@ class DataSheet:
         return lines + "\n".join(more) + "\n"
 
     def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
-        """Write a YAML file for `plan` and `init`, as `accelstudy data-sheet` does.
+        """Write a YAML file for `plan`, as `accelstudy data-sheet` does.
 
         Parameters
         ----------

@@ -22,7 +22,9 @@ from scipy.io import savemat
 from study_helpers import content as study_content
 
 import accelstudy as acs
+from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import read_campaign, write_campaign
+from accelstudy.data_sheets import get_data_sheet
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.conversion import Conversion
 
@@ -139,7 +141,6 @@ READ_BY = {
     "study.yaml": ["cells FILE"],
     "model.yaml": ["effects --scheme mclaren-24 --model FILE"],
     "scheme.yaml": ["schemes FILE"],
-    "box.yaml": ["init OUT --sensor FILE"],
 }  # fmt: skip
 """Files, and commands that read them."""
 
@@ -204,6 +205,20 @@ def test_any_damage_of_a_file_is_one_line(whole, name, data, which):
     if name.endswith((".yaml", ".json")):
         kinds += [values_replaced()]
     read(whole, name, READ_BY[name][which % len(READ_BY[name])], data.draw(st.one_of(kinds)))
+
+
+@settings(max_examples=25)
+@given(st.one_of(bytes_damaged(), words_replaced(), values_replaced()))
+def test_any_damage_of_a_data_sheet_is_one_line(whole, damage):
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "box.yaml")
+        path.write_bytes(damage((whole / "box.yaml").read_bytes()))
+        said = ""
+        try:
+            get_data_sheet(path)
+        except InputError as error:
+            said = str(error)
+        assert "\n" not in said
 
 
 def test_a_sensor_that_knows_nothing_and_a_gravity_that_knows_little_more(whole):

@@ -2,16 +2,11 @@
 
 import importlib.util
 
-import numpy as np
 import pytest
 from calling import call, refusal
 from places import ROOT
 from snakemake_helpers import snakemake
 
-import accelstudy as acs
-from accelstudy.basics.units import MGON
-from accelstudy.campaign.format import write_campaign
-from accelstudy.files.reading import read_layer
 from accelstudy.study.config import read_study
 from accelstudy.study.figures import figure_names
 from accelstudy.study.new_study import TEMPLATES
@@ -54,7 +49,7 @@ def test_without_snakemake_one_line_says_what_to_install(tmp_path, monkeypatch):
     assert "pip install 'accelstudy[workflow]'" in line
 
 
-# --- templates and sensors -----------------------------------------------------------------------
+# --- templates -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("template", TEMPLATES)
@@ -73,43 +68,10 @@ def test_each_template_is_planned_by_its_workflow_with_all_profiles(template, tm
     assert "snakemake --cores 2 " in (tmp_path / "mine" / "README.md").read_text("utf-8")
 
 
-def test_the_noise_of_a_data_sheet_is_that_of_a_usual_hold(tmp_path):
-    (tmp_path / "box.yaml").write_text(
-        "velocity_random_walk: 1 mm/s^2/sqrt(Hz)\nscale: 3000 ppm\n", encoding="utf-8"
-    )
-    init(tmp_path / "mine", "--sensor", tmp_path / "box.yaml")
-    study = read_study(tmp_path / "mine" / "config" / "config.yaml")
-    assert study.noise.sensor.sigma_mps2 == pytest.approx(1e-3 / np.sqrt(10), rel=1e-3)
-    assert study.sensor["scale"].value == [3000, -3000, 3000]
-    assert study.sensor["bias"].value == [0.05, 0.01, 0.03]  # of the paper
-
-
-def test_a_campaign_brings_noise_gravity_positions_and_what_its_calibration_finds(tmp_path):
-    effects = ("bias: 0.12, -0.07, 0.2", "scale: 0.003, -0.002, 0.001")
-    campaign = acs.simulate_campaign(
-        name="box", scheme="fibonacci-30", effects=effects, sigma=1e-5, gravity=9.81,
-        robot_sigma=MGON,
-    )  # fmt: skip
-    folder = tmp_path / "a box: 1"
-    write_campaign(campaign, folder)
-    for template in TEMPLATES:
-        init(tmp_path / template, "--template", template, "--sensor", folder)
-    study = read_study(tmp_path / "study" / "config" / "config.yaml")
-    assert study.noise.sensor.sigma_mps2 == 1e-5
-    assert study.noise.robot.sigma_mgon == pytest.approx(1)
-    assert study.gravity_mps2 == 9.81
-    assert study.sensor["bias"].value == pytest.approx([0.12, -0.07, 0.2], abs=1e-4)
-    assert study.sensor["scale"].value == pytest.approx([3000, -2000, 1000], abs=10)
-    (measured,) = read_layer(tmp_path / "campaigns/config/config.yaml")["campaigns"]
-    assert measured["campaign"] == str(folder)
-
-
 @pytest.mark.parametrize(("words", "reason"), [
     (("--template", "plan"), "--template plan: no longer a template; `accelstudy plan` needs"),
     (("--template", "studio"), "unknown template 'studio'; did you mean 'study'?"),
-    (("--sensor", "adxl-355"), "unknown sensor 'adxl-355'; did you mean 'adxl355'?"),
-    (("--sensor", "."), "campaign.yaml: no such file"),
-    (("--sensor", "no.yaml"), "no.yaml: no such file"),
+    (("--sensor", "adxl355"), "--sensor: no longer an option; set `noise` and `sensor` in config"),
 ])  # fmt: skip
 def test_what_there_is_not_is_one_line(words, reason, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
