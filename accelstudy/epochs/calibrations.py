@@ -1,15 +1,9 @@
-"""Calibrations of one sensor, brought to the effects that all of them have.
-
-If one has more effects, its sensor is calibrated again without them, as another one was: noise-free
-readings that it would give in evenly spread attitudes, under the conditions of the other session,
-by the approach of that.
-"""
+"""What a comparison and a history have in common: calibrations of one sensor with one model."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,46 +13,32 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from accelstudy.adjustment import calibrate
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import comma_list, estimate
 from accelstudy.campaign.calibration.document import write_json
-from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.campaign.calibration.sensor_calibration import KNOWN, USUAL, SensorCalibration
-from accelstudy.campaign.session import Campaign
+from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, new_figure, symbol
 from accelstudy.effects import Parameter
-from accelstudy.leveling.angles import angles_of
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
-from accelstudy.positions.points import evenly_spread
-from accelstudy.sensors.models import compose, composition_name
-from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise
 
 Array = NDArray[np.float64]
 
 STATES = {True: "unchanged", False: "changed"}
 """States of a result by whether the calibrations agree."""
-POSITIONS = 60
-"""Attitudes of the calibration that leaves out effects."""
-STEP = 1e-2
-"""Step of numerical derivatives, in sigmas."""
-GOLDEN = (np.sqrt(5) - 1) / 2
 PANELS = 3
 """Panels side by side."""
 
 
 class Calibrations(Result):
-    """Calibrations of one sensor, by the effects that all of them have.
+    """Calibrations of one sensor with one model.
 
     Attributes
     ----------
     calibrations : tuple of n SensorCalibration
-    model : SensorModel, the effects that all have
+    model : SensorModel
     estimates : (n, p) array, SI
     covariances : (n, p, p) array
     dates : tuple of n datetime; empty if they say nothing of the time
@@ -67,15 +47,17 @@ class Calibrations(Result):
     dates: tuple[datetime, ...] = ()
 
     def __init__(self, calibrations: Sequence[SensorCalibration]) -> None:
-        self.calibrations, self.model = tuple(calibrations), _common_model(calibrations)
-        fewest = sorted(calibrations, key=lambda one: len(one.model.effects))[:2]
-        each = [brought_to(one, self.model, fewest[one is fewest[0]]) for one in calibrations]
-        self.estimates = np.array([estimates for estimates, _ in each])
-        self.covariances = np.array([covariance for _, covariance in each])
+        _check_alike(calibrations)
+        self.calibrations, self.model = tuple(calibrations), calibrations[0].model
+        names = [one.model.parameter_names for one in calibrations]
+        orders = [[own.index(name) for name in names[0]] for own in names]
+        each = [*zip(calibrations, orders, strict=True)]
+        self.estimates = np.array([one.parameters[order] for one, order in each])
+        self.covariances = np.array([one.covariance[np.ix_(order, order)] for one, order in each])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters that all calibrations have."""
+        """Parameters of the model."""
         return self.model.parameters
 
     @property
@@ -87,11 +69,6 @@ class Calibrations(Result):
     def sigmas(self) -> Array:
         """Sigmas of `estimates`."""
         return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
-
-    def left_out(self, one: SensorCalibration) -> list[str]:
-        """Effects of a calibration that the common model lacks."""
-        common = [effect.spec for effect in self.model.effects]
-        return [effect.spec for effect in one.model.effects if effect.spec not in common]
 
     @property
     @abstractmethod
@@ -146,17 +123,16 @@ class Calibrations(Result):
         return figure
 
 
-def _common_model(calibrations: Sequence[SensorCalibration]) -> SensorModel:
-    """Model of the effects that all calibrations have.
+def _check_alike(calibrations: Sequence[SensorCalibration]) -> None:
+    """Check that the parameters of all calibrations are known, and mean the same.
 
     Raises
     ------
     InputError
-        If one of them has no sigmas, if they have no effect in common, or if their parameters do
-        not mean the same because the readings were converted in another way. The line names the
-        calibration by its number and its campaign.
+        If one of them has no sigmas, or other effects or another conversion of its readings than
+        the first. The line names the calibration by its number and its campaign.
     """
-    common = [effect.spec for effect in calibrations[0].model.effects]
+    first, names = calibrations[0], [effect.spec for effect in calibrations[0].model.effects]
     for number, one in enumerate(calibrations, start=1):
         where = f"calibration {number} ({one.content['campaign']})"
         if not np.isfinite(one.covariance).all():
@@ -164,79 +140,18 @@ def _common_model(calibrations: Sequence[SensorCalibration]) -> SensorModel:
                 f"{where}: no sigmas; calibrate with more positions, or state the noise of the "
                 "campaign"
             )
-        if one.content["nominal"] != calibrations[0].content["nominal"]:
+        if one.content["nominal"] != first.content["nominal"]:
             raise InputError(
                 f"{where}: nominal: other scales or offsets from counts to m/s^2 than in the first "
                 "calibration, so their parameters do not mean the same; import both logs with the "
                 "same ones"
             )
         own = [effect.spec for effect in one.model.effects]
-        if not (left := [spec for spec in common if spec in own]):
+        if {*own} != {*names}:
             raise InputError(
-                f"{where}: effects: none in common with those before: {comma_list(own)} here, "
-                f"{comma_list(common)} there"
+                f"{where}: effects: {comma_list(own)}, but {comma_list(names)} in the first "
+                "calibration; calibrate both campaigns with one `--model`"
             )
-        common = left
-    return compose(composition_name(compose("common", tuple(common)).effects), tuple(common))
-
-
-def brought_to(
-    calibration: SensorCalibration, model: SensorModel, like: SensorCalibration
-) -> tuple[Array, Array]:
-    """Parameters (p,) and covariance matrix (p, p) of a model with fewer effects.
-
-    Parameters
-    ----------
-    calibration : SensorCalibration
-    model : SensorModel, with some of its effects
-    like : SensorCalibration, whose session and approach leave out the others
-    """
-    own, given, covariance = calibration.model, calibration.parameters, calibration.covariance
-    if len(own.effects) == len(model.effects):
-        order = [own.parameter_names.index(name) for name in model.parameter_names]
-        return given[order], covariance[np.ix_(order, order)]
-    directions = evenly_spread(POSITIONS)
-    session = session_like(like, directions)
-    approach = get_approach(str(like.content["approach"] or "gravity"))
-
-    def readings(parameters: Array) -> Array:
-        forces = -session.gravity * directions
-        return own.sense(forces, parameters, session.gravity, session.hold)
-
-    fit = fit_campaign(replace(session, forces=readings(given)), model, approach)
-    steps = STEP * np.sqrt(np.diag(covariance))
-    stepped = np.concatenate([given + np.diag(steps), given - np.diag(steps)])
-    angles = fit.observed.angles
-    observed = replace(
-        fit.observed,
-        forces=np.array([readings(parameters) for parameters in stepped]),
-        angles=None if angles is None else np.repeat(angles, len(stepped), axis=0),
-        initial=fit.parameters,
-    )
-    found = calibrate(model, approach, observed).parameters[:, : model.n_parameters]
-    above, below = np.split(found, 2)
-    slopes = ((above - below) / (2 * steps[:, None])).T
-    return fit.parameters, slopes @ covariance @ slopes.T
-
-
-def session_like(like: SensorCalibration, directions: Array) -> Campaign:
-    """Session in which gravity has some directions, under the conditions of a calibration."""
-    n, forces = len(directions), -like.gravity * directions
-    columns = {}
-    for k, (column, name) in enumerate(KNOWN.items(), start=1):
-        low, high = like.ranges.get(name, USUAL[column])
-        columns[column] = low + (high - low) * (GOLDEN * k * np.arange(n) % 1.0)
-    return Campaign(
-        "comparison",
-        np.arange(1, n + 1),
-        forces,
-        like.gravity,
-        sigma_force=Noise().sigma_force,
-        angles=angles_of(forces),
-        sigma_angle=Noise().sigma_angle,
-        yaw=np.zeros(n),
-        **columns,
-    )
 
 
 def size_text(size: float, unit: str) -> str:

@@ -23,7 +23,6 @@ from accelstudy.epochs.calibrations import (
     Calibrations,
     change_text,
     largest_texts,
-    session_like,
 )
 from accelstudy.epochs.congruence import LEVEL, Differences
 from accelstudy.files.outputs import COMPARISON
@@ -40,7 +39,7 @@ class Comparison(Calibrations):
     Attributes
     ----------
     calibrations : tuple of SensorCalibration, the older one first
-    model : SensorModel, the effects that both have
+    model : SensorModel
     estimates : (2, p) array, SI
     covariances : (2, p, p) array
     tilt_range : float, rad, over which tilts are compared
@@ -79,9 +78,9 @@ class Comparison(Calibrations):
         changed, and as it is at last.
         """
         last, (first, second) = self.calibrations[1], self.estimates
-        g, forces = last.gravity, cap_forces(self.tilt_range, ATTITUDES, last.gravity)
-        hold = session_like(last, -forces / g).hold
-        error = tilt_error(self.model, first, self.model, second, forces, g, hold)
+        forces = cap_forces(self.tilt_range, ATTITUDES, last.gravity)
+        at = last.with_conditions(forces, self.model.hold_columns)
+        error = tilt_error(self.model, first, self.model, second, at[0], last.gravity, at[1])
         by_chance = np.einsum("auw,uw->a", error.quadratic, self.change.covariance)
         plain = np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0)
         return np.sqrt([plain, by_chance])
@@ -129,8 +128,6 @@ class Comparison(Calibrations):
                 for i, parameter in enumerate(self.parameters)
             ],
             "covariance": change.covariance,
-            "only_first": self.left_out(first),
-            "only_second": self.left_out(second),
             "tilt": {
                 "roll_mgon": roll,
                 "pitch_mgon": pitch,

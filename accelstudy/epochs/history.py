@@ -44,7 +44,7 @@ class History(Calibrations):
     Attributes
     ----------
     calibrations : tuple of n SensorCalibration, in the order of time
-    model : SensorModel, the effects that all have
+    model : SensorModel
     estimates : (n, p) array, SI
     covariances : (n, p, p) array
     dates : tuple of n datetime
@@ -72,7 +72,7 @@ class History(Calibrations):
         Raises
         ------
         InputError
-            If they are fewer than three, of one date, or cannot be brought to common effects.
+            If they are fewer than three, of one date, or of different models.
         """
         if len(calibrations) < MIN_CALIBRATIONS:
             raise InputError(
@@ -145,11 +145,7 @@ class History(Calibrations):
             "schema_version": 1,
             "sensor": self.sensor,
             "calibrations": [
-                {
-                    "campaign": one.content["campaign"],
-                    "date": date.isoformat(),
-                    "left_out": self.left_out(one),
-                }
+                {"campaign": one.content["campaign"], "date": date.isoformat()}
                 for one, date in zip(self.calibrations, self.dates, strict=True)
             ],
             "effects": [effect.spec for effect in self.model.effects],

@@ -21,7 +21,6 @@ from scipy import optimize
 
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.drawing.style import COLUMN, INK, new_figure
-from accelstudy.epochs.calibrations import session_like
 from accelstudy.epochs.course import YEAR
 from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 
@@ -87,10 +86,11 @@ class Interval:
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
         """Squared errors of roll and pitch of the draws, (DRAWS, 2), as a + b t + c t², rad²."""
-        last = self.history.calibrations[-1]
-        g, forces = last.gravity, cap_forces(self.tilt_range, ATTITUDES, last.gravity)
-        hold, values = session_like(last, -forces / g).hold, last.parameters
-        form = tilt_error(last.model, values, last.model, values, forces, g, hold).quadratic
+        last, model = self.history.calibrations[-1], self.history.model
+        g, values = last.gravity, self.history.estimates[-1]
+        forces = cap_forces(self.tilt_range, ATTITUDES, g)
+        at = last.with_conditions(forces, model.hold_columns)
+        form = tilt_error(model, values, model, values, at[0], g, at[1]).quadratic
         at_once, per_year = self._draw(np.einsum("auu->u", form))
         first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
         return (
@@ -107,20 +107,15 @@ class Interval:
         weights : (u,) array, squared tilt error by a parameter that is wrong by 1
         """
         history, rng = self.history, np.random.default_rng(SEED)
-        last = history.calibrations[-1]
-        noise = [_normal(rng, c) for c in history.covariances]
-        at_once, drift = _normal(rng, last.covariance), np.zeros(len(weights))
-        per_year = np.zeros_like(at_once)
-        names = last.model.parameter_names
-        places = [names.index(name) for name in history.model.parameter_names]
-        noise[-1] = at_once[:, places]
-        for k, (place, course) in enumerate(zip(places, history.courses, strict=True)):
+        noise = np.array([_normal(rng, c) for c in history.covariances])
+        at_once, per_year = noise[-1].copy(), np.zeros_like(noise[-1])
+        for k, course in enumerate(history.courses):
             scatter = course.line.scatter
             sessions = scatter * rng.standard_normal((len(noise) + 1, DRAWS))
-            errors = np.array([each[:, k] for each in noise]) + sessions[:-1]
-            per_year[:, place] = course.line.combination(scatter)[1] @ errors
-            drift[place] = course.rate.per_year
-            at_once[:, place] += sessions[-2] - sessions[-1]
+            errors = noise[:, :, k] + sessions[:-1]
+            per_year[:, k] = course.line.combination(scatter)[1] @ errors
+            at_once[:, k] += sessions[-2] - sessions[-1]
+        drift = np.array([course.rate.per_year for course in history.courses])
         parts = weights * np.mean(at_once**2, axis=0)
         dof = history.courses[0].line.dof * np.sum(parts) ** 2 / np.sum(parts**2)
         factor = np.sqrt(dof / rng.chisquare(dof, DRAWS))[:, None]

@@ -30,8 +30,7 @@ def compare(
 
     The congruence test of deformation analysis takes all parameters with both covariance matrices;
     if it rejects, the parameters that changed are named, at one level for all. The change is also
-    given in roll and pitch. If one calibration has effects that the other lacks, it is brought to
-    those of both.
+    given in roll and pitch. Both calibrations have to be of one model.
 
     The folder of results gets report.html, comparison.json and a figure.
 
@@ -47,7 +46,7 @@ def compare(
     Raises
     ------
     InputError
-        If they are not of one sensor, or have no effect in common.
+        If they are of different models, or their readings were converted differently.
 
     Examples
     --------
@@ -72,8 +71,8 @@ def history(
     """Say how a sensor changes over time.
 
     For each parameter there is a rate with its interval, and the scatter from session to session,
-    as by switching the sensor off and on. All tests together have one level. If calibrations differ
-    in their effects, they are brought to those that all of them have.
+    as by switching the sensor off and on. All tests together have one level. All calibrations have
+    to be of one model.
 
     With `tilt_accuracy` it says how long the last calibration is good enough, and what a new one
     would gain.
@@ -97,7 +96,7 @@ def history(
     Raises
     ------
     InputError
-        If they are fewer than three, of one date, or not of one sensor.
+        If they are fewer than three, of one date, or of different models.
 
     Examples
     --------
