@@ -127,16 +127,6 @@ def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
     assert "23.60 mm/s²" in found["reason"]
 
 
-@pytest.mark.parametrize("approach", ["robot", "gravity"])
-def test_an_observed_gravity_does_not_change_the_verdict(approach):
-    """It takes one unknown and gives one condition, and only scales all axes alike."""
-    measured, _ = campaign(4, approach=approach, effects=("hysteresis",), size=3.0)
-    fixed, free = (diagnose(replace(measured, sigma_gravity=s), NINE) for s in (0.0, 1e-3))
-    assert [f.name for f in fixed.found] == [f.name for f in free.found] == ["hysteresis"]
-    assert fixed.gap.before == pytest.approx(free.gap.before, rel=1e-3)
-    assert fixed.invisible == free.invisible
-
-
 @pytest.mark.parametrize(("repeat_first", "sigma_angle"), [(0, 0.0), (1, 1e-9)])
 def test_one_repeat_or_none_is_enough_and_no_robot_too_good(repeat_first, sigma_angle):
     measured = campaign(repeat_first=repeat_first)[0]

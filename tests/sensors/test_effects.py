@@ -296,16 +296,6 @@ def test_a_lag_is_a_setting_of_the_thermal_bias():
     assert lags[-1] < np.ptp(HOLD.time) / 3
 
 
-@EACH
-def test_linear_in_the_parameters(name):
-    effect = get_effect(name)
-    p, q = np.random.default_rng(4).normal(0, 1, (2, len(effect.parameters)))
-    one, other, both = (vars(added(effect, v)) for v in (p, q, 2 * p - 3 * q))
-    for kind, found in both.items():
-        expected = 2 * one[kind] - 3 * other[kind]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * (np.abs(found).max() + 1))
-
-
 # --- specs and candidates ------------------------------------------------------------------------
 
 

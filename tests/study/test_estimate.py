@@ -175,21 +175,6 @@ def test_quantiles_of_a_normal_sum(apart):
 STATISTICS = ("bias", "sd", "sd_ratio", "correlation", "variance_factor", "tilt_rms")
 
 
-@pytest.mark.parametrize(("noise", "approach"), [(0.3, "gravity"), (0.02, "robot")])
-def test_stated_errors_are_those_over_seeds(noise, approach):
-    cell = cell_of(noise, approach, replicates=100)
-    many = [simulated_statistics(cell, seed, [0.5, 0.95]) for seed in range(40)]
-    for name in STATISTICS:
-        values = np.array([one[name].value for one in many])
-        errors = np.array([one[name].error for one in many])
-        ratio = values.std(axis=0, ddof=1) / np.sqrt(np.mean(errors**2, axis=0))
-        low, high = (0.8, 1.2) if values.shape[1] > 2 else (0.6, 1.45)
-        assert low < np.sqrt(np.mean(ratio**2)) < high, name
-    bounds = [one.quantile(TILT, "roll", 0.95) for one in many]
-    scatter = np.std([each.value for each in bounds])
-    assert 0.5 < scatter / np.sqrt(np.mean([each.error**2 for each in bounds])) < 1.5
-
-
 LACKING = {"simulated_effects": ["bias", "scale", "nonorthogonality", "quadratic_scale"]}
 DISTURBED = {"noise": {"effects": ["heavy_tails(nu=3)"]}}
 
@@ -218,17 +203,6 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
     for name in ("roll", "pitch", "both"):
         one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
         assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
-
-
-def test_where_calibrations_fail_what_is_left_is_estimated():
-    cell = cell_of(1.5, replicates=1000)
-    found = simulated_statistics(cell, 1)
-    assert 3 < found.simulated - found.converged < 300
-    many = plain(replace(cell, replicates=4000), 2)
-    for name in ("bias", "sd", "coverage", "correlation", "tilt_rms"):
-        one, other = found[name], many[name]
-        error = np.hypot(np.hypot(one.error, other.error), 1 / 1000 if name == "coverage" else 0)
-        assert np.abs((one.value - other.value) / error).max() < STANDARD_ERRORS, name
 
 
 def test_plain_statistics_stand_beside():

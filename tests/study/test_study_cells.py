@@ -165,13 +165,3 @@ def test_other_cells_and_another_order_change_no_number(base, tmp_path):
     pd.testing.assert_frame_equal(
         found, small.sort_values(keys, ignore_index=True), check_exact=True
     )
-
-
-def test_how_cells_fan_out_changes_nothing(base, tmp_path):
-    other = run_study(tmp_path, "{scheme}", **BASE)
-    for name, table in base.items():
-        expected = table
-        if name == "estimates":  # their categories are those of the file
-            labels = dict.fromkeys(("cell", "parameter", "unit"), str)
-            expected, other[name] = table.astype(labels), other[name].astype(labels)
-        pd.testing.assert_frame_equal(other[name], expected, check_exact=True)
