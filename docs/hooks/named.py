@@ -55,17 +55,18 @@ def _absent(name):
 
 def _unknown(text):
     """What is no command, or no option of it; None where all is."""
-    lexer = shlex.shlex(text.replace("\\\n", " "), posix=True, punctuation_chars=True)
-    lexer.whitespace_split = True
     try:
-        words = list(lexer)
+        words = shlex.split(text.replace("\\\n", " "))
     except ValueError:  # a quote that is not closed: prose
         return None
     name = next((word for word in words if not word.startswith("-")), "")
-    if name not in main.commands:
+    command = main.commands.get(name)
+    if command is None:
         return f"accelstudy {name}" if re.fullmatch(r"[a-z-]+", name) else None
-    context = click.Context(main.commands[name])
-    known = {option for p in main.commands[name].get_params(context) for option in p.opts}
-    known |= {option for p in main.params for option in p.opts} | {"--help"}
-    given = [word.partition("=")[0] for word in words if word.startswith("--")]
-    return next((f"accelstudy {name} {each}" for each in given if each not in known), None)
+    try:
+        parser = command.make_parser(click.Context(command))
+        parser.parse_args(words[words.index(name) + 1 :])
+    except click.NoSuchOption as error:
+        return f"accelstudy {name} {error.option_name}"
+    except click.UsageError:  # a page may name an option without its value
+        return None

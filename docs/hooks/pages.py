@@ -4,25 +4,17 @@ import re
 from ast import literal_eval
 
 import catalogue
-import drawings
 import file_formats
 import gallery
 import help_texts
 import quotes
 import schemas
-from mkdocs.structure.files import File
 
 MODULES = {
     module.__name__: module
     for module in (catalogue, file_formats, gallery, help_texts, quotes, schemas)
 }
 CALL = re.compile(r"^<!-- (\w+)\.(\w+)\((.*)\) -->$", re.MULTILINE)
-
-
-def on_files(files, config):
-    """Add the drawing of a session."""
-    files.append(File.generated(config, "drawings/session.svg", content=drawings.session()))
-    return files
 
 
 def on_page_markdown(markdown, **_):

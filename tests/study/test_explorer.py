@@ -287,7 +287,7 @@ def test_a_choice_leaves_its_set_ups_and_shows_their_numbers(shown, tables):
     for title, name in (("empirical sd", "sd_empirical"), ("linear theory", "sd_linear")):
         same(table[title][-len(its) :].astype(float), its[name])
         assert set(table[title][: len(its)]) == {"–"}
-    assert points(shown, "coverage") == len(its)
+    assert points(shown, "sds") == len(its)
     fields = "[data-chart=correlations] [aria-roledescription='rect mark']"
     visible = [field for field in shown.locator(fields).all() if field.is_visible()]
     assert len(visible) == len(its) ** 2

@@ -20,8 +20,7 @@ from accelstudy.study.figures.calibrations import correlation_table, single_runs
 from accelstudy.study.figures.factors import FACTORS
 from accelstudy.study.figures.panels import tilt_errors
 from accelstudy.study.figures.table_1 import preset_table
-from accelstudy.study.figures.total_effects import changes
-from accelstudy.study.sensitivity import sensitivity_table, shapley_table
+from accelstudy.study.sensitivity import sensitivity_table
 
 PAPER = content(
     grids=[grid(schemes=["faces-6", "mclaren-24"], replicates=30), grid(f"{NINE}-crossaxis")],
@@ -49,8 +48,7 @@ def paper() -> Study:
 def tables(paper, tmp_path_factory) -> dict[str, pd.DataFrame]:
     found = run_study(tmp_path_factory.mktemp("paper"), **PAPER)
     sensitivity = sensitivity_table(paper, found["summary"])
-    shapley = shapley_table(paper, found["summary"], found["correlations"])
-    return {**found, "sensitivity": sensitivity, "shapley": shapley}
+    return {**found, "sensitivity": sensitivity}
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +62,7 @@ OTHERS = [*(f"sweep-{factor.name}" for factor in FACTORS)]
 
 
 def test_a_paper_study_has_the_figures_of_the_paper_and_of_every_study():
-    expected = [f"figure-{n}" for n in range(2, 9)] + ["leveling-overview", "shapley", "table-1"]
+    expected = [f"figure-{n}" for n in range(2, 9)] + ["leveling-overview", "table-1"]
     assert {*expected} <= {*ALL}
     assert {*OTHERS}.isdisjoint(ALL)
     assert {*OTHERS} < {*figure_names()}
@@ -147,7 +145,7 @@ def test_figure_4_shows_sobol_over_linear_theory_and_nothing_that_does_not_vary(
     draw("figure-5", {"sensitivity": table}, paper)
 
 
-@pytest.mark.parametrize("name", ["figure-5", "figure-6", "shapley"])
+@pytest.mark.parametrize("name", ["figure-5", "figure-6"])
 def test_a_panel_has_the_lines_of_one_group_each_with_its_symbol(name, figure_of):
     for ax in figure_of(name).axes:
         lines = [line for line in ax.get_lines() if len(line.get_xdata())]
@@ -158,23 +156,6 @@ def test_a_panel_has_the_lines_of_one_group_each_with_its_symbol(name, figure_of
         places = sorted((text.get_position() for text in ax.texts), key=lambda place: place[1])
         for (x, y), (other_x, other_y) in pairwise(places):
             assert abs(other_y - y) > 0.1 or abs(other_x - x) > 40
-
-
-def test_shapley_effects_name_what_overtakes(tables, paper):
-    table = tables["shapley"].assign(shapley_effect=tables["shapley"]["total_effect"])
-    (ax,) = draw("shapley", {"shapley": table}, paper).axes
-    assert [text.get_text() for text in ax.texts] == ["nothing to show"]
-    at = table["output"].eq("roll") & table["roll_gon"].eq(50) & table["pitch_gon"].eq(25)
-    at &= table["input"].eq("s_y")
-    table.loc[at, "shapley_effect"] = 0.9
-    (row,) = changes(table).query("overtakes").to_dict("records")
-    gained = 90 - 100 * float(table.loc[at, "total_effect"].iloc[0])
-    assert (row["input"], row["roll_gon"], row["pitch_gon"]) == ("s_y", 50, 25)
-    assert row["value"] == pytest.approx(gained)
-    drawn = draw("shapley", {"shapley": table}, paper)
-    level, tilted = drawn.axes
-    assert (level.get_title(), tilted.get_title()) == (r"$\theta$ = 0 gon", r"$\theta$ = 25 gon")
-    assert drawn.get_supylabel() == "scale\non roll"
 
 
 def test_table_1_has_the_mean_sd_of_a_group_and_the_tilt_error(tables, paper):

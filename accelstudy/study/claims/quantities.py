@@ -276,7 +276,7 @@ def _ends(values: Iterable[float]) -> Numbers:
     return dict(zip(("single_low", "median", "single_high"), map(float, values), strict=True))
 
 
-def correlations(
+def pair_correlations(
     data: ClaimData,
     approach: str = "gravity",
     scheme: str = "",
@@ -298,7 +298,7 @@ def correlations(
 
 def scale_pairs(data: ClaimData, approach: str, scheme: str = "") -> Array:
     """Mean |correlation| of each pair of scales."""
-    return correlations(data, approach, scheme, "s_", "s_")
+    return pair_correlations(data, approach, scheme, "s_", "s_")
 
 
 def scale_correlation(data: ClaimData) -> Numbers:
@@ -317,8 +317,8 @@ def scale_correlation_ratio(data: ClaimData) -> Numbers:
 
 
 def largest_correlation(data: ClaimData, **pairs: str) -> Numbers:
-    """Largest gravity-based correlation of pairs as in `correlations`."""
-    return {"value": float(correlations(data, **pairs).max())}
+    """Largest gravity-based correlation of pairs as in `pair_correlations`."""
+    return {"value": float(pair_correlations(data, **pairs).max())}
 
 
 def truth_over_sd(data: ClaimData, effect: str) -> Numbers:

@@ -31,8 +31,6 @@ def all_charts(approaches: Sequence[str], fields: Sequence[str]) -> dict[str, An
         "roll": tilt_chart("roll", approaches, fields),
         "pitch": tilt_chart("pitch", approaches, fields),
         "sds": sds_chart(approaches),
-        "ratio": interval_chart("sd_ratio", 1, ".3f", approaches),
-        "coverage": interval_chart("coverage_95", 0.95, ".1%", approaches),
         "correlations": correlation_chart(),
     }
     look = alt.Config(
@@ -94,26 +92,15 @@ def tilt_chart(angle: str, approaches: Sequence[str], fields: Sequence[str]) -> 
 
 def sds_chart(approaches: Sequence[str]) -> Layers:
     """Standard deviations of the parameters of one unit: a posteriori, empirical, linear theory."""
-    rows = _parameters(approaches)
+    numbers = ("sd_empirical", "sd_posteriori_mean", "sd_ratio", "coverage_95")
+    tooltip = ["parameter:N", "approach:N", "unit:N", *(f"{name}:Q" for name in numbers)]
+    rows = _rows(approaches, "parameter").encode(tooltip=tooltip)
     x = alt.X("sd_posteriori_mean:Q", title=None, axis=alt.Axis(format="~r", tickCount=5))
     return alt.layer(
         rows.mark_bar(opacity=0.4).encode(x=x),
         rows.mark_rule(size=2).encode(x="sd_posteriori_mean_low:Q", x2="sd_posteriori_mean_high:Q"),
         rows.mark_tick(thickness=2, size=14).encode(x="sd_linear:Q", color=alt.value(INK)),
         _points(rows, approaches).encode(x="sd_empirical:Q"),
-    )
-
-
-def interval_chart(quantity: str, right: float, digits: str, approaches: Sequence[str]) -> Layers:
-    """A quantity of each parameter with its 95 % interval, beside the value that is right."""
-    rows = _parameters(approaches)
-    axis = alt.Axis(format=digits, tickCount=5)
-    x = alt.X(f"{quantity}:Q", title=None, scale=alt.Scale(zero=False), axis=axis)
-    line = alt.Chart(alt.InlineData([{}])).mark_rule(color=INK, strokeDash=[4, 3])
-    return alt.layer(
-        line.encode(x=alt.datum(right)),
-        rows.mark_rule(size=2).encode(x=f"{quantity}_low:Q", x2=f"{quantity}_high:Q"),
-        _points(rows, approaches).encode(x=x),
     )
 
 
@@ -154,14 +141,6 @@ def _rows(approaches: Sequence[str], field: str, sort: Any = None) -> alt.Chart:
 def _points(rows: alt.Chart, approaches: Sequence[str]) -> alt.Chart:
     shape = alt.Shape("approach:N", scale=alt.Scale(domain=list(approaches)))
     return rows.mark_point(filled=True, size=55).encode(shape=shape)
-
-
-def _parameters(approaches: Sequence[str]) -> alt.Chart:
-    numbers = [
-        f"{name}:Q" for name in ("sd_empirical", "sd_posteriori_mean", "sd_ratio", "coverage_95")
-    ]
-    tooltip = ["parameter:N", "approach:N", "unit:N", *numbers]
-    return _rows(approaches, "parameter").encode(tooltip=tooltip)
 
 
 def _opacity(test: str, opacity: float, otherwise: Any) -> Any:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude, to_display
 from accelstudy.drawing import style
 from accelstudy.leveling.angles import jacobian, sigma_roll_pitch, specific_force
-from accelstudy.study.figures.panels import ANGLES, Image, key, panels, surface
+from accelstudy.study.figures.panels import ANGLES, Image, handle, panels, surface
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 from accelstudy.study.figures.total_effects import read_shares
 
@@ -148,7 +148,7 @@ def effects_of_forces(tables: Tables, study: Study) -> Figure:
         column="input",
         title="{symbol} on {output}",
         colours="total effect (share of variance)",
-        legend=[key("a share of 0.5, by linear theory"), key("Sobol's method", **circle)],
+        legend=[handle("a share of 0.5, by linear theory"), handle("Sobol's method", **circle)],
         **OVER_ATTITUDES,
     )
 

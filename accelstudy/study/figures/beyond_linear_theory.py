@@ -7,7 +7,7 @@ import scipy
 
 from accelstudy.drawing import style
 from accelstudy.study.figures.factors import NOISES
-from accelstudy.study.figures.panels import MAX_PANELS, key, panels, points
+from accelstudy.study.figures.panels import MAX_PANELS, handle, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 MIN_NONLINEAR_SHARE = 0.01
@@ -57,8 +57,8 @@ def beyond_linear_theory(tables: Tables, study: Study) -> Figure:
     sizes = table.groupby("title", sort=False)["group"].nunique()[:MAX_PANELS] + 1.6
     legend = [
         *style.approach_handles(approaches),
-        key("at most", linestyle="", marker="<", **LIMIT),
-        key("at least", linestyle="", marker=">", **LIMIT),
+        handle("at most", linestyle="", marker="<", **LIMIT),
+        handle("at least", linestyle="", marker=">", **LIMIT),
     ]
     return panels(
         table,

@@ -6,7 +6,7 @@ import numpy as np
 
 from accelstudy.drawing import style
 from accelstudy.study.config import APPROACHES
-from accelstudy.study.figures.panels import Image, in_shown_units, key, matrix, panels, points
+from accelstudy.study.figures.panels import Image, handle, in_shown_units, matrix, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 MIN_WRITTEN = 0.005
@@ -44,9 +44,9 @@ def errors_and_sigmas(tables: Tables, study: Study) -> Figure:
 
     colours = {name: style.approach_colour(name) for name in APPROACHES}
     legend = [
-        *(key(f"{n}, mean of all", color=c, alpha=0.4, linewidth=6) for n, c in colours.items()),
-        key("95 % of all simulations"),
-        key("one simulation", marker="o", linestyle="", markerfacecolor="white"),
+        *(handle(f"{n}, mean of all", color=c, alpha=0.4, linewidth=6) for n, c in colours.items()),
+        handle("95 % of all simulations"),
+        handle("one simulation", marker="o", linestyle="", markerfacecolor="white"),
     ]
     return panels(
         single_runs(tables, study),
@@ -94,7 +94,7 @@ def paper_cells(table: DataFrame, study: Study) -> DataFrame:
 
 
 @register("figure-8", "correlations", category="Paper", angles=False)
-def correlations(tables: Tables, study: Study) -> Figure:
+def correlations_of_parameters(tables: Tables, study: Study) -> Figure:
     """Figure 8: correlations of the parameters of the two calibrations.
 
     Absolute correlations of the estimated parameters less the identity, from the covariance matrix

@@ -8,7 +8,7 @@ from accelstudy.basics.units import GON, attitude_unit, shown_unit, to_attitude,
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import NOISES, varies
-from accelstudy.study.figures.panels import FAILED, Image, key, matrix, panels, tilt_errors
+from accelstudy.study.figures.panels import FAILED, Image, handle, matrix, panels, tilt_errors
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 ROW_MM = 6.0
@@ -56,9 +56,11 @@ def leveling_overview(tables: Tables, study: Study) -> Figure:
     largest = f"{to_attitude(study.leveling.max_tilt_gon * GON):g} {attitude_unit()}"
     one_reading = f"{to_display(study.sigma_force / study.gravity_mps2, 'rad'):.1f} {unit}"
     legend = [
-        key("upper number: rms; lower: both stay below in 95 % of the calibrations", linestyle=""),
-        key(f"not in it: a single reading, at {noise} and level {one_reading}", linestyle=""),
-        key("not estimable", **FAILED),
+        handle(
+            "upper number: rms; lower: both stay below in 95 % of the calibrations", linestyle=""
+        ),
+        handle(f"not in it: a single reading, at {noise} and level {one_reading}", linestyle=""),
+        handle("not estimable", **FAILED),
     ]
     return panels(
         table,

@@ -214,7 +214,7 @@ def points(ax: Axes, rows: DataFrame, x: str = "x", y: str = "y", **look: Any) -
         ax.plot(its[x].to_numpy(), its[y].to_numpy(), **{**usual, **look})
 
 
-def key(label: str, **look: Any) -> Line:
+def handle(label: str, **look: Any) -> Line:
     """Entry of a legend."""
     from matplotlib.lines import Line2D
 

@@ -9,7 +9,7 @@ import numpy as np
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.study.figures.factors import FACTORS, POSITIONS, Factor, swept, varies
-from accelstudy.study.figures.panels import FAILED, accuracies, key, panels
+from accelstudy.study.figures.panels import FAILED, accuracies, handle, panels
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 SYSTEMATIC = "gravity-error"
@@ -64,8 +64,8 @@ def over_factor(tables: Tables, study: Study, factor: Factor) -> Figure:
     seen = {*table["state"], *([BIAS] if table["bias"].any() else [])}
     legend = [
         *style.approach_handles(table["approach"].unique(), marker="", linestyle="-"),
-        *(key(name, **look) for name, look in looks.items() if len(looks) > 1),
-        *(key(name, **look) for name, look in MARKS.items() if name in seen),
+        *(handle(name, **look) for name, look in looks.items() if len(looks) > 1),
+        *(handle(name, **look) for name, look in MARKS.items() if name in seen),
     ]
     return panels(
         table,

@@ -7,7 +7,7 @@ import numpy as np
 from accelstudy.drawing import style
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import PRESETS, get_model
-from accelstudy.study.figures.panels import FAILED, accuracies, key, narrow, panels, points
+from accelstudy.study.figures.panels import FAILED, accuracies, handle, narrow, panels, points
 from accelstudy.study.figures.registry import Axes, DataFrame, Figure, Study, Tables, register
 
 ROW_MM = 9.5
@@ -57,8 +57,8 @@ def published_calibrations(tables: Tables, study: Study) -> Figure:
     table = preset_table(tables, study)
     legend = [
         *style.approach_handles(table["approach"].unique()),
-        key("not estimable", **FAILED),
-        key("estimable, but other parameters are not", **FAILED, **PALE),
+        handle("not estimable", **FAILED),
+        handle("estimable, but other parameters are not", **FAILED, **PALE),
     ]
     return panels(
         table,
