@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
@@ -22,8 +21,6 @@ from accelstudy.campaign.importing.noise import hold_noise, sigma_text
 from accelstudy.campaign.importing.recording import (
     AXES,
     Recording,
-    SensorLog,
-    find_column,
     read_log,
 )
 from accelstudy.campaign.importing.windows import Windows
@@ -83,7 +80,7 @@ def open_reference(
     try:
         log = read_log(path, layout, like=sensor.usual_layout, conditions=("time",))
     except InputError as error:
-        said = re.split("; give the column of time|; the columns are those", str(error))[0]
+        said = str(error).partition("; ")[0]
         raise InputError(
             f"`reference_log` {said}; it is read like the log of `reference`, and "
             "`reference_columns` fx=…,fy=…,fz=…,time=… names other columns"
@@ -161,7 +158,7 @@ class ReferenceLog:
         )
         columns = {"angles": angles, "sigma_angle": noise / gravity, "reference": reference}
         left_out = dict.fromkeys(table.index[poles].tolist(), why)
-        warnings = [*(f"hold {n} left out: {why}" for n in left_out), *_unused(holds.log.first)]
+        warnings = [f"hold {n} left out: {why}" for n in left_out]
         return Angles(holds, columns, left_out, warnings, note)
 
     def _records(self, holds: Holds, apart: float) -> tuple[dict[int, Array], dict[int, str]]:
@@ -250,16 +247,6 @@ class ReferenceLog:
                 "as only a small rotation is estimated"
             )
         return best
-
-
-def _unused(log: SensorLog) -> Iterator[str]:
-    """Say that roll and pitch in the log of the sensor itself are not used."""
-    there = [key for key in ("roll", "pitch") if find_column(log.source, key) is not None]
-    if there:
-        yield (
-            f"{log.path}: columns {', '.join(there)} are left out: roll and pitch are those of "
-            "`reference_log`"
-        )
 
 
 def reference_sensor(

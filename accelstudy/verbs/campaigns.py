@@ -119,7 +119,7 @@ def find_holds(
     shortest : float in s, or str with a unit
         Shortest hold, s, without its ends. [default: 1]
     exclude : str, or several
-        What to leave out, and why: 13:moved, 120s-135s:moved.
+        What to leave out, and why: 13:moved or 13,14:moved.
     block : int
         Samples of each position, in a log without the moves between them.
     means : bool

@@ -73,6 +73,7 @@ def moved(turn, size=0.0, cut=1):
 
 
 NEVER = "the sensor was never still: "
+SOMETHING_ELSE = "no text, MATLAB file up to version 7, Parquet, bag or ULog; unpack an archive"
 REFUSED = [
     # Text that is no log.
     ("", BY_PLACE, "the file is empty"),
@@ -89,17 +90,16 @@ REFUSED = [
     (dated("1492-01-01 10:00:00.{:05d}"), "", "--rate"),
     (dated("2024-01-01 10:00:00.{:05d}"), "--time-unit ms", "column time tells its unit; leave --"),
     # Files that are something else.
-    (packed("log.csv"), "", "a zip archive; unpack it first"),
-    (packed("[Content_Types].xml"), "", "an Excel workbook; save its sheet as CSV"),
-    (b'[{"ax": 1, "ay": 2}]', "", "JSON; save it as CSV"),
+    (packed("[Content_Types].xml"), "", SOMETHING_ELSE),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500), "", SOMETHING_ELSE),
+    (b'[{"ax": 1, "ay": 2}]', "", SOMETHING_ELSE),
+    (b"BZh91AY" + bytes(50), "", SOMETHING_ELSE),
     (("log.csv.gz", gzip.compress(NAMED.encode())[:-20]), "", "not a whole gzip file"),
-    (("log.parquet.gz", gzip.compress(b"1")), "", "unpack it first"),
     (("log.parquet", b"PAR1" + bytes(99)), "", "not a whole Parquet file"),
     (("log.parquet", parquet(["t", "fx", "fy", "fz", "fx"], *TABLE.T, TIME)), "", "which column"),
     (("log.parquet", parquet(["t", "fx", "fy", "fz"], *TABLE.T[:3], ["a"] * 50)), "",
      "column fz is string, not numbers"),
     (("log.mat", matlab(log=TABLE)[:300]), "", "not a whole MATLAB file"),
-    (("log.mat", b"\x89HDF\r\n"), "", "save it with -v7"),
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--rate 4", "which array? There are log, other"),
     (("log.mat", matlab(log=TABLE, other=FORCES)), "--variable othr", "did you mean 'other'"),
     (("log.mat", matlab(log=1j * TABLE)), BY_PLACE, "array log has complex numbers"),
@@ -128,10 +128,10 @@ REFUSED = [
     (HELD, "--rate 100 --shortest 5", "8 rests of 4.0 s are no hold: it takes 6.4 s"),
     (HELD, "--rate 100 --window 0.02", "holds 2 samples, at 100 per second; is the rate (--rate)"),
     (HELD, "--rate 100 --window 1e3", "too few samples for a window of 100001"),
-    (HELD, "--rate 100 --exclude 13:moved", "exclude: there is no hold 13; they are 1 to 8"),
-    (HELD, "--rate 100 --exclude 13", "exclude: expected a hold or a time, and why, as 13:moved"),
+    (HELD, "--rate 100 --exclude 13:moved", "exclude: there is no hold 13; they are 1, 2, 3"),
+    (HELD, "--rate 100 --exclude 13", "exclude: expected holds by their numbers in segmentation"),
     (HELD, "--rate 100 --join 4,5", "--join: no longer an option; holds in one attitude"),
-    (HELD, "--rate 100 --exclude 1s-2s:x", "exclude: 1s-2s: no hold lies there"),
+    (HELD, "--rate 100 --exclude 1s-2s:x", "as 13:moved or 13,14:moved, not '1s-2s:x'"),
     (np.repeat(np.eye(4, 3) * G, 300, axis=0), "--rate 100 --window 0.5", "frozen"),
     (moved(0.5, 4.0, 3), "--rate 100", NEVER),  # waved about
     (moved(0.1, 0.4, 2), "--rate 100", NEVER),  # turned gently by hand
@@ -142,7 +142,6 @@ REFUSED = [
     (BLOCKS, "--block 80", "blocks of 80 samples are no positions"),
     (BLOCKS, "--block 3", "--block: must be from 4 to"),
     (BLOCKS, "--block 40 --means", "(--means) has a row for each position, no block"),
-    (BLOCKS, "--block 40 --exclude 1s-2s:moved", "has no time; name blocks by their numbers"),
     (BLOCKS, "none.csv --block 40", "a log of blocks (--block) is one file, not 2"),
     # Means.
     (means(n=0), "--means", "n_samples: must be positive"),

@@ -5,7 +5,7 @@ A hold is a run of samples about which the windows of all sensors are at rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import NormalDist
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import STANDARD_GRAVITY
-from accelstudy.basics.wording import plural
+from accelstudy.basics.wording import plural, short_list
 from accelstudy.campaign.importing.allan import MIN_DIFFERENCES
 from accelstudy.campaign.importing.noise import HoldNoise, hold_noise, noise_before_rounding
 from accelstudy.campaign.importing.recording import AXES, SDS, Recording
-from accelstudy.campaign.importing.settings import ImportSettings, Span, Which
+from accelstudy.campaign.importing.settings import ImportSettings
 from accelstudy.campaign.importing.windows import (
     MAX_REST_NOISE,
     THRESHOLD_FACTOR,
@@ -232,9 +232,6 @@ def find_blocks(log: Recording, settings: ImportSettings) -> Holds:
     InputError
         If the log does not end with a block, or the sensor is saturated or moves in all of them.
     """
-    named = (which for which, _ in settings.left_out)
-    if "time" not in log.first.places and any(isinstance(which, Span) for which in named):
-        raise InputError(f"{log.path}: has no time; name blocks by their numbers, as 13:moved")
     block = log.part
     if (size := settings.block) is not None:
         row, total = log.row, len(log.first.forces)
@@ -340,10 +337,13 @@ def _holds_of(
     Raises
     ------
     InputError
-        If a person leaves all of them out, or the sensor was never still.
+        If there is no such hold, a person leaves all of them out, or the sensor was never still.
     """
     log, table = windows.log, hold_table(windows.log, holds)
-    left_out = {**(left_out or {}), **_left_out(table, settings.left_out)}
+    left_out = {**(left_out or {}), **settings.left_out}
+    for number in sorted(left_out.keys() - holds.keys()):
+        there = short_list([str(each) for each in holds])
+        raise InputError(f"exclude: there is no hold {number}; they are {there}")
     used = [log.forces[hold] for number, hold in holds.items() if number not in left_out]
     if not used:
         why = f"exclude: no {'hold' if size is None else 'block'} is left"
@@ -357,42 +357,6 @@ def _holds_of(
         )
         raise _never_still(windows, why, settings.window_s or usual_window(log), size)
     return found
-
-
-def _left_out(table: pd.DataFrame, left_out: Sequence[tuple[Which, str]]) -> dict[int, str]:
-    """Holds that are left out, with the reason; one by its number counts before one by its time.
-
-    Raises
-    ------
-    InputError
-        If there is no such hold, or none in a span of time.
-    """
-    reasons: dict[int, str] = {}
-    for which, why in sorted(left_out, key=lambda each: not isinstance(each[0], Span)):
-        if isinstance(which, Span):  # in which they lie, if only in part
-            inside = (table["t0"] <= which.end) & (table["t1"] >= which.start)
-            numbers = table.index[inside].tolist()
-            if not numbers:
-                raise InputError(f"exclude: {which}: no hold lies there")
-        else:
-            numbers = [*which]
-        for number in numbers:
-            if number not in table.index:
-                names = _names(table.index)
-                raise InputError(f"exclude: there is no hold {number}; they are {names}")
-        reasons |= dict.fromkeys(numbers, why)
-    return reasons
-
-
-def _names(numbers: Iterable[int]) -> str:
-    """Numbers in one line, runs of them by their ends."""
-    runs: list[list[int]] = []
-    for number in sorted(numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(f"{r[0]} to {r[-1]}" if len(r) > 2 else ", ".join(map(str, r)) for r in runs)
 
 
 def _moves(holds: Holds) -> bool:

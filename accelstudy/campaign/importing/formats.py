@@ -13,19 +13,10 @@ from accelstudy.files.reading import readable
 
 _BAGS = (b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3\0")
 _ULOG = b"ULog\x01\x12\x35"
-_OTHERS = {
-    b"PK\x03\x04": "a zip archive; unpack it first",
-    b"\xd0\xcf\x11\xe0": "an Excel workbook; save its sheet as CSV",
-    b"\x89HDF": "a MATLAB 7.3 (HDF5) file; save it with -v7",
-    b"BZh": "packed by bzip2; unpack it first",
-    b"\xfd7zXZ": "packed by xz; unpack it first",
-    b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
-    b"Rar!": "a RAR archive; unpack it first",
-    b"\x28\xb5\x2f\xfd": "packed by zstd; unpack it first",
-    b"%PDF": "a PDF; a log is text, MATLAB, Parquet, a bag or a ULog",
-}
-"""What files begin with that are no logs, and what they are."""
-_JSON = re.compile(rb"(\xef\xbb\xbf)?\s*(\{\s*[\"}]|\[\s*[\[{\"])")
+_CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x1a\x1c-\x1f]")
+"""Bytes that no text has, in UTF-16 either."""
+_NO_TABLE = re.compile(rb"BZh|%PDF|(\xef\xbb\xbf)?\s*[\[{]\s*[\[{\"}]")
+"""What files begin with that look like text: an archive, a document, JSON."""
 
 
 def open_source(path: LogFile, variable: str | None = None, delimiter: str | None = None) -> Source:
@@ -55,9 +46,6 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
     if path.suffix.lower() in (".parquet", ".pq"):
         return open_parquet(path)
     if start.startswith(GZIP):
-        kind = Path(path.stem).suffix.lower()
-        if kind in (".parquet", ".pq", ".mat"):
-            raise InputError(f"{path}: unpack it first; only text is read from gzip")
         return TextSource(path, delimiter)
     # An ASCII .mat has no zero bytes; every binary one has some in its header.
     if path.suffix.lower() == ".mat" and 0 in start:
@@ -66,12 +54,9 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
         return open_bag(path, variable)
     if start.startswith(_ULOG):
         return open_ulog(path, variable)
-    for first, what in _OTHERS.items():
-        if start.startswith(first):
-            office = any(part in start for part in (b"[Content_Types]", b"docProps/", b"xl/"))
-            if first == b"PK\x03\x04" and (office or path.suffix.lower() == ".xlsx"):
-                what = "an Excel workbook; save its sheet as CSV"
-            raise InputError(f"{path}: {what}")
-    if _JSON.match(start):
-        raise InputError(f"{path}: JSON; save it as CSV, with a row for each sample")
+    if _NO_TABLE.match(start) or _CONTROLS.search(start):
+        raise InputError(
+            f"{path}: no text, MATLAB file up to version 7, Parquet, bag or ULog; unpack an "
+            "archive, and save a workbook or JSON as CSV, with a row for each sample"
+        )
     return TextSource(path, delimiter)

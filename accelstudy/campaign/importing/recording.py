@@ -35,8 +35,6 @@ CONDITIONS = ("temperature", "vibration")
 """Columns of a log besides time and forces."""
 MAX_FORCE = 1e4
 """m/s², some 1000 g: what levels gives no larger reading."""
-SENTINELS = (2.0**31 - 1, -(2.0**31), 1 - 2.0**31, 2.0**32 - 1)
-"""Numbers that stand for a missing reading: the ends of the integers of 32 bits."""
 SAMPLED_ROWS = 1000
 """Rows of a log that tell how large its readings are."""
 MAX_BAD_SHARE = 0.05
@@ -324,19 +322,16 @@ class SensorLog:
         elif self.layout.rate_hz is not None:
             rows["time"] = np.arange(len(values["fx"])) / self.layout.rate_hz
         frame, conversion = self.layout.axes, self.conversion
-        first_rows = np.column_stack([values[axis][:SAMPLED_ROWS] for axis in AXES])
-        read = _is_reading(first_rows).all(axis=1)
-        norms = np.linalg.norm(conversion.to_si(first_rows[read]), axis=1)
-        # The unit may be wrong: it is checked by the means of the holds.
-        limit = max([MAX_FORCE, *([1000 * np.median(norms)] if len(norms) else [])])
         forces = np.empty((3, len(values["fx"])))
         for force, sign, i in zip(forces, frame.signs, frame.order, strict=True):
-            raw, own = values.pop(AXES[i]), conversion.axis(i)
-            np.subtract(raw, own.offset, out=force)
+            own = conversion.axis(i)
+            np.subtract(values.pop(AXES[i]), own.offset, out=force)
             force *= sign * own.scale
-            large = ~_within_limits(raw, 2.0**31 - 2)
-            if large.any():
-                force[large] = np.where(_is_reading(raw[large]), force[large], np.nan)
+        # The unit may be wrong, which the means of the holds show, but it is the same in all rows.
+        usual = np.abs(forces[:, :SAMPLED_ROWS]).max(axis=0)
+        usual = usual[_within_limits(usual)]
+        limit = max([MAX_FORCE, *([1000 * np.median(usual)] if len(usual) else [])])
+        for force in forces:
             force[~_within_limits(force, limit)] = np.nan
         rows |= zip(AXES, forces, strict=True)
         for key in self.conditions:
@@ -377,11 +372,6 @@ def counted_from_first(values: NDArray[Any]) -> tuple[Array, float]:
 def _within_limits(values: NDArray[Any], largest: float = MAX_VALUE) -> NDArray[np.bool_]:
     """Which numbers are at most ±`largest`; by default, those that can be calculated with."""
     return np.asarray((values >= -largest) & (values <= largest))
-
-
-def _is_reading(values: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which numbers of a log can be readings of a sensor."""
-    return _within_limits(values) & ~np.isin(values, SENTINELS)
 
 
 class Recording:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -28,25 +28,8 @@ from accelstudy.files.validation import (
 
 _LARGE = Field(le=1e6)
 
-_EXCLUDED = re.compile(
-    r"\s*(?:(\d+(?:\.\d*)?)\s*s?\s*-\s*(\d+(?:\.\d*)?)\s*s|(\d{1,9}(?:\s*,\s*\d{1,9})*))\s*:\s*(\S.*)",
-    re.DOTALL,
-)
-"""Holds by a span of time or by their numbers, and why they are left out."""
-
-
-class Span(NamedTuple):
-    """A span of time since the start of the log, s, for the holds that lie in it."""
-
-    start: float
-    end: float
-
-    def __str__(self) -> str:
-        return f"{self.start:g}s-{self.end:g}s"
-
-
-Which = Span | tuple[int, ...]
-"""Holds by a span of time, or by the numbers that the detector gave them."""
+_EXCLUDED = re.compile(r"(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*:\s*(\S.*)", re.DOTALL)
+"""Holds by their numbers, and why they are left out."""
 
 
 class GravitySettings(ConfigSection):
@@ -91,7 +74,7 @@ class ImportSettings(LogLayout):
     trim_s: NotNegative = Field(0.2, description="cut from both ends of a hold")
     shortest_s: Positive = Field(1.0, description="shortest hold")
     exclude: list[str] = Field(
-        [], description="holds to leave out, as 13:moved or 120s-135s:somebody passed"
+        [], description="holds to leave out, and why, as 13:moved or 13,14:somebody passed"
     )
 
     @model_validator(mode="after")
@@ -107,22 +90,17 @@ class ImportSettings(LogLayout):
         return self.range_mps2
 
     @property
-    def left_out(self) -> list[tuple[Which, str]]:
-        """Holds to leave out, with the reason: ``13:moved`` or ``120s-135s:moved``."""
-        chosen: list[tuple[Which, str]] = []
+    def left_out(self) -> dict[int, str]:
+        """Numbers of the holds to leave out, with the reason: ``13:moved``."""
+        reasons: dict[int, str] = {}
         for text in self.exclude:
-            match = _EXCLUDED.fullmatch(text)
-            if match is None or (match[1] and float(match[1]) >= float(match[2])):
+            if (match := _EXCLUDED.fullmatch(text.strip())) is None:
                 raise InputError(
-                    "exclude: expected a hold or a time, and why, as 13:moved or 120s-135s:moved, "
-                    f"not {text!r}"
+                    "exclude: expected holds by their numbers in segmentation.png, and why, as "
+                    f"13:moved or 13,14:moved, not {text!r}"
                 )
-            start, end, numbers, why = match.groups()
-            which: Which = (
-                Span(float(start), float(end)) if start else tuple(map(int, numbers.split(",")))
-            )
-            chosen.append((which, " ".join(why.split())))
-        return chosen
+            reasons |= dict.fromkeys(map(int, match[1].split(",")), " ".join(match[2].split()))
+        return reasons
 
 
 def parse_settings(

@@ -7,7 +7,8 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from io import BytesIO
 from itertools import islice, takewhile
@@ -36,6 +37,8 @@ _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
 _SEPARATORS = {"tab": "\t", "blank": None}
 _LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
+_LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
+"""Name of the number that follows, as in ``ax: 0.12`` or ``ax=0.12``."""
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
 _NUMBER = r"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE]([+]?[0-9]{1,2}|-[0-2]?[0-9]{1,2}))?$"
 
@@ -52,10 +55,12 @@ class TextSource(Source):
 
     def __init__(self, path: Path, delimiter: str | None = None) -> None:
         self.path, self._repeated = path, 0
-        self._content: bytes | None = _read(path)
+        self._content: bytes | None
+        self._content, labels = _read(path)
         self._rows = _Rows.told_from(self._content, path, delimiter)
-        self.named = self._rows.names is not None
-        self.names = self._rows.names or [str(i) for i in range(self._rows.width)]
+        names = labels if len(labels) == self._rows.width else self._rows.names
+        self.named = names is not None
+        self.names = names or [str(i) for i in range(self._rows.width)]
         self.dates, self.layout = self._rows.dates, layout_by_names(self.names)
 
     @property
@@ -153,25 +158,23 @@ class TextSource(Source):
 
     def look_up(self, row: int, place: int) -> tuple[str, str]:
         """See `Source`; reads the file again, which only errors and warnings need."""
-        number, line = next(islice(self._numbered_rows(), row, None), (0, ""))
+        lines = enumerate(_read(self.path)[0].decode().split("\n"), 1)
+        below = ((n, self._rows.clean(line)) for n, line in lines if n > self._rows.first)
+        rows = ((n, text) for n, text in below if text is not None)
+        number, line = next(islice(rows, row, None), (0, ""))
         if not number:
             return f"row {row + 1}", "unreadable"
-        cells = self._rows.split(line.split(self._rows.comment)[0])
+        cells = self._rows.split(line)
         if any(cells[self._rows.width :]):
             return f"line {number}", f"{len(cells)} columns instead of {self._rows.width}"
         if place >= len(cells):
             return f"line {number}", "the line ends before it"
         return f"line {number}", repr(cells[place][:40]) if cells[place] else "nothing"
 
-    def _numbered_rows(self) -> Iterator[tuple[int, str]]:
-        """Rows with the numbers of their lines, counted from 1."""
-        for number, line in enumerate(_read(self.path).decode().split("\n"), 1):
-            if number > self._rows.first and (row := self._rows.clean(line)) is not None:
-                yield number, row
-
     def _rows_only(self) -> pa.Buffer:
         """Rows of the table, each in a line of its own, in UTF-8."""
-        content, self._content, self._repeated = self._content or _read(self.path), None, 0
+        content, self._content = self._content or _read(self.path)[0], None
+        self._repeated = 0
         lines = BytesIO(content)
         for _ in range(self._rows.first):
             lines.readline()
@@ -184,10 +187,9 @@ class TextSource(Source):
         """Lines of a text without those that are no rows."""
         if self._rows.are_clean(block):
             return block
-        text = block.decode()
-        lines, closed = text.split("\n"), self._rows.closes_quotes(text)
+        lines = block.decode().split("\n")
         self._repeated += sum(line.strip() in self._rows.header for line in lines)
-        rows = (row for line in lines if (row := self._rows.clean(line, closed)) is not None)
+        rows = (row for line in lines if (row := self._rows.clean(line)) is not None)
         return "".join(f"{row}\n" for row in rows).encode()
 
 
@@ -247,11 +249,8 @@ class _Rows:
         blanks = ("  ", "\t", "\n ", " \n") if delimiter is None else ()
         self._marks = [m.encode() for m in ('"', *self._comments, *self.header, *blanks)]
         mark = re.escape(delimiter or " ")
-        # A cell in quotation marks that holds neither another mark nor the delimiter.
-        self._quoted = re.compile(f'"[^"\n{mark}]*"')
-        # Blanks before a cell in quotation marks or, as a delimiter, between any cells.
-        between = rf'(?<={mark})[ ]+(?=")' if delimiter else r"\s+"
-        self._blanks = re.compile(between + r'(?=(?:[^"]*"[^"]*")*[^"]*$)')
+        # A cell whose quotation marks hold neither another mark nor the delimiter.
+        self._quoted = re.compile(f'(^|{mark}) *"([^"{mark}]*)"')
 
     @classmethod
     def told_from(cls, content: bytes, path: Path, delimiter: str | None) -> _Rows:
@@ -288,32 +287,29 @@ class _Rows:
         )
         return not content.startswith(b" ", start) and not any(found)
 
-    def closes_quotes(self, text: str) -> bool:
-        """Whether every quotation mark closes before the next delimiter."""
-        return '"' not in self._quoted.sub("", text)
+    def clean(self, line: str) -> str | None:
+        """A row as Arrow takes it, with quotation marks only where they are needed.
 
-    def clean(self, line: str, closed: bool = False) -> str | None:
-        """A row as Arrow takes it, None for any other line; a cell of a log has no end of a line.
-
-        So a quotation mark that is not `closed` in its line has no meaning.
+        None for any other line.
         """
-        content = line.strip(self._around)
-        if not content or content.startswith(self._comments) or line.strip() in self.header:
+        if (
+            not (content := line.strip(self._around))
+            or content.startswith(self._comments)
+            or line.strip() in self.header
+        ):
             return None
-        row = line
-        if self.comment in line and (start := line.split(self.comment)[0]).count('"') % 2 == 0:
-            row = start
-        if '"' in row and not closed:
-            try:
-                mark = self.delimiter or " "
-                reader = csv.reader([row, ""], delimiter=mark, skipinitialspace=True)
-                closed = sum(1 for _ in reader) == 2
-            except csv.Error:
-                closed = False
-            row = row if closed else row.replace('"', "")
+        start = line.split(self.comment)[0]
+        row = line if start.count('"') % 2 else start
         if '"' in row:
-            return self._blanks.sub("" if self.delimiter else " ", row.strip(" "))
-        return row if self.delimiter else " ".join(row.split())
+            plain = self._quoted.sub(r"\1\2", row)
+            row = self._quote_again(self.split(row)) if '"' in plain else plain
+        return row if self.delimiter or '"' in row else " ".join(row.split())
+
+    def _quote_again(self, cells: Sequence[str]) -> str:
+        """A row of cells, with quotation marks around those that need them."""
+        mark = self.delimiter or " "
+        cells = [cell.replace('"', '""') for cell in cells]
+        return mark.join(f'"{c}"' if mark in c or '"' in c else c for c in cells)
 
     def _lacks(self, cells: Sequence[str], full: Sequence[str]) -> bool:
         """Whether a row is like a full one, but for some readings."""
@@ -371,18 +367,25 @@ class _Rows:
 
 
 def split_line(line: str, delimiter: str | None) -> list[str]:
-    """Cells of a line, without surrounding blanks and quotation marks."""
-    if '"' in line and delimiter is not None:
-        try:
-            row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-            return [cell.strip() for cell in row]
-        except csv.Error:
-            pass
+    """Cells of a line, without surrounding blanks and quotation marks.
+
+    No cell holds the end of a line, so a quotation mark that does not close has no meaning.
+    """
+    if '"' in line:
+        line = line if delimiter else " ".join(line.split())
+        reader = csv.reader([line, ""], delimiter=delimiter or " ", skipinitialspace=True)
+        with suppress(csv.Error):
+            if len(rows := [*reader]) == 2:
+                return [cell.strip() for cell in rows[0]]
+        line = line.replace('"', "")
     return [cell.strip() for cell in line.split(delimiter)]
 
 
-def _read(path: Path) -> bytes:
-    """All of a file in UTF-8, with line ends as in Python."""
+def _read(path: Path) -> tuple[bytes, list[str]]:
+    """All of a file in UTF-8, with line ends as in Python, and labels that all its lines had.
+
+    A line as ``ax: 0.12, ay: -0.03, az: 9.8`` is read as one with three numbers.
+    """
     try:
         with readable(path):
             content = path.read_bytes()
@@ -396,7 +399,13 @@ def _read(path: Path) -> bytes:
         except UnicodeDecodeError:  # what is no UTF-8 is mostly that of a Western Windows
             encoding = "cp1252" if encoding.startswith("utf-8") else encoding
             content = content.decode(encoding, errors="replace").encode()
-    return content.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in content else content
+    if b"\r" in content:
+        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    first = content[:_PREVIEW].split(b"\n")
+    labels, lines = Counter(tuple(_LABEL.findall(line)) for line in first).most_common(1)[0]
+    if len(labels) < 3 or lines < len(first) / 2:
+        return content, []
+    return _LABEL.sub(b"", content), [label.decode() for label in labels]
 
 
 def _encoding_of(start: bytes) -> str:
