@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 import pandas as pd
+import pyarrow as pa
 from matplotlib.axes import Axes
 
 from accelstudy.approaches import get_approach
@@ -25,14 +25,11 @@ from accelstudy.files.tables import write_table
 from accelstudy.pages.result import Result
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.study import statistics as of_cells
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import parse_study
-from accelstudy.study.statistics import ANGLES, TILT, CellStatistics
-from accelstudy.study.tables import tables_of
-
-if TYPE_CHECKING:
-    import xarray as xr
+from accelstudy.study.replicates import ESTIMATES, estimates_table
+from accelstudy.study.statistics import ANGLES, TILT, CellStatistics, simulated_statistics
+from accelstudy.study.tables import tables_of, with_derived
 
 GRID: dict[str, tuple[str, Callable[[str], Any]]] = {
     "model": ("models", get_model),
@@ -89,7 +86,7 @@ class Simulation(Result):
         cells = _with_truth(parse_study(content, "simulate").cells, truth)
         if not any(cell.estimability.estimable for cell in cells):
             raise InputError(f"{cells[0].name}: {cells[0].estimability.reason}")
-        return cls([of_cells.simulated_statistics(cell, seed) for cell in cells], seed)
+        return cls([simulated_statistics(cell, seed) for cell in cells], seed)
 
     @property
     def state(self) -> str:
@@ -196,49 +193,19 @@ class Simulation(Result):
         return pd.concat(tables, keys=[cell.name for cell in self.cells], names=["cell"])
 
     @cached_property
-    def estimates(self) -> xr.Dataset:
-        """Every calibration, SI: an `xarray.Dataset` of cell × replicate × parameter.
+    def estimates(self) -> pd.DataFrame:
+        """Every calibration, SI: a row for each cell, replicate and parameter.
 
-        Its variables are `estimate`, its a-posteriori standard deviation `sigma`, the `truth` of
-        each cell, and `tilt`, the rms error of each angle up to 50 gon. A calibration that did not
-        converge is NaN, and so is a parameter that a cell does not estimate.
+        The columns are those of the estimates of a study, with error, sigma0_squared and
+        sigma_posteriori. Cells that cannot be estimated have no rows.
         """
-        import xarray as xr
-
-        cells, count = self.cells, max(cell.replicates for cell in self.cells)
-        units = {name: u for cell in cells for name, u in cell.parameter_units.items()}
-        truth = np.full((len(cells), len(units)), np.nan)
-        estimate, sigma = np.full((2, len(cells), count, len(units)), np.nan)
-        tilt = np.full((len(cells), count, len(ANGLES)), np.nan)
-        for i, one in enumerate(self.statistics):
-            own = [[*units].index(name) for name in one.cell.parameter_units]
-            truth[i, own] = one.cell.true_values
-            if one.replicates is not None:
-                block = one.replicates.simulated
-                rows = np.flatnonzero(block.converged)
-                numbers = of_cells.calibrations(one.cell, block)
-                estimate[i, rows[:, None], own] = block.estimates[rows]
-                sigma[i, rows[:, None], own] = numbers["sigma_posteriori"]
-                tilt[i, rows] = numbers["tilt"][:, : len(ANGLES)]
-        each, noted = ("cell", "replicate", "parameter"), {"units": "SI, as `unit` says"}
-        set_up = ("model", "scheme", "approach")
-        return xr.Dataset(
-            {
-                "estimate": (each, estimate, noted),
-                "sigma": (each, sigma, noted),
-                "truth": (("cell", "parameter"), truth, noted),
-                "tilt": (("cell", "replicate", "angle"), tilt, {"units": "rad"}),
-            },
-            {
-                "cell": [cell.name for cell in cells],
-                "replicate": np.arange(1, count + 1),
-                "parameter": [*units],
-                "unit": ("parameter", [*units.values()]),
-                "angle": [*ANGLES],
-                **{key: ("cell", [getattr(cell, key) for cell in cells]) for key in set_up},
-                "sensor_sigma": ("cell", [c.noise.sigma_force for c in cells], {"units": "m/s^2"}),
-            },
+        each = (
+            estimates_table(one.cell, one.replicates)
+            for one in self.statistics
+            if one.replicates is not None
         )
+        table = pa.concat_tables([ESTIMATES.empty_table(), *each])
+        return with_derived(table.unify_dictionaries().to_pandas())
 
 
 def _with_truth(cells: Sequence[Cell], truth: Mapping[str, float | str] | None) -> list[Cell]:

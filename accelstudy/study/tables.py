@@ -305,8 +305,7 @@ def read_estimates(
     Returns
     -------
     DataFrame
-        The stored columns, and error, sigma0_squared and sigma_posteriori (NaN without
-        redundancy), all in SI.
+        The stored columns, and those of `with_derived`, all in SI.
 
     Raises
     ------
@@ -321,7 +320,15 @@ def read_estimates(
         raise InputError(
             f"{path}: two files hold the cell {cell}; delete what is not of your study"
         )
-    table["error"] = table["estimate"] - table["truth"]
-    table["sigma0_squared"] = table["omega"] / table["redundancy"].where(table["redundancy"] > 0)
-    table["sigma_posteriori"] = table["sigma0_squared"] ** 0.5 * table["sigma_priori"]
-    return table
+    return with_derived(table)
+
+
+def with_derived(estimates: pd.DataFrame) -> pd.DataFrame:
+    """Add error, sigma0_squared and sigma_posteriori (NaN without redundancy) to estimates, SI."""
+    freedom = estimates["redundancy"].where(estimates["redundancy"] > 0)
+    factor = estimates["omega"] / freedom
+    return estimates.assign(
+        error=estimates["estimate"] - estimates["truth"],
+        sigma0_squared=factor,
+        sigma_posteriori=factor**0.5 * estimates["sigma_priori"],
+    )

@@ -142,8 +142,7 @@ def lot(
     Parameters
     ----------
     campaigns : sequence of Campaign or path
-        Folders of campaigns, one per sensor, patterns such as 'sensor-*', or the list of a batch
-        (a YAML file).
+        Folders of campaigns, one per sensor, or patterns such as 'sensor-*'.
     cores : int
         Processes that work at once; the results do not depend on it.
 
@@ -166,33 +165,11 @@ def lot(
 
 
 def folders_of(given: Campaign | str | PathLike[str]) -> list[Campaign | str | PathLike[str]]:
-    """Folders of a pattern, or of the list of a batch; anything else stands for itself."""
+    """Folders that match a pattern; anything else stands for itself."""
     from accelstudy.basics.names import matches
 
-    if not isinstance(given, str | PathLike):
-        return [given]
-    path = Path(given)
-    if path.suffix in (".yaml", ".yml") and path.is_file():
-        return [*_listed(path)]
-    found = matches(path, os.path.isdir)
+    path = Path(given) if isinstance(given, str | PathLike) else None
+    found = None if path is None else matches(path, os.path.isdir)
     if found == []:
         raise InputError(f"{given}: no folder has such a name")
-    return [path] if found is None else [*map(Path, found)]
-
-
-def _listed(path: Path) -> list[Path]:
-    """Folders of the campaigns that the list of a batch names."""
-    from accelstudy.basics.plugins import explain_missing
-    from accelstudy.campaign.batch.config import parse_batch
-    from accelstudy.files.reading import read_layer
-
-    content = read_layer(path)
-    with explain_missing(content, path):
-        tasks = parse_batch({**content, "plugins": []}, str(path)).tasks()
-    for task in tasks:
-        if task.kind != "campaign":
-            raise InputError(
-                f"{path}: {task.source}: is a {task.kind}; only campaigns can be in a lot here. "
-                "Import it, or run the workflow of the campaigns with a section `lot`"
-            )
-    return [Path(task.source) for task in tasks]
+    return [given] if found is None else [*map(Path, found)]

@@ -32,22 +32,20 @@ result
 #
 # ## Every calibration
 #
-# `estimates` has each single calibration as an `xarray.Dataset`. Its dimensions have names, so
-# that a mean over replicates is `mean("replicate")`, whatever their order.
+# `estimates` has each single calibration: a row for each cell, replicate and parameter.
 
 # %%
 calibrations = result.estimates
-print(calibrations)
+calibrations[["cell", "replicate", "parameter", "unit", "truth", "estimate", "sigma_posteriori"]]
 
 # %% [markdown]
 # Are the estimates free of bias? Their mean should be off the truth by a few of its own standard
 # errors at most.
 
 # %%
-count = calibrations.sizes["replicate"]
-error = calibrations["estimate"].mean("replicate") - calibrations["truth"]
-in_errors = abs(error) / (calibrations["estimate"].std("replicate") / np.sqrt(count))
-print(f"largest of {in_errors.size}: {float(in_errors.max()):.1f} standard errors")
+error = calibrations.groupby(["cell", "parameter"], observed=True)["error"]
+in_errors = abs(error.mean()) / error.sem()
+print(f"largest of {len(in_errors)}: {in_errors.max():.1f} standard errors")
 
 # %% [markdown]
 # ## The answer
