@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from itertools import pairwise
 
 import click
 import numpy as np
@@ -16,11 +15,8 @@ from study_helpers import NINE, PROVENANCE, content, grid
 
 import accelstudy
 from accelstudy.basics.errors import InputError
-from accelstudy.campaign.gross_errors import gross_error_names
 from accelstudy.commands.main import main
-from accelstudy.effects import effect_names, get_effect
 from accelstudy.files.tables import write_table
-from accelstudy.noise_effects import noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
 
@@ -120,19 +116,6 @@ def test_models():
     for preset in PRESETS:
         line = f" *{re.escape(preset.source)} +{preset.model} in {preset.scheme}"
         assert any(re.fullmatch(line, each) for each in lines)
-
-
-def test_effects():
-    """Each under its heading, with its equation; the golden set has the other lines."""
-    found = output("effects")
-    headings = ("Effects of the sensor", "Effects of the rig", "Noise effects", "Gross errors")
-    places = [found.index(f"{heading}\n") for heading in headings] + [len(found)]
-    of_sensor, of_rig, noise, gross = (
-        dict(re.findall(r"^(\w+): (.*)", found[a:b], re.M)) for a, b in pairwise(places)
-    )
-    assert of_sensor | of_rig == {name: get_effect(name).equation for name in effect_names()}
-    assert (noise.keys(), gross.keys()) == ({*noise_effect_names()}, {*gross_error_names()})
-    assert "base_tilt" in of_rig
 
 
 # --- the unit of angles --------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """What a scheme can determine: ranks, conditions, reasons, and the numbers of linear theory."""
 
-from itertools import permutations, product
-
 import numpy as np
 import pytest
 from scheme_helpers import KNOWN
@@ -15,16 +13,11 @@ from accelstudy.design.closed_forms import (
     perfect_robot_ratio,
 )
 from accelstudy.design.estimability import estimability
-from accelstudy.effects import Effect
-from accelstudy.effects.base import per_axis
-from accelstudy.schemes import Scheme, get_scheme
-from accelstudy.schemes.mclaren import mclaren_orbit
+from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
 QUADRATIC = get_model("bias-scale-nonorthogonality-quadratic")
-CUBIC = get_model("bias-scale-nonorthogonality-cubic")
 ANGLES = ("alpha_yz", "alpha_zy", "alpha_zx")
 # bias (m/s²), scale, non-orthogonality (rad) in the order of the parameters
 KINDS = {"bias": slice(0, 3), "scale": slice(3, 6), "nonorthogonality": slice(6, 9)}
@@ -68,63 +61,6 @@ def test_gravity_is_blind_to_rotations_and_a_robot_is_not(scheme):
     assert design(scheme, TWELVE, ROBOT).estimable
     assert design(scheme).estimable is (scheme != "faces-6")
     assert design(scheme, QUADRATIC).estimable is (scheme not in ("faces-6", "d-optimal-9"))
-
-
-GOLDEN = (1 + np.sqrt(5)) / 2
-TRIBONACCI = 1.8392867552141612
-SIGNS = list(product((1, -1), repeat=2))
-ALIGNED = {
-    "6 faces": np.concatenate([np.eye(3), -np.eye(3)]),
-    "12 edges": [np.roll((0, a, b), k) for a, b in SIGNS for k in range(3)],
-    "24 McLaren": mclaren_orbit(),
-    "24 rhombicuboctahedron": get_scheme("rhombicuboctahedron-24").directions,
-    "24 snub cube": [
-        s * np.array((1, 1 / TRIBONACCI, TRIBONACCI))[list(order)]
-        for s in product((1, -1), repeat=3)
-        for order in permutations(range(3))
-        if np.linalg.det(np.diag(s)[list(order)]) > 0
-    ],
-    "24 truncated octahedron": [
-        np.array(p) for p in product((0, 1, -1, 2, -2), repeat=3) if sorted(np.abs(p)) == [0, 1, 2]
-    ],
-    "20 faces of the icosahedron": [
-        *product((1, -1), repeat=3),
-        *(np.roll((0, a / GOLDEN, b * GOLDEN), k) for a, b in SIGNS for k in range(3)),
-    ],
-}
-
-
-GENERIC = {"24 McLaren", "24 truncated octahedron", "20 faces of the icosahedron"}
-"""Of which a generic rotation makes cubic terms estimable."""
-
-
-@pytest.mark.parametrize("name", ALIGNED)
-def test_gravity_does_not_see_cubic_terms_in_aligned_orbits(name):
-    """One orbit of the cube's rotations: Σ f⁴ over the axes is a multiple of Σ f²."""
-    scheme = Scheme("aligned", "aligned", ALIGNED[name], "generated", "test")
-    found = design(scheme, CUBIC)
-    assert {"s_x", "s_y", "s_z", "k3_x", "k3_y", "k3_z"} <= set(found.not_estimable)
-    assert "these positions" in found.reason
-    if name in GENERIC:
-        assert design(scheme.rotated(np.radians([15, 25, 35])), CUBIC).estimable
-
-
-class _Quintic(Effect):
-    name = "quintic_of_the_test"
-    parameters = per_axis("k5", "1", "k_{5%}")
-
-    def output(self, f, p, g, hold, xp):
-        return tuple(k * f_i**5 / g**4 for k, f_i in zip(p, f, strict=True))
-
-
-def test_rings_see_three_sizes_of_force_and_so_one_odd_nonlinearity():
-    model = SensorModel("cubic and quintic", (*CUBIC.effects, _Quintic()))
-    rings = design("rings-24", model, ROBOT)
-    assert rings.rank == 12
-    assert set(rings.not_estimable) == {
-        f"{name}_{axis}" for name in ("s", "k3", "k5") for axis in "xyz"
-    }
-    assert design("mclaren-24", model, ROBOT).estimable
 
 
 def test_observed_gravity_is_a_further_parameter():

@@ -106,11 +106,6 @@ def test_unknown_names_are_answered_with_the_valid_ones(name, close):
         assert known in message
 
 
-def test_a_name_is_registered_once():
-    with pytest.raises(ValueError, match="the scheme 'mclaren-24' is there already"):
-        register("mclaren-24", title="", status="generated", source="")(mclaren_orbit)
-
-
 def test_a_registered_scheme_is_found_by_its_name_and_its_family(monkeypatch):
     monkeypatch.setattr(registry._registry, "_items", dict(registry._registry._all_items))
 

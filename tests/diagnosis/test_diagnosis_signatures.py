@@ -6,36 +6,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from diagnosis_helpers import campaign, design, shuffled, some_holds
-from usual import GRAVITY, NINE, ROBOT, G
+from usual import GRAVITY, NINE, G
 
-from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.space.frame import signature
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
-from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.visibility import (
     examine_campaign,
-    signature_columns,
     upper_limits,
     visibilities,
 )
 from accelstudy.effects import effect_names, get_effect
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.simulation.sessions import Noise, session
+from accelstudy.simulation.sessions import session
 
-USUAL = [effect.name for effect in NINE.effects]
-OTHERS = [name for name in effect_names() if name not in USUAL]
 EACH = pytest.mark.parametrize("name", effect_names())
 
 
 FULL = session(NINE, np.zeros(9), shuffled("mclaren-24"), G, some_holds(24))
-
-
-@pytest.fixture(scope="module")
-def designs():
-    """Examined fits with all columns, in varied yaw, by approach."""
-    directions = shuffled("fibonacci-30")
-    hold = some_holds(len(directions))
-    return {approach.name: design(directions, approach, hold) for approach in (ROBOT, GRAVITY)}
 
 
 # --- derivatives ---------------------------------------------------------------------------------
@@ -71,35 +58,6 @@ def test_a_signature_is_the_derivative_of_what_is_observed(name):
         assert np.abs(force).max() + np.abs(reading).max() > 100 * rounding
         np.testing.assert_allclose(shown.force[..., j], force, rtol=1e-6, atol=rounding)
         np.testing.assert_allclose(shown.angles[..., j], reading, rtol=1e-6, atol=rounding)
-
-
-@pytest.mark.parametrize("approach", [ROBOT, GRAVITY], ids=lambda a: a.name)
-@pytest.mark.parametrize("name", OTHERS)
-def test_what_an_effect_leaves_in_the_residuals(designs, name, approach):
-    """z of an adjustment of data with a small effect, in which no noise was drawn."""
-    effect, examined = get_effect(name), designs[approach.name]
-    directions = shuffled("fibonacci-30")
-    hold = some_holds(len(directions))
-    if name in examined.invisible:
-        columns = np.zeros((len(examined.frame.residuals.design), len(effect.parameters)))
-    else:
-        h = examined.candidates[name][0]
-        effect = h.effect
-        columns = signature_columns(examined.frame, h)
-    model = SensorModel("with", (*NINE.effects, effect))
-    rng = np.random.default_rng(5)
-    p = 1e-3 * effect.typical[0] * rng.choice([-1.0, 1.0], len(effect.parameters))
-    truth = np.concatenate([np.zeros(NINE.n_parameters), p])
-    observed = session(model, truth, directions, G, hold).observations(Noise())
-    fitted = Residuals.of(solve(NINE, approach, observed)).z
-    expected = columns @ p
-    scale = np.linalg.norm(
-        examined.frame.residuals.whiten(
-            signature(effect, examined.frame.forces, examined.frame.angles, G, examined.frame.hold)
-        )
-        @ p
-    )
-    assert np.linalg.norm(fitted - expected) < 2e-3 * scale + 1e-9
 
 
 # --- what can be seen ----------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from norm_model import SHOWN, nine
-from scipy import stats
 from usual import GRAVITY, NINE, G
 
 from accelstudy.diagnosis.visibility import examine_scheme, visibilities, visibility_table
@@ -61,17 +60,6 @@ def test_the_nearest_effects_come_first_with_their_cosines(shown, by_hand):
         found = dict(row.confused)
         assert list(found) == sorted(cosines, key=lambda other: -cosines[other])
         assert found == pytest.approx(cosines, abs=1e-6)
-
-
-def test_power_is_as_promised(shown, by_hand):
-    """Of the test of one parameter of the size that is called detectable, in simulated noise."""
-    row = next(row for row in visibilities(shown[0]) if row.name == "quadratic_scale")
-    left = by_hand["quadratic_scale"]
-    column = left[:, np.argmin(np.linalg.norm(left, axis=0))]
-    noise = np.random.default_rng(1).standard_normal((4000, len(column)))
-    test = ((noise + row.mdb * column) @ column / np.linalg.norm(column)) ** 2
-    power = np.mean(test > stats.chi2.isf(0.001, 1))
-    assert power == pytest.approx(0.8, abs=4 * np.sqrt(0.8 * 0.2 / 4000))
 
 
 def test_the_table_says_what_shows_what_does_not_and_why(shown):

@@ -246,19 +246,6 @@ def test_a_size_that_is_fitted_costs_what_its_integral_says():
     assert of_type.odds[alone].sum() + of_type.cost == pytest.approx(integral, abs=0.1)
 
 
-def test_what_a_third_has_is_found_beside_what_all_have():
-    """Of ten lots; by itself a sensor shows it with a noncentrality of 11."""
-    rng, named, right = np.random.default_rng(2), 0, []
-    for _ in range(10):
-        lacks, _, _, sizes = two_effects(rng, like=0.7)
-        mixture = mixture_of(np.zeros((N, 3)), typical=sizes.sets)
-        named += next(iter(mixture.sets)) == NAMES[:2]
-        right.append(np.mean((mixture.having(NAMES[1]) > 0.5) == lacks[:, 1]))
-    assert named >= 9
-    # With a known size the error is Φ(−√λ/2) where half of the sensors have it, and less here.
-    assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.6 / 2) - 0.03
-
-
 @pytest.mark.parametrize("like", [0.3, 0.99])
 def test_what_an_effect_leaves_beside_a_rival_is_that_of_least_squares(like):
     _, d, _, sizes = two_effects(np.random.default_rng(3), like=like, first=0.8)

@@ -13,7 +13,6 @@ from usual import GRAVITY, ROBOT, G
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
 from accelstudy.design.estimability import estimability
-from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.effects import HoldConditions, TemperatureCourse, effect_names, get_effect
 from accelstudy.effects.hold_conditions import MIN_STEP
 from accelstudy.effects.saturation import ROUND_WIDTH
@@ -75,17 +74,6 @@ def test_every_effect_has_a_formula_here_and_is_of_the_sensor_or_of_its_rig():
     formulas = {spec.partition("(")[0] for spec in (*OUTPUT, *AXES, *READING)}
     assert {*effect_names()} == formulas
     assert {name for name in formulas if get_effect(name).part == "rig"} == RIG
-
-
-def test_what_is_easily_confused_is_of_one_family():
-    assert family_of("bias_drift", "warm_up") == "slow change in time"
-    assert family_of("cubic_scale", "saturation") == "odd nonlinearity"
-    assert family_of("quadratic_scale", "scale_asymmetry") == "even nonlinearity"
-    assert family_of("encoder_offset", "base_tilt") == "attitude of the rig"
-    assert family_of("hysteresis", "settling") == "memory of the previous position"
-    assert family_of("coloured_noise", "heavy_tails") == "noise"
-    for apart in (("thermal_bias", "warm_up"), ("bias_drift", "unknown"), ("unknown",), ()):
-        assert not family_of(*apart)
 
 
 @EACH

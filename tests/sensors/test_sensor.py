@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from usual import G
 
 from accelstudy.basics.units import MGON
-from accelstudy.effects import Effect, HoldConditions, get_effect, register
+from accelstudy.effects import HoldConditions
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import MODELS, PRESETS, TITLES, get_model
+from accelstudy.sensors.models import MODELS, get_model
 from accelstudy.sensors.sensor import SensorModel
 
 NINE = "bias-scale-nonorthogonality"
@@ -82,20 +82,6 @@ def test_generated_functions_equal_the_effects_in_numpy(name):
     np.testing.assert_allclose(model.sense(f_b, p), expected.T, rtol=0, atol=1e-14 * G)
 
 
-def test_order_names_and_units_of_the_parameters():
-    model = get_model("bias-scale-nonorthogonality-crossaxis")
-    names = "b_x b_y b_z s_x s_y s_z alpha_yz alpha_zy alpha_zx alpha_xz alpha_xy alpha_yx"
-    assert model.parameter_names == tuple(names.split())
-    units = [p.unit for p in model.parameters]
-    assert units == ["m/s^2"] * 3 + ["1"] * 3 + ["rad"] * 6
-    assert model.n_parameters == 12
-
-
-@ALL_MODELS
-def test_number_of_parameters_is_that_of_the_title(name):
-    assert get_model(name).n_parameters == int(TITLES[name].split(":")[0])
-
-
 def test_vector_orders_a_mapping_and_fills_in_zeros():
     p = get_model(NINE).vector({"alpha_zx": 3.0, "b_y": 1.0})
     np.testing.assert_array_equal(p, [0, 1, 0, 0, 0, 0, 0, 0, 3])
@@ -139,16 +125,6 @@ def test_an_inverse_that_does_not_exist_is_not_a_number(effect, wrong):
     assert np.isnan(result[1, 0, 0])
 
 
-# --- names ---------------------------------------------------------------------------------------
-
-
-def test_presets_name_models_and_schemes_that_exist():
-    assert len({preset.name for preset in PRESETS}) == len(PRESETS)
-    for preset in PRESETS:
-        assert get_model(preset.model).n_parameters >= 6
-        assert get_scheme(preset.scheme).n_positions >= 6
-
-
 # --- the robot's reading -------------------------------------------------------------------------
 
 
@@ -159,13 +135,3 @@ def test_reading_errors_are_functions_of_what_is_read():
     k = np.array([2e-3, -1e-3])
     expected = angles / (1 - k) - angles
     np.testing.assert_allclose(model.reading_errors(angles, k), expected, rtol=1e-12)
-
-
-def test_an_effect_is_registered_once():
-    class Again(Effect):
-        name = "bias"
-        parameters = ()
-
-    with pytest.raises(ValueError, match="the effect 'bias' is there already"):
-        register(Again)
-    assert get_effect("bias").parameters
