@@ -42,7 +42,7 @@ def write(path, forces, start=0.0, names="time,fx,fy,fz"):
 @pytest.fixture(scope="module")
 def plate(tmp_path_factory):
     """A folder with the logs of a sensor and a reference, and the calibration of the latter."""
-    folder, rng = tmp_path_factory.mktemp("plate"), np.random.default_rng(5)
+    folder, rng = tmp_path_factory.mktemp("plate"), np.random.default_rng(7)
 
     def noisy(forces, matrix, bias, sigma):
         return forces @ matrix.T + bias + sigma * rng.standard_normal(forces.shape)
