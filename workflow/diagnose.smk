@@ -58,7 +58,6 @@ rule diagnose:
             "model": TRIP.model,
             "approach": TRIP.approach,
             "seed": TRIP.seed,
-            "replicates": TRIP.replicates,
         },
         angle_unit=angle_unit(),
         version=VERSION,

@@ -13,7 +13,6 @@ from numpy.linalg import LinAlgError
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.campaign.calibration.result import Calibration
-from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.report import document
 from accelstudy.diagnosis.report.figures import draw_explanations
 from accelstudy.diagnosis.report.output import write_diagnosis
@@ -36,17 +35,14 @@ class Diagnosis(Result):
 
     kind = DIAGNOSIS
 
-    def __init__(
-        self, result: Found, seed: int, replicates: int, source: Path | None = None
-    ) -> None:
-        self.result, self._seed, self._replicates = result, seed, replicates
-        self.name = result.campaign.name
+    def __init__(self, result: Found, source: Path | None = None) -> None:
+        self.result, self.name = result, result.campaign.name
         self.source = Path("CAMPAIGN") if source is None else source
         self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
 
     @cached_property
     def content(self) -> dict[str, Any]:
-        """Content of diagnosis.json, without the simulated sessions."""
+        """Content of diagnosis.json."""
         return document.diagnosis_document(self.result)
 
     @property
@@ -78,20 +74,14 @@ class Diagnosis(Result):
         except LinAlgError as error:
             raise InputError(f"the diagnosis gives no calibration: {error}") from None
 
-    @cached_property
-    def loop(self) -> Loop | None:
-        """Sessions simulated with the old and with the new model; None if nothing was added."""
-        return close_loop(self.result, self._replicates, self._seed)
-
     def draw(self, ax: Axes) -> None:
         """Draw the posterior probabilities of the explanations."""
         draw_explanations(ax, self.result.credible_set)
 
     def write(self, folder: Path, place: Path) -> None:
         """Write what `accelstudy diagnose` does."""
-        loop = self.loop
         with stage("figures and page"):
-            write_diagnosis(self.result, folder, loop, self.source, place)
+            write_diagnosis(self.result, folder, self.source, place)
 
     def tell(self, place: Path) -> None:
         """Print the verdict and what is said with it."""

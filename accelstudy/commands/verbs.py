@@ -42,7 +42,11 @@ def run_export(calibration: Path, form: str) -> None:
 
 
 CALIBRATE = Command(calibrations.calibrate, writes=outputs.CALIBRATION)
-DIAGNOSE = Command(calibrations.diagnose, writes=outputs.DIAGNOSIS)
+DIAGNOSE = Command(
+    calibrations.diagnose,
+    writes=outputs.DIAGNOSIS,
+    retired={"--replicates": "nothing is simulated; model.yaml is a study that does it"},
+)
 LOT = Command(sensors.lot, writes=outputs.LOT, reads=sensors.folders_of)
 CHECK_SIGMAS = Command(calibrations.check_sigmas, run_check_sigmas)
 EXPORT = Command(calibrations.export, run_export, retired={"--level": LEVELED}, shared=[QUIET])

@@ -19,7 +19,7 @@ from accelstudy.campaign.calibration.assessment import OUTLIER_LEVEL
 from accelstudy.campaign.calibration.fit import JudgedNoise
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.consequences import Change, leveling_rms, parameter_changes
+from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors
 from accelstudy.diagnosis.decision.learned import shares_of_places
 from accelstudy.diagnosis.decision.noise import (
     exceeds_stated,
@@ -41,7 +41,7 @@ from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause
 from accelstudy.diagnosis.evidence.detection import Detection
 from accelstudy.diagnosis.evidence.noise_tests import LEVEL, NoiseTest
 from accelstudy.diagnosis.held_out import Gap
-from accelstudy.diagnosis.next_positions import NextPosition, next_positions, positions_to_learn
+from accelstudy.diagnosis.next_positions import NextPosition, next_positions
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape, shape_of
 from accelstudy.diagnosis.space.examined import ExaminedFit
@@ -49,7 +49,7 @@ from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.space.shapes import Place
 from accelstudy.diagnosis.visibility import UpperLimit, upper_limits
-from accelstudy.effects.learned import LEARNED, Learned
+from accelstudy.effects.learned import LEARNED
 from accelstudy.sensors.plausibility import implausible_parameters
 from accelstudy.sensors.sensor import SensorModel
 
@@ -66,13 +66,6 @@ class Estimate(NamedTuple):
     unit: str
 
 
-class Rival(NamedTuple):
-    """An effect with a similar signature, and the cosine between them."""
-
-    name: str
-    cosine: float
-
-
 @dataclass(frozen=True)
 class NamedCause:
     """An effect, noise effect or gross error that was found.
@@ -87,7 +80,6 @@ class NamedCause:
     parameters : tuple of Estimate; empty of what is no effect
     settings : tuple of Estimate, of those that were searched for
     imitators : tuple of str, further names that could leave the same, and more
-    rivals : tuple of Rival
     """
 
     name: str
@@ -99,11 +91,27 @@ class NamedCause:
     parameters: tuple[Estimate, ...] = ()
     settings: tuple[Estimate, ...] = ()
     imitators: tuple[str, ...] = ()
-    rivals: tuple[Rival, ...] = ()
 
 
-@dataclass(frozen=True)
-class LikeShape:
+class FitSize(NamedTuple):
+    """Variance of unit weight of a fit, beside that of simulated sessions.
+
+    Attributes
+    ----------
+    model : str, "base" or "extended"
+    redundancy : int
+    simulated : (float, float), central 95 % of sessions in which the model of the fit is complete
+    measured : float, in units of the stated noise; where none is stated, of what the last fit
+        leaves
+    """
+
+    model: str
+    redundancy: int
+    simulated: tuple[float, float]
+    measured: float
+
+
+class LikeShape(NamedTuple):
     """Where what is missing may live: a target that is a function of a coordinate.
 
     Attributes
@@ -278,7 +286,6 @@ class Diagnosis:
         assert effect is not None
         # What is beside a large effect was found in what its refit leaves.
         here = None if best.name == LEARNED else examined.hypothesis(best.effect)
-        near = () if here is None else examined.nearest(here)
         like = () if here is None else examined.imitators(here)
         smooth = [s for s in best.effect.takes if s.name == best.smooth]
         of_logs = zip(smooth, searched, strict=False)
@@ -292,7 +299,6 @@ class Diagnosis:
             tuple(Estimate(q.name, *values[q.name], q.unit) for q in effect.parameters),
             tuple(Estimate(s.name, best.value, best.value * log, s.unit) for s, log in of_logs),
             tuple(other for other in like if other not in members),
-            tuple(Rival(n, c) for n, c in near if c >= RULES.rival and n not in members),
         )
 
     @cached_property
@@ -356,6 +362,20 @@ class Diagnosis:
             return None
         return global_test(self.base.omega, self.base.redundancy, sigma_dof=self.base.sigma_dof)
 
+    @property
+    def fits(self) -> list[FitSize]:
+        """Variances of unit weight of the base fit and of the final one, if that is another one."""
+        gap, fits = self.gap, [("base", self.base, self.gap.before)]
+        if gap.after is not None:
+            fits.append(("extended", self.final.solution, gap.after))
+        unit = 1.0 if self.sigma_known else fits[-1][2]
+        sizes = []
+        for model, fit, variance in fits:
+            dof = min(fit.sigma_dof, 1e9)
+            low, high = special.fdtri(fit.redundancy, dof, [0.025, 0.975]).tolist()
+            sizes.append(FitSize(model, fit.redundancy, (low, high), variance / unit))
+        return sizes
+
     # --- what follows -------------------------------------------------------------------------
 
     @cached_property
@@ -380,29 +400,19 @@ class Diagnosis:
         return tuple(sorted(like, key=lambda one: -one.posterior))
 
     @cached_property
-    def leveling(self) -> tuple[float, float] | None:
-        """Tilt error without and with what was found, rad; None if there is nothing to compare."""
+    def leveling(self) -> TiltErrors | None:
+        """Tilt errors without and with what was found; None if there is nothing to compare."""
         if not self.finding.chosen:
             return None
-        return leveling_rms(self.base, self.final.solution, self.frame.hold, self.noise.variance)
+        return tilt_errors(self.base, self.final.solution, self.frame.hold, self.noise.variance)
 
     @property
     def better_for_leveling(self) -> str | None:
         """Model that leaves the smaller tilt error, "base" or "extended"; None if there is one."""
         if self.leveling is None or self.extended_model is self.model:
             return None
-        before, after = self.leveling
-        return "base" if after > RULES.larger_tilt * before else "extended"
-
-    @cached_property
-    def changes(self) -> tuple[Change, ...]:
-        """Changes of the parameters of the base model; none if a position was left out."""
-        tried = [one.shape.distinguishable for one in self.finding.chosen]
-        effects = [effect for effect in tried if effect is not None]
-        if not effects or len(effects) < len(tried):
-            return ()
-        final, variance = self.final.solution, self.noise.variance
-        return parameter_changes(self.base, self.frame, effects, final, variance)
+        worse = self.leveling.after > RULES.larger_tilt * self.leveling.before
+        return "base" if worse else "extended"
 
     @cached_property
     def upper_limits(self) -> tuple[UpperLimit, ...]:
@@ -418,13 +428,8 @@ class Diagnosis:
 
     @cached_property
     def next_positions(self) -> tuple[NextPosition, ...]:
-        """Positions that tell the two most probable explanations apart, or that show a function."""
+        """Positions that tell the two most probable explanations apart."""
         finding = self.finding
-        if finding.place is not None:
-            learned = finding.chosen[0].shape.effect
-            assert isinstance(learned, Learned)
-            with stage("next positions"):
-                return tuple(positions_to_learn(self.final, learned))
         if finding.posterior is None or finding.verdict not in ("named", "narrowed", "unknown"):
             return ()
         rivals = [one.best for one in finding.credible_set if one.is_effects]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -18,7 +18,7 @@ from accelstudy.basics.names import check_path_name
 from accelstudy.campaign.format import write_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign, write_truth
 from accelstudy.config_names import ModelName
-from accelstudy.files.validation import Configuration, Seed, Sessions, validate
+from accelstudy.files.validation import Configuration, Seed, validate
 from accelstudy.sensors.models import get_model
 
 
@@ -36,11 +36,12 @@ Settings = Annotated[CampaignSettings, BeforeValidator(_known_settings)]
 class RoundTrip(Configuration):
     """A simulated campaign and its diagnosis; results go to ``results/<name of the campaign>``."""
 
+    retired: ClassVar = {"replicates": "nothing is simulated; model.yaml is a study that does it"}
+
     campaign: Settings = Field(description="settings of the simulated campaign, SI")
     model: ModelName = Field("bias-scale-nonorthogonality", description="model that is diagnosed")
     approach: str | None = Field(None, description="robot if the campaign has one, by default")
     seed: Seed = Field(1, description="of the diagnosis")
-    replicates: Sessions = Field(1000, description="sessions simulated with either model")
 
     @model_validator(mode="after")
     def _names_exist(self) -> RoundTrip:

@@ -67,8 +67,8 @@ class Rules:
     """Level of the test of the size of the noise, and of any fit that is accepted."""
     level_confirmed: float = 0.05
     """Probability that something is confirmed on held-out positions though nothing is missing."""
-    level_component: float = 0.01
-    """Level of the test whether a component takes part in a formula."""
+    z_component: float = 3.5
+    """Largest value of a learned function, over its sigma, from which on it shows in an axis."""
     z_significant: float = 1.645
     """Size from which on a correction of held-out positions, over its sigma, is significant: 5 %,
     one-sided."""

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.diagnosis.coordinates import TARGETS
-from accelstudy.diagnosis.decision.learned import space_of
+from accelstudy.basics.wording import comma_list
+from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
+from accelstudy.diagnosis.decision.learned import coordinate_values, space_of
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
-from accelstudy.diagnosis.formulas import Ranking, argument, rank_formulas
+from accelstudy.diagnosis.formulas import Formula, rank_formulas
+from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.diagnosis.space.shapes import function_rows
-from accelstudy.effects.learned import Learned
+from accelstudy.effects.learned import OF_EACH, Learned
 
 Array = NDArray[np.float64]
 
@@ -34,8 +36,10 @@ class LearnedShape:
     ----------
     coordinate, target : str
     effect : Learned
-    ranking : Ranking, what depends on what, and which formulas it may be
+    subject : str, what depends on what: "the bias of x and y depends on the yaw"
+    formulas : tuple of Formula, which it may be, most probable first
     components : tuple of str, c components that have a function
+    axes : tuple of str, those in which it shows
     grid : (k,) array, the coordinate, SI
     values, sigmas : (k, c) arrays, h and its sigma there, SI
     where : (n, c) array, the coordinate of each component in the positions, SI
@@ -47,8 +51,10 @@ class LearnedShape:
     coordinate: str
     target: str
     effect: Learned
-    ranking: Ranking
+    subject: str
+    formulas: tuple[Formula, ...]
     components: tuple[str, ...]
+    axes: tuple[str, ...]
     grid: Array
     values: Array
     sigmas: Array
@@ -56,6 +62,12 @@ class LearnedShape:
     residuals: Array
     spreads: Array
     least_known: tuple[float, ...]
+
+    @property
+    def extents(self) -> dict[str, float]:
+        """How far the function goes up and down in the session, by the axes in which it shows."""
+        extents = zip(self.components, np.ptp(self.values, axis=0).tolist(), strict=True)
+        return {name: extent for name, extent in extents if name in self.axes}
 
 
 def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShape | None:
@@ -72,9 +84,9 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
     learned, *others = (cause.shape for cause in finding.chosen)
     effect, frame, solution = learned.effect, finding.frame, finding.frame.solution
     assert isinstance(effect, Learned)
-    beside = space_of(others, len(problem.residuals.z))
-    ranking = rank_formulas(problem.frame, problem.evidence, effect, finding.place, beside)
-    at = argument(frame, effect)
+    at = coordinate_values(effect, frame)
+    if effect.coordinate not in (*OF_EACH, "angle"):
+        at = at[:, :1]
     grid = np.linspace(at.min(), at.max(), POINTS)
     names = list(solution.model.parameter_names)
     own = [names.index(parameter.name) for parameter in effect.parameters]
@@ -87,20 +99,25 @@ def shape_of(problem: Problem, finding: Finding, variance: float) -> LearnedShap
         # It acts where something moved: not in the first position.
         steps = np.column_stack([frame.hold.column(f"step_{axis}") for axis in "xyz"])
         spreads[~steps.any(axis=1)] = np.nan
-    components = TARGETS[effect.target].components
-    taking = [components.index(axis) for axis in ranking.axes]
+    target, most = TARGETS[effect.target], np.max(np.abs(values) / sigmas, axis=0)
+    shown = most >= min(RULES.z_component, most.max())
+    axes = tuple(name for name, seen in zip(target.components, shown, strict=True) if seen)
+    which = "all axes" if len(axes) == len("xyz") else comma_list(axes)
+    beside = space_of(others, len(problem.residuals.z))
     return LearnedShape(
         *finding.place,
         effect,
-        ranking,
-        components,
+        f"{target.words.format(which)} depends on {coordinate_of(effect.coordinate).words}",
+        rank_formulas(problem.frame, problem.evidence, effect, finding.place, at, beside),
+        target.components,
+        axes,
         grid,
         values,
         sigmas,
         np.broadcast_to(at, left.shape),
         np.where(np.isnan(spreads), np.nan, np.stack(here, axis=1) + left),
         spreads,
-        _least_known(grid, np.sqrt(np.mean(sigmas[:, taking] ** 2, axis=1))),
+        _least_known(grid, np.sqrt(np.mean(sigmas[:, shown] ** 2, axis=1))),
     )
 
 

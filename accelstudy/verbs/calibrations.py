@@ -238,7 +238,6 @@ def diagnose(
     approach: kinds.UsualApproach = None,
     prior: kinds.TypeFile = None,
     seed: kinds.Seed = 1,
-    replicates: Annotated[int, Range(100, 10**9)] = 1000,
 ) -> Diagnosis:
     """Find what a sensor model lacks to explain a campaign.
 
@@ -249,8 +248,6 @@ def diagnose(
     ----------
     campaign : Campaign or path
         Folder of the campaign.
-    replicates : int
-        Sessions simulated with either model; fewer beyond 500 positions.
 
     Raises
     ------
@@ -269,4 +266,4 @@ def diagnose(
     given = resolve(campaign, model, approach, prior, plausible=False)
     with stage("search for what is missing"):
         result = pipeline.diagnose(*given, seed=seed)
-    return Diagnosis(result, seed, replicates, campaign_path(campaign))
+    return Diagnosis(result, campaign_path(campaign))

@@ -76,10 +76,7 @@ def results(folder, calibrations):
     two = [folder / f"sensor-{i}" for i in (1, 2)]
     return {
         "calibrate": (calibrations[0], ["calibrate", folder / "sensor-0"]),
-        "diagnose": (
-            acs.diagnose(folder / "sensor-1", replicates=100),
-            ["diagnose", folder / "sensor-1", "--replicates", 100],
-        ),
+        "diagnose": (acs.diagnose(folder / "sensor-1"), ["diagnose", folder / "sensor-1"]),
         "compare": (acs.compare(*calibrations[:2]), ["compare", *files[:2]]),
         "history": (
             acs.history(calibrations[:3], dates=dates, tilt_accuracy="50 mgon"),
@@ -327,6 +324,7 @@ WRONG = {
     "acs.find_holds(acs.read_log(table / 9.8, rate=100))": "g, not m/s^2; give `unit` g",
     "acs.simulate_campaign(effects=3)": "effects: expected the name of an effect",
     "acs.calibrate(3)": "campaign: expected a Campaign",
+    "acs.diagnose(folder / 'sensor-0', seed=-1)": "seed: must be",
     "acs.read_calibration(folder)": "no such file",
     "acs.compare(one, 3)": "second: expected what `calibrate` or",
     "acs.history(calibrations[:2])": "date",

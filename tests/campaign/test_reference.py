@@ -14,7 +14,7 @@ from accelstudy.campaign.calibration.sigma_check import check_sigmas
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.next_positions import _rows
+from accelstudy.diagnosis.next_positions import candidate_rows
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
@@ -144,7 +144,7 @@ def test_the_next_position_shares_the_errors(campaign):
 def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):
     solution = solve(TWELVE, ROBOT, campaign_observations(campaign))
     frame = SessionFit.of(solution)
-    found, expected = _rows(frame, frame.forces, frame.hold), solution.design[: 3 * 20]
+    found, expected = candidate_rows(frame, frame.forces, frame.hold), solution.design[: 3 * 20]
     size = np.linalg.norm(expected, axis=0)
     normal = np.einsum("kcu,kcv->uv", found / size, found / size)
     np.testing.assert_allclose(normal, (expected / size).T @ (expected / size), atol=0.05)

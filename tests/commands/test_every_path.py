@@ -76,8 +76,7 @@ def test_three_commands_end_well_and_agree(case, tmp_path, request):
         assert_sound(page)
         assert " ".join(calibration["verdict"].split()) in text_of(page)
         assert f"{calibration['state'].upper()}: " in told.stdout
-    said = run("diagnose", campaign, *with_approach, "--out", tmp_path / "dia",
-               "--replicates", 100)  # fmt: skip
+    said = run("diagnose", campaign, *with_approach, "--out", tmp_path / "dia")
     diagnosis = read(tmp_path / "dia/diagnosis.json")
     page = (tmp_path / "dia/report.html").read_text(encoding="utf-8")
     assert_sound(page)

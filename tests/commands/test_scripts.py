@@ -81,7 +81,7 @@ def test_all_that_is_suggested_runs_from_the_log_to_the_last_page():
     (diagnose, apply) = commands_in(printed)
     succeed(*apply, *reading)
     assert "a.xlsx: a spreadsheet" in refusal(*apply[:-1], "a.xlsx", *reading)
-    done = succeed(*diagnose, "--replicates", "100", "--quiet")
+    done = succeed(*diagnose, "--quiet")
     assert done.stdout == "The model lacks quadratic scale.\n"
     page = Path("imu-left-diagnosis/report.html").read_text(encoding="utf-8")
     steps = commands_in("\n".join(map(unescape, re.findall("<pre>(.*?)</pre>", page))))

@@ -14,27 +14,28 @@ from diagnosis_helpers import SCHEMA, explanation, otherwise
 from page_helpers import assert_sound, text_of
 from places import ROOT
 from stand_ins import composed
-from usual import NINE, ROBOT
+from usual import NINE, ROBOT, G
 
 import accelstudy as acs
+from accelstudy.adjustment import calibrate
 from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import MGON, angles_in
+from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.format import write_campaign
+from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
-from accelstudy.diagnosis.loop import CASES as CASES_OF_LOOP
-from accelstudy.diagnosis.loop import Loop, close_loop
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import write_diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
-from accelstudy.diagnosis.result import Rival
 from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import examine
+from accelstudy.leveling.error import cap_forces, holds_in_use, leveling_error
+from accelstudy.simulation.sessions import Noise, session
 from accelstudy.study.config import read_study
 
 THERMAL = "thermal_bias: 0.003, -0.002, 0.001"
@@ -56,7 +57,7 @@ CASES = {
 HEADLINES = {
     "named": "The model lacks thermal bias.",
     "gravity": "The model lacks", "no_effect": "Nothing that these data can show",
-    "unknown": "and something smaller: ", "learned": "the bias of x depends on the yaw",
+    "unknown": "The model lacks", "learned": "the bias of x depends on the yaw",
     "noise_model": "its noise is not",
     "gross_error": "The data have a gross error",
 }  # fmt: skip
@@ -84,7 +85,7 @@ def written(tmp_path_factory):
     @cache
     def get(case):
         simulated(case, root / case)
-        diagnosed = acs.diagnose(root / case, replicates=100)
+        diagnosed = acs.diagnose(root / case)
         folder = root / f"{case}-out"
         with composed(*RENDERED.get(case, ())):
             diagnosed.save(folder)
@@ -123,7 +124,7 @@ def test_every_verdict_is_written_and_told(written, case):
         assert "on data that were not used?" in text_of(page)
     if case == "gross_error":
         assert [effect["name"] for effect in content["effects"]] == ["axis_error", "row_order"]
-        assert "The forces of positions 3, 9 are exchanged. The data were mended" in text_of(page)
+        assert "The forces of positions 3, 9 are exchanged. As they are, the data" in text_of(page)
         assert "It concerns the noise" not in page
     if case == "gravity":
         assert "mounting rotation" in page.split("What can this campaign not see?")[1]
@@ -164,7 +165,7 @@ def test_a_narrowed_diagnosis_is_told_as_a_set(named, tmp_path):
     assert 0 < part["purity"] < 1
     for words in (
         "➜ NARROWED The model lacks an effect of temperature: thermal bias or thermal curve.",
-        "This campaign cannot tell thermal bias (0.55) and thermal curve (0.4) apart; further",
+        "Explanations, most probable first: thermal bias (0.55) and thermal curve (0.4);",
         "whether thermal bias or thermal curve is missing",
         "takes thermal bias, and its sigmas do not know of the others",
     ):
@@ -209,7 +210,7 @@ def test_axes_of_different_noise_are_warned_of(named):
 @pytest.mark.parametrize(("after", "better"), [(98.0, "base"), (82.5, "extended")])
 def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better):
     """On the page and its commands, in the terminal, and in both files for programs."""
-    diagnosis = otherwise(named, leveling=(82.0 * MGON, after * MGON))
+    diagnosis = otherwise(named, leveling=TiltErrors(0.01, 82.0 * MGON, after * MGON))
     content, page = told(diagnosis, tmp_path)
     assert content["gap"]["better_for_leveling"] == better
     calibration = json.loads((tmp_path / "calibration.json").read_text(encoding="utf-8"))
@@ -217,21 +218,6 @@ def test_a_model_that_levels_worse_is_not_advised(named, tmp_path, after, better
     for lines in ([page], verdict_lines(diagnosis), calibration["warnings"]):
         assert any(advised in line for line in lines) == (better == "base")
     assert ("accelstudy apply" in page) == (better == "extended")
-
-
-@pytest.mark.usefixtures("composed")
-def test_no_other_signature_is_said_only_without_a_rival_like_it(named, tmp_path):
-    """A rival whose cosine prints as 1.000 is named instead."""
-    (found,) = named.found
-    for change, nothing in (
-        ({"rivals": (Rival("thermal_curve", 0.9412),)}, True),
-        ({"rivals": (Rival("thermal_curve", 0.99996),)}, False),
-        ({"imitators": ("thermal_curve",), "rivals": (Rival("thermal_curve", 1.0),)}, False),
-    ):
-        _, page = told(otherwise(named, found=(replace(found, **change),)), tmp_path)
-        part = page.split("What is it called?")[1].split("How sure is that")[0]
-        assert ("No other effect" in part) == nothing
-        assert ("thermal curve" in part) != nothing
 
 
 def test_noise_alone_is_blamed_only_where_it_is_probable():
@@ -294,28 +280,46 @@ def test_the_model_is_a_study(written, case):
     assert len(study.grids[0].models) == (2 if case != "noise_model" else 1)
 
 
-def test_the_old_simulation_lacks_the_measurement(written, named, tmp_path):
-    loop = written("named").diagnosed.loop
-    old, real, new = loop.document["cases"]
-    assert not old["contains_measurement"]
-    assert real["contains_measurement"]
-    assert loop.measured["base"] == pytest.approx(named.gap.before)
-    assert loop.measured["extended"] == pytest.approx(named.gap.after, rel=0.05)
-    for case in (("old", "base"), ("new", "extended")):
-        values = loop.case(*case)["sigma0_squared"]
-        assert values.mean() == pytest.approx(1, abs=5 * values.std() / np.sqrt(len(values)))
-    before, after = named.leveling
-    assert real["tilt_rms_mgon"] == pytest.approx(before / MGON, rel=0.05)
-    assert new["tilt_rms_mgon"] == pytest.approx(after / MGON, rel=0.1)
-    assert old["tilt_rms_mgon"] < 0.5 * before / MGON
-    promised = f"promises a tilt error of {number(old['tilt_rms_mgon'])} mgon"
+def simulated_sessions(simulated, fitted, d, count=200):
+    """Variances of unit weight and tilt errors of sessions, each drawn and calibrated."""
+    p = simulated.parameters[: simulated.model.n_parameters]
+    f_b = simulated.model.correct(d.campaign.forces, p, G, d.frame.hold)
+    directions = -f_b / np.linalg.norm(f_b, axis=1, keepdims=True)
+    ideal = session(simulated.model, p, directions, G, d.frame.hold)
+    noise = Noise(d.campaign.sigma_force, d.campaign.sigma_angle)
+    drawn = ideal.draw(noise, count, np.random.default_rng(1))
+    initial = fitted.parameters[: fitted.model.n_parameters]
+    result = calibrate(fitted.model, d.approach, replace(drawn, initial=initial))
+    tilts = cap_forces(50 * GON, 60, G)
+    used = holds_in_use(d.frame.hold, d.campaign.n_positions, tilts)
+    own = result.parameters[:, : fitted.model.n_parameters]
+    error = leveling_error(simulated.model, p, fitted.model, own, tilts, G, used)
+    return result.variance_posteriori, np.sqrt(np.mean(error.per_replicate**2))
+
+
+def test_simulations_find_what_is_said_of_them(named, written, tmp_path):
+    """The base model's own, and those with the effect, calibrated without it and with it."""
+    base, extended = named.base, named.final.solution
+    low, high = named.fits[0].simulated
+    tilt = named.leveling
+    for simulated, fitted, expected in (
+        (base, base, tilt.promised), (extended, base, tilt.before),
+        (extended, extended, tilt.after),
+    ):  # fmt: skip
+        variances, rms = simulated_sessions(simulated, fitted, named)
+        assert rms == pytest.approx(expected, rel=0.1)
+        if simulated is fitted:
+            assert 0.9 < np.mean((variances > low) & (variances < high)) < 0.99
+    assert [one.measured for one in named.fits] == [named.gap.before, named.gap.after]
+    assert tilt.promised < 0.5 * tilt.before
+    promised = f"promises a tilt error of {number(tilt.promised / MGON)} mgon"
     assert promised in text_of(written("named").page)
 
     with angles_in("deg"), composed():
-        document = write_diagnosis(named, tmp_path / "deg", loop=loop)
-    assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(before / MGON)
+        document = write_diagnosis(named, tmp_path / "deg")
+    assert document["gap"]["leveling_rms_mgon"]["before"] == pytest.approx(tilt.before / MGON)
     page = (tmp_path / "deg/report.html").read_text("utf-8").partition("90° = 100 gon")[2]
-    assert f"promises a tilt error of {number(0.9 * old['tilt_rms_mgon'])} mdeg" in page
+    assert f"promises a tilt error of {number(0.9 * tilt.promised / MGON)} mdeg" in page
     assert re.findall(r"(?:[^.\w]|m)gon", page) == []
 
 
@@ -327,21 +331,6 @@ def test_positions_that_are_just_enough_to_calibrate_show_nothing(tmp_path):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Too few positions to show whether anything is missing" in page
     assert page.count("<svg") == 1  # that of the residuals
-
-
-def test_nothing_is_compared_without_an_effect_a_tilt_or_a_variance(written, named, monkeypatch):
-    """A sensor that clips may have no tilt; variances that are nothing say nothing of the noise."""
-    assert written("no_effect").diagnosed.loop is None
-    assert close_loop(otherwise(named, leveling=None)) is None
-    sessions = pd.DataFrame(
-        [{"simulation": s, "calibration": c, "replicate": i, "sigma0_squared": value}
-         for s, c in CASES_OF_LOOP for i, value in enumerate((0.0, np.nan, np.inf, 1.2))],
-    ).assign(converged=True, tilt_error_rad=1e-3)  # fmt: skip
-    loop = Loop(sessions, {"base": 1.0, "extended": 1.0})
-    assert loop.document["cases"][0]["sigma0_squared_central95"] == [1.2, 1.2]
-    nothing = sessions[["sigma0_squared", "tilt_error_rad", "converged"]][:1]
-    monkeypatch.setattr("accelstudy.diagnosis.loop._session_table", lambda *_: nothing)
-    assert close_loop(named, 1) is None
 
 
 @pytest.mark.usefixtures("composed")

@@ -19,7 +19,6 @@ TINY = {
         "temperature": [20, 40],
         "temperature_order": "ABBA",
     },
-    "replicates": 100,
 }
 
 
@@ -43,7 +42,7 @@ def test_all_is_made(made):
     files = {path.name for path in diagnosis.iterdir() if not path.name.startswith(".")}
     assert files == {
         "calibration.json", "diagnosis.json", "report.html", "model.yaml", "positions.parquet",
-        "loop.parquet", "figures",
+        "figures",
     }  # fmt: skip
     for name in ("evidence", "gap", "location", "residuals"):
         assert (diagnosis / "figures" / f"{name}.svg").stat().st_size > 1000

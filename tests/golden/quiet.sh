@@ -11,7 +11,7 @@ accelstudy simulate-campaign --quiet --out implausible --gross-error "row_order(
 accelstudy calibrate rejected --quiet --approach robot --out rejected-calibrated
 accelstudy calibrate unknown --quiet --approach robot --out unknown-calibrated
 accelstudy calibrate implausible --quiet --approach robot --out implausible-calibrated
-accelstudy diagnose rejected --quiet --replicates 100 --out diagnosed
+accelstudy diagnose rejected --quiet --out diagnosed
 accelstudy compare spring/calibration.json winter/calibration.json --quiet --out both
 accelstudy history spring/calibration.json autumn/calibration.json winter/calibration.json --quiet --date 2025-04-01 --date 2025-10-01 --date 2026-01-15 --out years
 accelstudy lot of-spring of-autumn of-winter --quiet --out lot

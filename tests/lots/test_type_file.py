@@ -117,7 +117,7 @@ def test_each_command_takes_a_type(tmp_path):
     page = (tmp_path / "c/report.html").read_text(encoding="utf-8")
     assert "5 sensors of its type" in page
     assert "--prior" in page
-    succeed("diagnose", tmp_path / "s0", *given, "--replicates", "100", "--out", tmp_path / "d")
+    succeed("diagnose", tmp_path / "s0", *given, "--out", tmp_path / "d")
     advice = succeed(
         "advise", tmp_path / "faces", "--tilt-accuracy", "100mgon", *given
     ).stdout  # fmt: skip

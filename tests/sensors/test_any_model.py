@@ -113,7 +113,7 @@ def test_a_study_of_compositions(tmp_path):
 @pytest.fixture(scope="module")
 def diagnosed(made):
     """Folder of the diagnosis of the campaign, which lacks both effects."""
-    run("diagnose", made / "c", "--out", made / "d", "--replicates", "100")
+    run("diagnose", made / "c", "--out", made / "d")
     return made / "d"
 
 

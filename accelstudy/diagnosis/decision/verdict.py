@@ -137,9 +137,7 @@ def _judge(case: Case, posterior: Posterior) -> Finding:
     if top.is_noise and top.posterior >= RULES.sure:
         reason = Reason.of("noise", name=top.names[0], remark=NOISES[top.names[0]])
         return Finding("noise_model", frame, reason, posterior=posterior)
-    reason = Reason.of("not in the catalogue")
-    if UNKNOWN not in top.names:
-        reason = Reason.of("undecided", first=top, second=posterior.reported[1])
+    reason = Reason.of("not in the catalogue" if UNKNOWN in top.names else "undecided")
     return Finding("unknown", frame, reason, posterior=posterior)
 
 

@@ -23,10 +23,10 @@ from accelstudy.campaign.calibration.document import (
 )
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_estimability
 from accelstudy.campaign.session import Campaign
+from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
-from accelstudy.diagnosis.next_positions import NextPosition
-from accelstudy.diagnosis.report.words import reason, warnings
+from accelstudy.diagnosis.report.words import clauses, warnings
 from accelstudy.diagnosis.result import Diagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
@@ -48,7 +48,8 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "model": d.model.name,
         "axes": FRD.name,
         "verdict": d.verdict,
-        "reason": reason(d),
+        "reason": "; ".join(clauses(d.reason)),
+        "fits": d.fits,
         "global_test": {
             "statistic": d.base.omega if test is None else test.statistic,
             "dof": d.base.redundancy,
@@ -64,7 +65,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
             "p_value": screening.p_value,
             "simulations": d.case.chance.simulations,
             "candidates": [
-                {"name": name, "p_single": screening.p_candidate[name], "p_family": p}
+                {"name": name, "p_family": p}
                 for name, p in sorted(screening.p_family.items(), key=lambda item: item[1])
             ],
         },
@@ -76,12 +77,19 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "shape": None if d.shape is None else shape_document(d.shape),
         "like": d.like,
         "gap": _gap(d),
-        "parameter_changes": d.changes,
         "invisible_effects": d.invisible,
-        "untestable_effects": [*d.problem.examined.untestable],
-        "untestable_reasons": d.problem.examined.untestable,
+        "untestable_effects": d.problem.examined.untestable,
         "upper_limits": d.upper_limits,
-        "next_positions": [_next(position) for position in d.next_positions],
+        "next_positions": [
+            {
+                "roll_gon": one.roll / GON,
+                "pitch_gon": one.pitch / GON,
+                **({} if one.temperature is None else {"temperature_degC": one.temperature}),
+                **({} if one.later is None else {"later_s": one.later}),
+                "separates": [name for names in one.separates for name in names],
+            }
+            for one in d.next_positions
+        ],
         "redundancy": d.frame.residuals.redundancy,
         "n_positions": d.campaign.n_positions,
         "warnings": d.campaign.warnings,
@@ -97,22 +105,19 @@ def _some(record: object, *names: str) -> dict[str, Any]:
 
 def shape_document(shape: LearnedShape) -> dict[str, Any]:
     """Describe a learned function, SI."""
-    ranking, names = shape.ranking, shape.components
+    names = shape.components
     return {
         "coordinate": shape.coordinate,
         "target": shape.target,
-        "axes": ranking.axes,
-        "subject": ranking.subject,
+        "axes": shape.axes,
+        "subject": shape.subject,
         "function": {
             "unit": TARGETS[shape.effect.target].unit,
             "coordinate": shape.grid.tolist(),
             "value": dict(zip(names, shape.values.T.tolist(), strict=True)),
             "sigma": dict(zip(names, shape.sigmas.T.tolist(), strict=True)),
         },
-        "formulas": [
-            {"text": f"{ranking.subject}: {one.text}", "posterior": one.posterior}
-            for one in ranking.formulas
-        ],
+        "formulas": shape.formulas,
         "least_known": shape.least_known,
     }
 
@@ -137,31 +142,17 @@ def effect_document(named: NamedCause) -> dict[str, Any]:
     return {k: v for k, v in content.items() if k not in optional or v not in (None, [])}
 
 
-def _next(position: NextPosition) -> dict[str, Any]:
-    """Describe a position that would separate what is left."""
-    shown = {
-        "roll_gon": position.roll / GON,
-        "pitch_gon": position.pitch / GON,
-        "temperature_degC": position.temperature,
-        "yaw_gon": None if position.yaw is None else position.yaw / GON,
-        "later_s": position.later,
-        "any_attitude": position.anywhere,
-        "separates": [name for names in position.separates for name in names],
-    }
-    return {key: value for key, value in shown.items() if value is not None}
-
-
 def _gap(d: Diagnosis) -> dict[str, Any]:
-    gap, held = d.gap, d.gap.held_out
-    tilt = (None, None) if d.leveling is None else [value / MGON for value in d.leveling]
-    used = () if held is None else held.held
+    gap, held, tilt = d.gap, d.gap.held_out, d.leveling
     return {
         "sigma0_squared": {"before": gap.before, "after": gap.after},
-        "held_out_mse": _some(held, "before", "after", "floor", "reduction_ci95"),
-        "held_out_z": _some(held, "z")["z"],
-        "held_out_z_needed": _some(held, "needed")["needed"],
-        "held_out_positions": d.campaign.positions[list(used)].tolist(),
-        "leveling_rms_mgon": dict(zip(("before", "after"), tilt, strict=True)),
+        "held_out_mse": _some(held, "before", "after", "floor"),
+        "held_out_z": held and held.z,
+        "held_out_z_needed": held and held.needed,
+        "held_out_positions": d.campaign.positions[list(held.held) if held else []].tolist(),
+        "leveling_rms_mgon": dict.fromkeys(TiltErrors._fields)
+        if tilt is None
+        else {name: value / MGON for name, value in tilt._asdict().items()},
         "better_for_leveling": d.better_for_leveling,
         "confirmed": gap.confirmed,
         "confirmed_statement": gap.statement,

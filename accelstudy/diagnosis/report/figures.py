@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
@@ -17,7 +16,6 @@ from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.basics.wording import number, words
 from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
-from accelstudy.diagnosis.decision.statement import family_of
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import place_text
@@ -30,7 +28,6 @@ from accelstudy.drawing.style import (
     COLUMN,
     FULL,
     INK,
-    MISSING,
     new_figure,
     say_empty,
 )
@@ -52,8 +49,6 @@ def diagnosis_figures(
     figures: dict[str, Callable[[], Figure]] = {"residuals": lambda: residual_figure(d, positions)}
     if d.detection.p_family:
         figures["evidence"] = lambda: evidence_figure(d)
-    if len(d.credible_set) > 1:
-        figures["explanations"] = lambda: explanations_figure(d.credible_set)
     if (shape := d.shape) is not None:
         figures["shape"] = lambda: shape_figure(shape)
     if d.gap.held_out is not None:
@@ -77,37 +72,33 @@ ABREAST = 0.03
 
 def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals before and after against direction, time and temperature."""
-    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
-    panels = _panels(diagnosis, positions, len(names))
-    refitted = diagnosis.final is not diagnosis.frame
-    explained = diagnosis.extended_model is not diagnosis.model
-    rows = ("before", "after") if refitted else ("before",)
+    d, names = diagnosis, _components(positions)
+    panels = _panels(d, positions, len(names))
+    rows = ("before",) if d.final is d.frame else ("before", "after")
     figure = new_figure(FULL, 12 + 46 * len(rows))
     # The scale of a bumped position would hide all others.
-    sharey: Literal["all", "row"] = "all" if explained else "row"
+    sharey: Literal["all", "row"] = "row" if d.extended_model is d.model else "all"
     grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
     # Labels of narrow panels must not meet.
-    ticks = 3 if len(panels) > 2 else 5
+    ticks = MaxNLocator(3 if len(panels) > 2 else 5, steps=[1, 2, 5, 10])
     # Residuals that exceed the stated noise must look too large.
-    gap = diagnosis.gap
-    posteriori = gap.before if gap.after is None else gap.after
-    sigma = 1e3 * condition_sigma(diagnosis.base, 1.0 if diagnosis.sigma_known else posteriori)
+    sigma = condition_sigma(d.base, 1.0 if d.sigma_known else d.gap.after or d.gap.before)
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
-            ax.axhspan(-2 * sigma, 2 * sigma, color=NOISE)
-            ax.axhline(0, color=INK, linewidth=0.6)
-            for i, name in enumerate(names):
-                _draw_component(ax, positions, name, when, abscissa[:, i], explained)
-            ax.margins(y=0.08)
-            ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
+            ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)
+            _draw_residuals(ax, positions, when, abscissa)
+            ax.xaxis.set_major_locator(ticks)
             if when == rows[-1]:
                 ax.set_xlabel(label)
         title = "base model" if when == "before" else "with what was found"
         line[0].set_ylabel(f"{title}\nresidual / (mm/s²)")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    figure.legend(once.values(), once.keys(), loc="outside upper left", ncols=7)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=7)
     return figure
+
+
+def _components(positions: pd.DataFrame) -> list[str]:
+    """Names of the components of a residual."""
+    return [name for name in AXES if f"residual_{name}_before_mps2" in positions]
 
 
 def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[str, Array]:
@@ -122,32 +113,30 @@ def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[s
     ):
         values = positions[column].to_numpy() / scale
         if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = _abreast(values, count)
+            panels[label] = _abreast(np.broadcast_to(values[:, None], (len(values), count)))
     return panels
 
 
-def _abreast(values: Array, count: int) -> Array:
+def _abreast(values: Array) -> Array:
     """Abscissas (n, count) of components, aside of each other where few values would hide them."""
+    count = values.shape[1]
     aside = ABREAST * np.ptp(values) * (np.arange(count) - (count - 1) / 2)
-    return values[:, None] + aside * (len(np.unique(values)) <= MAX_DISTINCT)
+    return values + aside * (len(np.unique(values)) <= MAX_DISTINCT)
 
 
-def _draw_component(
-    ax: Axes, positions: pd.DataFrame, name: str, when: str, x: Array, explained: bool
-) -> None:
-    colour, marker = AXES[name]
-    label = "|f| − g" if name == "norm" else f"${name}$"
-    values = 1e3 * positions[f"residual_{name}_{when}_mps2"]
-    ax.plot(x, values, marker, color=colour, markersize=3.2, label=label)
-    if when == "before" and explained:
-        part = values - 1e3 * positions[f"residual_{name}_after_mps2"]
-        dash = BEFORE if name == "norm" else colour
-        ax.plot(x, part, "_", color=dash, markersize=8, markeredgewidth=1.3,
-                label=f"{label}, explained")  # fmt: skip
+def _draw_residuals(ax: Axes, positions: pd.DataFrame, when: str, abscissa: Array) -> None:
+    """Draw all components over abscissas (n, components)."""
+    ax.axhline(0, color=INK, linewidth=0.6)
     left_out = positions["split"] == "left out"
-    if when == "before" and left_out.any():
-        ax.plot(x[left_out], values[left_out], "o", color=BEFORE, markersize=9,
-                markerfacecolor="none", label="left out")  # fmt: skip
+    for name, x in zip(_components(positions), abscissa.T, strict=True):
+        colour, marker = AXES[name]
+        label = "|f| − g" if name == "norm" else f"${name}$"
+        values = 1e3 * positions[f"residual_{name}_{when}_mps2"]
+        ax.plot(x, values, marker, color=colour, markersize=3.2, label=label)
+        if when == "before" and left_out.any():
+            ax.plot(x[left_out], values[left_out], "o", color=BEFORE, markersize=9,
+                    markerfacecolor="none")  # fmt: skip
+    ax.margins(y=0.08)
 
 
 MAX_CANDIDATES = 12
@@ -172,14 +161,13 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     named = {name for f in diagnosis.found for name in (f.name, *f.equivalence_class)}
     named |= set() if diagnosis.shape is None else {UNKNOWN}
     colours = [AFTER if name in named else OTHER_COLOUR for name in shown]
-    place = np.arange(len(shown))[::-1]
-
+    labels = [words(name) for name in shown]
     figure = new_figure(FULL, 22 + 4.4 * len(shown))
     left, right = figure.subplots(1, 2, sharey=True)
     tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
     smallest = float(np.nanmin([*tested, 1.0]))
-    left.hlines(place, tested, 1, color=colours, linewidth=1.2)
-    left.scatter(tested, place, color=colours, s=18, zorder=3)
+    left.hlines(labels, tested, 1, color=colours, linewidth=1.2)
+    left.scatter(tested, labels, color=colours, s=18, zorder=3)
     level = RULES.level(diagnosis.sigma_known)
     left.axvline(level, color=BEFORE, linewidth=1, linestyle="--")
     left.text(level, 1.0, f"level {level:g}", transform=left.get_xaxis_transform(),
@@ -188,22 +176,18 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xlim(2, min(0.3 * smallest, 1e-3))
     left.xaxis.set_minor_locator(NullLocator())
     left.set_xlabel("p-value alone, all candidates counted")
-    left.set_yticks(place, [words(name) for name in shown])
     left.grid(axis="y", visible=False)
-    _draw_shares(right, place, [probabilities.get(name) for name in shown], colours)
+    left.invert_yaxis()
+    draw_shares(right, {words(name): probabilities.get(name) for name in shown}, colours)
     right.set(xlim=(0, 115), xlabel="posterior probability, alone or with others / %")
     return figure
 
 
-def _draw_shares(
-    ax: Axes,
-    place: Sequence[str] | NDArray[np.int_],
-    shares: Sequence[float | None],
-    colour: str | list[str],
-) -> None:
-    """Draw probabilities as bars, with their numbers."""
-    drawn = ax.barh(place, [100 * (share or 0.0) for share in shares], color=colour, height=0.6)
-    ax.bar_label(drawn, [_percent(share) for share in shares], padding=2, fontsize=7.5)
+def draw_shares(ax: Axes, shares: Mapping[str, float | None], colour: str | Sequence[str]) -> None:
+    """Draw probabilities as bars, with their names and numbers."""
+    drawn = ax.barh([*shares], [100 * (share or 0.0) for share in shares.values()], color=colour,
+                    height=0.6)  # fmt: skip
+    ax.bar_label(drawn, [_percent(share) for share in shares.values()], padding=2, fontsize=7.5)
     ax.set_xticks([0, 25, 50, 75, 100])
     ax.grid(axis="y", visible=False)
 
@@ -229,14 +213,13 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     }
     if len(d.like) > MAX_PLACES:
         bars["all others"] = sum(one.posterior for one in d.like[MAX_PLACES:])
-    names = [name for name in AXES if f"residual_{name}_before_mps2" in positions]
-    values = coordinate_in_holds(best.coordinate, d.frame)
+    count, values = len(_components(positions)), coordinate_in_holds(best.coordinate, d.frame)
     # Each axis has its own argument, and a panel of its own only where all residuals are one.
-    together = values.shape[1] in (1, len(names))
+    together = values.shape[1] in (1, count)
     panels = 1 if together else values.shape[1]
     figure = new_figure(FULL, 22 + 8 * max(len(bars), 4))
     left, *axes = figure.subplots(1, 1 + panels, width_ratios=[1.1, *[1.4 / panels] * panels])
-    _draw_shares(left, [*bars], [*bars.values()], AFTER)
+    draw_shares(left, bars, AFTER)
     left.set(xlim=(0, 118), xlabel="posterior probability / %")
     left.invert_yaxis()
     # Without times that of the time is the order.
@@ -245,11 +228,8 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     label = _axis(of.words if best.coordinate == "time" else place_text(best.coordinate))
     when = "after" if d.verdict == "unknown" and d.found else "before"
     for k, ax in enumerate(axes):
-        ax.axhline(0, color=INK, linewidth=0.6)
-        for i, name in enumerate(names):
-            x = values[:, min(i, values.shape[1] - 1) if together else k] / of.size
-            x = _abreast(x, len(names))[:, i]
-            _draw_component(ax, positions, name, when, x, False)
+        x = np.broadcast_to(values if together else values[:, [k]], (len(values), count))
+        _draw_residuals(ax, positions, when, _abreast(x / of.size))
         ax.set_title("" if together else ("roll", "pitch")[k] if panels == 2 else "xyz"[k])
         ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         ax.sharey(axes[0])
@@ -261,63 +241,14 @@ def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     return figure
 
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
-"""Of the families, the most probable first."""
-ALONE = "#999999"
-"""Of what belongs to no family, and of further families."""
-MAX_BARS = 8
-"""Explanations in the figure; weaker ones count as others."""
-HEIGHT = 0.64
-"""Of a bar, in rows."""
-
-
-def explanations_figure(explanations: tuple[Explanation, ...]) -> Figure:
-    """Posterior of each explanation, each bar from where the one above it ends."""
-    rows, colours = _rows(explanations)
-    figure = new_figure(COLUMN, 14 + 4 * len(colours) + 7 * len(rows))
-    draw_explanations(figure.add_subplot(), explanations)
-    return figure
-
-
-def _rows(
-    explanations: tuple[Explanation, ...],
-) -> tuple[list[tuple[str, float, list[str]]], dict[str, str]]:
-    """Label, posterior and colours of each bar, and the colour of each family."""
-    families = [[family_of(*members) for members in one.classes] for one in explanations[:MAX_BARS]]
-    named = dict.fromkeys(family for of_one in families for family in of_one if family)
-    colours = dict(zip(named, COLOURS, strict=False))
-    rows = [
-        ("\nwith ".join(map(words, one.names)), one.posterior, [colours.get(f, ALONE) for f in of])
-        for one, of in zip(explanations, families, strict=False)
-    ]
-    rest = 1 - sum(posterior for _, posterior, _ in rows)
-    return rows + [("all others", rest, [MISSING])] * (rest > 0), colours
-
-
 def draw_explanations(ax: Axes, explanations: tuple[Explanation, ...]) -> None:
-    """Draw what `explanations_figure` shows; nothing is missing if there are none."""
+    """Draw the posterior of each explanation; nothing is missing if there are none."""
     if not explanations:
         say_empty(ax, "nothing is missing")
         return
-    (rows, colours), end = _rows(explanations), 0.0
-    for row, (_, posterior, parts) in enumerate(rows):
-        height = HEIGHT / len(parts)
-        for i, colour in enumerate(parts):
-            at = row - HEIGHT / 2 + (i + 0.5) * height
-            ax.barh(at, posterior, left=end, height=height, color=colour)
-        ax.annotate(f"{posterior:.2f}", (1, row), xytext=(4, 0), textcoords="offset points",
-                    va="center", fontsize=7.5, annotation_clip=False)  # fmt: skip
-        end += posterior
-    ax.axvline(RULES.credible, color=INK, linewidth=0.8, linestyle="--")
-    ax.text(RULES.credible, 1.0, f"{RULES.credible:g}", transform=ax.get_xaxis_transform(),
-            ha="center", va="bottom", fontsize=7.5)  # fmt: skip
-    ax.set_yticks(range(len(rows)), [label for label, _, _ in rows])
-    ax.set(xlim=(0, 1), xlabel="posterior probability, summed")
+    draw_shares(ax, {"\nwith ".join(map(words, e.names)): e.posterior for e in explanations}, AFTER)
+    ax.set(xlim=(0, 118), xlabel="posterior probability / %")
     ax.invert_yaxis()
-    ax.grid(axis="y", visible=False)
-    if colours:
-        handles = [Patch(color=colour, label=family) for family, colour in colours.items()]
-        ax.figure.legend(handles=handles, loc="outside upper left", ncols=1)
 
 
 COMPONENTS = {
@@ -329,7 +260,7 @@ COMPONENTS = {
 BAND = 1.96
 """Half of a band of 95 %, in sigmas."""
 MAX_NOISE_RATIO = 3
-"""Residuals whose noise is so many times that of the best are drawn small."""
+"""Residuals whose noise is more than so many times that of the best are left out."""
 
 
 def shape_figure(shape: LearnedShape) -> Figure:
@@ -337,35 +268,24 @@ def shape_figure(shape: LearnedShape) -> Figure:
     figure = new_figure(COLUMN, 10 + 36 * len(shape.components))
     panels = figure.subplots(len(shape.components), 1, sharex=True, sharey=True)
     of, target = coordinate_of(shape.effect.coordinate), TARGETS[shape.effect.target]
-    faint = is_noisy(shape)
-    unit, hardly = shown_unit(target.unit), list[tuple[Axes, Array, Array]]()
+    unit = shown_unit(target.unit)
     for i, (name, ax) in enumerate(zip(shape.components, panels, strict=True)):
         colour, marker = COMPONENTS[name]
         x, at = shape.where[:, i] / of.size, shape.grid
         within = (at >= shape.where[:, i].min()) & (at <= shape.where[:, i].max())
         h, sigma = (to_display(v[within, i], target.unit) for v in (shape.values, shape.sigmas))
         points, grid = to_display(shape.residuals[:, i], target.unit), at[within] / of.size
+        clear = shape.spreads[:, i] <= MAX_NOISE_RATIO * np.nanmin(shape.spreads[:, i])
         ax.axhline(0, color=INK, linewidth=0.6)
         ax.fill_between(grid, h - BAND * sigma, h + BAND * sigma, color=colour, alpha=0.25, lw=0)
         ax.plot(grid, h, color=colour)
-        ax.plot(x[~faint[:, i]], points[~faint[:, i]], marker, color=colour, markersize=3.2)
-        hardly.append((ax, x[faint[:, i]], points[faint[:, i]]))
+        ax.plot(x[clear], points[clear], marker, color=colour, markersize=3.2)
         ax.set_ylabel(f"{target.label.format(name)}\n{_per_unit('h', unit)}")
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        if name not in shape.ranking.axes:
+        if name not in shape.axes:
             ax.set_title("no part of it shows", loc="right")
-    # What hardly shows the function has no say in the scale.
-    limits = panels[0].get_ylim()
-    for ax, x, points in hardly:
-        ax.plot(x, points, ".", color=OTHER_COLOUR, markersize=2.5)
-    panels[0].set_ylim(limits)
     panels[-1].set_xlabel(_per_unit(_axis(of.words), of.unit))
     return figure
-
-
-def is_noisy(shape: LearnedShape) -> NDArray[np.bool_]:
-    """Which residuals, (n, c), have so much noise that they are drawn small."""
-    return np.asarray(shape.spreads > MAX_NOISE_RATIO * np.nanmin(shape.spreads, axis=0))
 
 
 def _axis(words: str) -> str:

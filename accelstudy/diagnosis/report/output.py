@@ -13,7 +13,6 @@ from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.sensor_calibration import needs_of, unknown
-from accelstudy.diagnosis.loop import Loop
 from accelstudy.diagnosis.report import words
 from accelstudy.diagnosis.report.document import (
     diagnosed_calibration,
@@ -21,7 +20,7 @@ from accelstudy.diagnosis.report.document import (
     positions_table,
     study_overlay,
 )
-from accelstudy.diagnosis.report.figures import diagnosis_figures, is_noisy
+from accelstudy.diagnosis.report.figures import diagnosis_figures
 from accelstudy.diagnosis.result import MISSING, Diagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
@@ -38,7 +37,6 @@ MODEL_HEADER = """\
 def write_diagnosis(
     diagnosis: Diagnosis,
     folder: str | Path,
-    loop: Loop | None = None,
     source: str | Path = "CAMPAIGN",
     place: str | Path = "",
 ) -> dict[str, Any]:
@@ -48,7 +46,6 @@ def write_diagnosis(
     ----------
     diagnosis : Diagnosis
     folder : path, made if it is not there
-    loop : Loop, optional, simulations with the old and with the new model
     source, place : paths of the campaign and of the results, for the commands that the page gives
 
     Returns
@@ -58,9 +55,6 @@ def write_diagnosis(
     """
     folder = Path(folder)
     document, calibration = diagnosis_document(diagnosis), None
-    if loop is not None:
-        document["loop"] = loop.document
-        write_frame(folder / "loop.parquet", loop.sessions)
     positions = positions_table(diagnosis)
     write_frame(folder / "positions.parquet", positions)
     try:
@@ -73,7 +67,7 @@ def write_diagnosis(
     with whole_file(folder / "model.yaml") as path:
         text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
         path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    shape, lines = diagnosis.shape, words.verdict_lines(diagnosis)
+    lines = words.verdict_lines(diagnosis)
     write_page(
         folder / "report.html",
         "diagnosis/report/report.html.j2",
@@ -83,7 +77,6 @@ def write_diagnosis(
         w=words,
         lines=lines,
         figures=save_all(diagnosis_figures(diagnosis, positions), folder / "figures"),
-        small_dots=shape is not None and bool(is_noisy(shape).any()),
         calibration=calibration,
         rules=RULES,
         missing=MISSING,

@@ -6,26 +6,23 @@ The sentences stand in `words.txt.j2`; here are the phrases of which it makes th
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from accelstudy.basics.levels import ACCEPTED, UNCHECKED
-from accelstudy.basics.units import GON
-from accelstudy.basics.wording import comma_list, probability, words, words_with_counts
+from accelstudy.basics.units import GON, shown_unit
+from accelstudy.basics.wording import amount, comma_list, probability, words, words_with_counts
 from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
 from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.decision.statement import (
     Cosine,
     Part,
     Statement,
-    family_of,
     statement_of,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
-from accelstudy.diagnosis.evidence.candidates import Cause
-from accelstudy.diagnosis.formulas import OTHER_FORM
 from accelstudy.diagnosis.result import Diagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.effects import Effect, get_effect
 from accelstudy.effects.learned import LEARNED, Learned
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -53,8 +50,6 @@ MIN_SAID = 0.1
 """Posterior from which on something open is worth a word; the figure has all of it."""
 MIN_PLACE_SAID = 0.5
 """Posterior from which on it is worth a word where that which has a name lives."""
-MAX_FORMULAS = 3
-"""Formulas that are worth a word; the page lists all."""
 
 HERE = sys.modules[__name__]
 
@@ -69,19 +64,9 @@ def verdict_lines(diagnosis: Diagnosis) -> list[str]:
     return render("verdict", diagnosis)
 
 
-def advice(diagnosis: Diagnosis) -> list[str]:
-    """Say what would show more, apart from further positions."""
-    return render("advice", diagnosis)
-
-
 def warnings(diagnosis: Diagnosis, axes: Sequence[float]) -> list[str]:
     """Say what a user of the calibration has to know; `axes` are their sigmas where they differ."""
     return render("warnings", diagnosis, axes)
-
-
-def reason(diagnosis: Diagnosis) -> str:
-    """Say why the verdict is what it is; nothing where that needs no reason."""
-    return "; ".join(clauses(diagnosis.reason))
 
 
 def clauses(of: Reason | None) -> list[str]:
@@ -164,13 +149,10 @@ def like_text(diagnosis: Diagnosis) -> str:
     named = diagnosis.verdict not in ("unknown", LEARNED)
     if named and worth and worth[0].posterior < MIN_PLACE_SAID:
         return ""  # the figure has all of it
-    places = [
-        (
-            f"{TARGETS[one.target].alone} that varies with {place_text(one.coordinate)}",
-            one.posterior,
-        )
+    places = {
+        f"{TARGETS[one.target].alone} that varies with {place_text(one.coordinate)}": one.posterior
         for one in worth
-    ]
+    }
     return _with_probabilities(places, "or")
 
 
@@ -180,16 +162,17 @@ def place_text(coordinate: str) -> str:
     return of.place or of.words
 
 
-def formulas(diagnosis: Diagnosis) -> str:
-    """Say which formulas a learned function may be; nothing if none was learned."""
-    if diagnosis.shape is None:
-        return ""
-    ranked = diagnosis.shape.ranking.formulas
-    if ranked[0].text == OTHER_FORM and ranked[0].posterior >= RULES.sure:
-        return f"No formula of the library describes it ({probability(ranked[0].posterior)})."
-    worth = [(one.text, one.posterior) for one in ranked if one.posterior >= MIN_SAID]
-    rest = " or otherwise" if len(worth) > MAX_FORMULAS else ""
-    return f"It varies {_with_probabilities(worth[:MAX_FORMULAS], 'or')}{rest}."
+def extents_text(shape: LearnedShape) -> str:
+    """Say how far a learned function goes up and down in a session."""
+    unit = TARGETS[shape.effect.target].unit
+    sizes = [f"{amount(size, unit)} ({axis})" for axis, size in shape.extents.items()]
+    return f"{comma_list(sizes)} {shown_unit(unit)}".rstrip()
+
+
+def formulas(shape: LearnedShape) -> str:
+    """Say which formulas a learned function may be."""
+    worth = {one.text: one.posterior for one in shape.formulas if one.posterior >= MIN_SAID}
+    return f"It varies {_with_probabilities(worth, 'or')}."
 
 
 def range_text(diagnosis: Diagnosis) -> str:
@@ -201,11 +184,8 @@ def range_text(diagnosis: Diagnosis) -> str:
     return f"{of.at(settings['low'])} to {of.at(settings['high'])}"
 
 
-def more_of_it(diagnosis: Diagnosis) -> str:
-    """Say where a learned function is known least; nothing where further positions are given."""
-    shape = diagnosis.shape
-    if shape is None or diagnosis.next_positions:
-        return ""
+def more_of_it(shape: LearnedShape) -> str:
+    """Say where a learned function is known least."""
     of = coordinate_of(shape.effect.coordinate)
     places = comma_list([of.at(place) for place in shape.least_known], "or")
     session = " in another session" if of.is_course else ""
@@ -236,150 +216,67 @@ def together(names: Sequence[str]) -> str:
     return comma_list(words_with_counts(names, name_words))
 
 
-def explain_text(names: Sequence[str]) -> str:
-    """List names with the verb that belongs to them."""
-    return f"{together(names)} explain{'s' if len(names) == 1 else ''}"
+def most_probable(credible_set: Sequence[Explanation]) -> str:
+    """List the explanations that are worth a word, the most probable first."""
+    worth = {explanation_text(one.names): one.posterior
+             for one in credible_set if one.posterior >= MIN_SAID}  # fmt: skip
+    return _with_probabilities(worth)
 
 
 def missing(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
     """Say what is missing: a slow change in time (bias drift or warm up) and hysteresis."""
-    effects, others = _effects_and_others(credible_set)
-    unless = _or([one for one in others if one.posterior >= MIN_SAID])
-    return _missing(_if_it_is_an_effect(effects, cosine)) + f", unless it is {unless}" * bool(
-        unless
-    )
+    effects = [one for one in credible_set if one.is_effects]
+    others = [one for one in credible_set if not one.is_effects and one.posterior >= MIN_SAID]
+    # What is certain given that it is one of the effects.
+    share = RULES.credible * sum(one.posterior for one in effects)
+    says = statement_of(effects, cosine, share)
+    text = _certain(says) or _or(effects)
+    return f"{text}, unless it is {_or(others)}" if others else text
 
 
-def without_a_name(set_says: Statement, beside: str = "something else") -> str:
-    """Say in a sentence what is certain of something that has no name as a whole.
-
-    Parameters
-    ----------
-    set_says : Statement
-    beside : str, what that which is open is called
-    """
-    effects = [part for part in set_says.certain if part.is_effect]
-    if not effects:
+def without_a_name(says: Statement) -> str:
+    """Say in a sentence what is certain of something that has no name as a whole."""
+    certain = _certain(says)
+    if not certain:
         return "Something is missing from the model, and it has no name here."
-    lacks = f"The model lacks {comma_list([_part(part) for part in effects])}"
-    worth = [one for one in set_says.open if one.names and one.posterior >= MIN_SAID]
-    more = sorted(worth, key=lambda one: not one.is_effects)
-    surely = len(effects) < len(set_says.certain) or _surely_more(set_says, RULES.credible)
-    if any(one.is_effects for one in more) and len(more) <= RULES.many:
-        return f"{lacks}, and {'' if surely else 'perhaps '}{beside}: {_or(more)}."
-    if surely:
-        return f"{lacks}; what is missing beside it has no name here."
-    return f"{lacks}; whether more is missing, and what, is open."
+    if _beside(says):
+        return f"The model lacks {certain}."
+    return f"The model lacks {certain}; what is missing beside it has no name here."
 
 
-def most_probable(set_says: Statement, credible_set: Sequence[Explanation]) -> str:
-    """Say what something without a name is most like, by families; nothing if that is open.
-
-    If something is certain, it is said of what is beside it.
-    """
-    certain = any(part.is_effect for part in set_says.certain)
-    kinds: dict[str, float] = defaultdict(float)
-    for one in set_says.open if certain else credible_set:
-        for kind in dict.fromkeys(map(_kind, one.causes)):
-            kinds[kind] += one.posterior
-    worth = sorted(((k, p) for k, p in kinds.items() if p >= MIN_SAID), key=lambda item: -item[1])
-    if not worth:
-        return ""
-    return f"Most probable{' beside it' if certain else ''}: {_with_probabilities(worth)}."
+def _certain(says: Statement) -> str:
+    """Say what is certain, and what may be beside it; nothing if nothing is certain."""
+    parts, beside = [part for part in says.certain if part.is_effect], _beside(says)
+    if len(parts) == 1 and not beside:
+        return _part(parts[0], "{family}: {names}" if parts[0].family else "{names}")
+    text = comma_list([_part(part) for part in parts])
+    if not parts or not beside:
+        return text
+    surely = all(one.names for one in says.open)
+    return f"{text}, and {'' if surely else 'perhaps '}{_or(beside)}"
 
 
-def stands_for(diagnosis: Diagnosis) -> list[str]:
-    """Say of each certain family which of its members the model has."""
-    d, said = diagnosis, []
-    for part in d.finding.statement.certain if d.verdict == "unknown" else ():
-        added = [f.name for f in d.found if f.name in {name.name for name in part.names}]
-        others = [name for name in part.names if name.name not in added]
-        if added and others:
-            said.append(f"In the model {words(added[0])} stands for {_names(others)} as well.")
-    return said
+def _beside(says: Statement) -> list[Explanation]:
+    """What may be beside that which is certain, if these are few."""
+    worth = [one for one in says.open if one.names and one.posterior >= MIN_SAID]
+    return worth if len(worth) <= RULES.many else []
 
 
-def _kind(cause: Cause) -> str:
-    family = family_of(*cause.members)
-    return family_words(family) if family else name_words(cause.name)
-
-
-def not_told_apart(credible_set: Sequence[Explanation], cosine: Cosine) -> str:
-    """Say what a campaign cannot tell apart; nothing if it tells everything apart."""
-    effects, others = _effects_and_others(credible_set)
-    set_says = _if_it_is_an_effect(effects, cosine)
-    alike = [
-        [(_names([name]), name.posterior) for name in part.names]
-        for part in set_says.certain
-        if len(part.names) > 1
-    ]
-    beside = set_says.open if alike or not others else credible_set
-    more = [
-        (explanation_text(o.names), o.posterior)
-        for o in beside
-        if o.names and o.posterior >= MIN_SAID
-    ]
-    perhaps = any(not one.names for one in beside)
-    if len(more) > 1 and not perhaps:
-        alike.append(more)
-    open_questions = [f"{', nor '.join(map(_with_probabilities, alike))} apart"] if alike else []
-    if more and perhaps:
-        open_questions.append(f"whether {_with_probabilities(more, 'or')} is missing as well")
-    return f"This campaign cannot tell {', nor '.join(open_questions)}" if open_questions else ""
-
-
-def _with_probabilities(alternatives: Sequence[tuple[str, float]], last: str = "and") -> str:
-    return comma_list([f"{what} ({probability(p)})" for what, p in alternatives], last)
-
-
-def _missing(set_says: Statement) -> str:
-    if not set_says.certain:
-        return _or(set_says.open)
-    more = _or([one for one in set_says.open if one.names and one.posterior >= MIN_SAID])
-    if not more and len(set_says.certain) == 1:
-        (part,) = set_says.certain
-        return _part(part, "{family}: {names}" if part.family else "{names}")
-    parts = comma_list([_part(part) for part in set_says.certain])
-    if not more:
-        return parts
-    surely = _surely_more(set_says, RULES.credible * sum(one.posterior for one in set_says.open))
-    return f"{parts}, and {more}" if surely else f"{parts}, and perhaps {more}"
+def _with_probabilities(alternatives: Mapping[str, float], last: str = "and") -> str:
+    return comma_list([f"{what} ({probability(p)})" for what, p in alternatives.items()], last)
 
 
 def _part(part: Part, pattern: str = "{family} ({names})") -> str:
     """Say one thing that is certain, with all names that it may have."""
-    names = _names(part.names)
+    # Those that mean the same follow each name.
+    same = [other for name in part.names for other in (name.name, *name.members)]
+    names = comma_list(list(dict.fromkeys(map(name_words, same))), "or")
     if len(part.names) == 1:
         return names
     return pattern.format(family=family_words(part.family), names=names)
-
-
-def _names(names: Sequence[Cause]) -> str:
-    """All names, with those that mean the same."""
-    same = [other for name in names for other in (name.name, *name.members)]
-    return comma_list(list(dict.fromkeys(map(name_words, same))), "or")
 
 
 def _or(explanations: Sequence[Explanation]) -> str:
     alternatives = [explanation_text(one.names) for one in explanations]
     pairs = any(len(one.names) > 1 for one in explanations)
     return ", or ".join(alternatives) if pairs else comma_list(alternatives, "or")
-
-
-def _effects_and_others(
-    credible_set: Sequence[Explanation],
-) -> tuple[list[Explanation], list[Explanation]]:
-    """Explanations by effects alone, and the others."""
-    effects = [one for one in credible_set if one.is_effects]
-    return effects, [one for one in credible_set if not one.is_effects]
-
-
-def _if_it_is_an_effect(effects: Sequence[Explanation], cosine: Cosine) -> Statement:
-    """What is certain given that it is one of these explanations."""
-    probability = RULES.credible * sum(one.posterior for one in effects)
-    return statement_of(effects, cosine, probability)
-
-
-def _surely_more(set_says: Statement, probability: float) -> bool:
-    """Whether something is missing beside what is certain."""
-    return sum(one.posterior for one in set_says.open if one.names) >= probability
