@@ -35,6 +35,8 @@ from accelstudy.diagnosis.evidence.noise_models import (
 from accelstudy.diagnosis.evidence.noise_tests import axis_factors
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.space.examined import examine
+from accelstudy.diagnosis.space.hypotheses import clusters, lack_of_fit
+from accelstudy.effects import HoldConditions, get_effect
 from accelstudy.simulation.sessions import Noise
 
 FEW, MANY = 400, 1600
@@ -194,6 +196,27 @@ def test_residuals_are_those_of_a_basis_of_the_residual_space(examined):
             np.testing.assert_allclose(part, np.sum((h.basis.T @ errors) ** 2, axis=0), rtol=1e-7)
 
 
+def test_repeats_and_lack_of_fit_share_the_residual_space(examined):
+    """Against a basis of all differences between conditions of one attitude."""
+    residuals = examined.frame.residuals
+    n, c = residuals.whitening.shape[:2]
+    labels = clusters(examined.frame.forces)
+    assert len(np.unique(labels)) == n / 2
+    differences = []
+    for i in range(n):
+        for axis in range(c if labels[i] != i else 0):
+            change = np.zeros((n, c, 1))
+            change[i, axis], change[labels[i], axis] = 1, -1
+            differences.append(residuals.stack(np.linalg.solve(residuals.whitening, change)))
+    basis = np.linalg.qr(residuals.project(np.concatenate(differences, axis=1)))[0]
+    same = lack_of_fit(residuals, examined.frame.forces)
+    errors = residuals.project(np.random.default_rng(1).standard_normal((len(residuals.z), 5))).T
+    repeated = np.sum((errors @ basis) ** 2, axis=1)
+    assert same.dims[0] == residuals.redundancy - basis.shape[1]
+    rest = np.sum(errors**2, axis=1) - repeated
+    np.testing.assert_allclose(same.parts(errors)[:, 0], rest, rtol=1e-9)
+
+
 def test_coloured_noise_has_the_likelihood_of_whole_covariance_matrices(examined):
     residuals = examined.frame.residuals
     n, c = residuals.whitening.shape[:2]
@@ -225,6 +248,19 @@ def test_factors_of_the_axes_are_those_of_whole_matrices(examined):
     right = np.array([np.sum((z @ a) ** 2) for a in g]) - angles
     expected = np.maximum(np.linalg.solve(left, right), 0)
     np.testing.assert_allclose(axis_factors(residuals), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_times_of_a_jump_among_many_holds_are_some_with_all_others_between():
+    """Not all are searched at first; those next to the best one are looked at then."""
+    hold = HoldConditions(time=60.0 * np.arange(1000))
+    coarse = get_effect("bias_jump").candidates(hold, np.zeros((1000, 3)), 9.8)
+    assert len(coarse) <= 50
+    times = np.array([c.settings["t"] for c in coarse])
+    assert (times[0], times[-1]) == (90, 60 * 997.5)
+    assert np.all(np.diff(times) > 0)
+    between = [b.settings["t"] for b in coarse[20].between(coarse[21], hold)]
+    assert 1 <= len(between) <= 7
+    assert times[20] < min(between) <= max(between) < times[21]
 
 
 def test_memory_of_a_diagnosis_is_linear_in_the_positions(monkeypatch):

@@ -1,6 +1,5 @@
 """Batches of campaigns: configuration, one bad campaign among good ones, public data, summary."""
 
-import hashlib
 import json
 import re
 import shutil
@@ -10,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 from calling import refused
 from campaign_helpers import simulated_campaign
 from log_helpers import session, write
 from page_helpers import assert_sound, text_of
 from places import ROOT
-from snakemake_helpers import ENVIRONMENT, jobs, one_line, remains, run_workflow, snakemake
+from snakemake_helpers import jobs, one_line, remains, run_workflow, snakemake
 
 from accelstudy.basics.units import MGON
 from accelstudy.campaign.batch.config import CampaignEntry, parse_batch
@@ -28,7 +26,6 @@ from accelstudy.campaign.batch.overview import (
 )
 from accelstudy.campaign.batch.run import run_task
 from accelstudy.campaign.format import read_campaign, write_campaign
-from accelstudy.campaign.importing import public
 from accelstudy.campaign.importing.public import public_data
 from accelstudy.files.reading import read_layer
 from accelstudy.files.tables import read_origin, read_table
@@ -250,50 +247,6 @@ def test_the_campaigns_of_a_type_are_evaluated_together(made):
     assert [one["campaign"] for one in lot["left_out"]] == ["spoilt", "six"]
     page = (results / "lot/report.html").read_text(encoding="utf-8")
     assert "Which campaigns are not in the lot?" in page
-
-
-# --- public data ---------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def registry(tmp_path, monkeypatch):
-    """A registry of public data that is the one of the jobs and here."""
-    path = tmp_path / "public_data.yaml"
-    monkeypatch.setattr(public, "REGISTRY", path)
-    prepare = "from pathlib import Path\nfrom accelstudy.campaign.importing import public\n"
-    monkeypatch.setitem(
-        ENVIRONMENT, "PREPARE_JOB", f"{prepare}public.REGISTRY = Path({str(path)!r})"
-    )
-    public_data.cache_clear()
-    yield path
-    public_data.cache_clear()
-
-
-def test_what_cannot_be_downloaded_is_tried_again(registry, tmp_path):
-    environment = {**ENVIRONMENT, "ACCELSTUDY_ANGLE_UNIT": "deg"}
-    log = write_log(tmp_path / "source")
-    digest = hashlib.sha256(log.read_bytes()).hexdigest()
-    url = f"http://127.0.0.1:1/{log.name}"  # where nobody answers
-    entry = {"description": "a log", "url": url, "sha256": digest, "licence": "MIT"}
-    registry.write_text(yaml.safe_dump({"bench-log": {**entry, "import": {"rate_hz": 100}}}))
-    entries = [{"public": "bench-log"}]
-    config = {"batch": "b", "public_folder": "downloads", "campaigns": entries}
-
-    failed = run(tmp_path, config, environment=environment)
-    assert failed.returncode != 0
-    assert f"error: {url}: cannot be downloaded: " in failed.stdout
-
-    (tmp_path / "downloads" / "bench-log").mkdir(parents=True, exist_ok=True)
-    log.rename(tmp_path / "downloads" / "bench-log" / log.name)
-    text = succeed(tmp_path, config, environment=environment)
-    assert jobs(text) == {"calibrate": 1, "overview": 1}
-    one_line(text, "1 of 1 campaigns calibrated")
-    for path in ("overview.html", "campaigns/bench-log/report.html"):
-        page = (tmp_path / "results/b" / path).read_text(encoding="utf-8")
-        assert "mdeg" in page
-        assert "mgon" not in page
-    # What is there is not got again, though pages are written in another unit.
-    assert jobs(succeed(tmp_path, config, "--dry-run")) == {"calibrate": 1, "overview": 1}
 
 
 # --- configuration -------------------------------------------------------------------------------

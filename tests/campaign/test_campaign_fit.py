@@ -12,10 +12,11 @@ from usual import GRAVITY, NINE, ROBOT
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.document import GAUGES, to_gauge
-from accelstudy.campaign.calibration.fit import fit_campaign
+from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.campaign.session import Campaign
+from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
 
 
@@ -27,6 +28,17 @@ def test_a_poor_sensor_is_calibrated_from_automatic_initial_values(approach):
     fit = fit_campaign(simulated_campaign(truth), NINE, approach)
     errors = (fit.parameters - NINE.vector(truth)) / fit.sigma
     assert np.abs(errors).max() < 4.5
+
+
+def test_initial_values_are_the_sphere():
+    directions = get_scheme("fibonacci-30").directions
+    forces = np.array([0.3, -0.2, 0.1]) + 1.05 * 9.81 * directions
+    start = dict(zip(NINE.parameter_names, initial_values(NINE, forces, 9.81), strict=True))
+    assert start == pytest.approx(
+        {"b_x": 0.3, "b_y": -0.2, "b_z": 0.1, "s_x": 0.05, "s_y": 0.05, "s_z": 0.05}
+        | {"alpha_yz": 0, "alpha_zy": 0, "alpha_zx": 0},
+        abs=1e-12,
+    )
 
 
 def test_a_robot_is_needed_for_the_robot_approach():

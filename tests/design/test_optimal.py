@@ -30,6 +30,7 @@ from accelstudy.design.spaces import (
 from accelstudy.design.task import Task
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.error import cap_forces, tilt_error
+from accelstudy.positions.choice import first_best, stable_order
 from accelstudy.schemes import get_scheme
 from accelstudy.schemes.optimal import stored_designs
 from accelstudy.sensors.models import get_model
@@ -359,3 +360,10 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
     assert row[0] @ row[1] > np.cos(1 * GON) > row[0] @ row[2]
     joined = search.join(np.vstack([row, apart[1:]]))
     np.testing.assert_array_equal(joined[:3], np.tile(row[1], (3, 1)))
+
+
+def test_what_is_equal_but_for_rounding_keeps_its_order():
+    """So that another processor, which rounds another way, finds the same scheme."""
+    rounding = np.array([2.0, -1.0, 0.0, 1.0]) * 1e-15
+    assert first_best([3.0, *(1.0 + rounding), np.nan]) == 1
+    assert stable_order([3.0, *(1.0 + rounding), 0.5]).tolist() == [5, 1, 2, 3, 4, 0]

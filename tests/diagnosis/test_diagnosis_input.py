@@ -202,7 +202,7 @@ SETTINGS = st.fixed_dictionaries(
 })  # fmt: skip
 @given(SETTINGS)
 @settings(
-    max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 def test_every_campaign_has_a_verdict_or_a_reason(keys):
     """Nothing but `InputError`; a sentence, and a document that JSON takes and the schema fits."""

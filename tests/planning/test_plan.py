@@ -207,20 +207,6 @@ def test_each_sensor_with_each_equipment_has_candidates_and_reasons(name, equipm
     assert errors_in_use(question).reading > 0
 
 
-def test_longer_holds_lower_white_noise_and_not_the_bias_instability():
-    loud = DataSheet("s", velocity_random_walk=5e-3, nonlinearity=0.0, full_scale=20.0)
-    wandering = replace(loud, velocity_random_walk=1e-4, bias_instability=2e-3)
-    for sheet, gains in ((loud, True), (wandering, False)):
-        question = asked(sheet, equipment=(BY_HAND,), holds=(1.0, 100.0), most_positions=30)
-        short, long = (
-            min(c.tilt.rms.max() for c in candidates(question) if c.hold == hold)
-            for hold in question.holds
-        )
-        assert (long < short / 5) == gains
-    limiting = _candidate(asked(wandering, holds=(10.0,)))
-    assert limits(asked(wandering, holds=(10.0,)), limiting) == "wander of the sensor's bias"
-
-
 def test_neglected_effects_decide_the_model():
     bent = DataSheet("s", position_sigma=0.5e-3, nonlinearity=0.005, full_scale=19.6133)
     result = answer(asked(bent, equipment=(BY_HAND,)), replicates=500)

@@ -14,9 +14,7 @@ from accelstudy.basics.units import GON, MGON, STANDARD_GRAVITY
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.data_sheets import DataSheet
 from accelstudy.design.estimability import estimability
-from accelstudy.leveling.angles import roll_pitch
 from accelstudy.schemes import get_scheme
-from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
 SHEET = DataSheet(
@@ -52,10 +50,6 @@ def of(pole, name, tilt, calibration=None, setup=None, sheet=SHEET):
     return np.sqrt(squares[:, :2].sum(axis=1)), np.sqrt(squares[:, 2])
 
 
-def point(pole, **values):
-    return np.array([values.get(name, 0.0) for name in pole.INPUTS])
-
-
 def test_the_foot_is_where_rotations_put_it(pole):
     values = np.random.default_rng(1).uniform(-0.7, 0.7, len(pole.INPUTS))
     given = dict(zip(pole.INPUTS, values, strict=True))
@@ -64,15 +58,6 @@ def test_the_foot_is_where_rotations_put_it(pole):
     arm = [given["bend_forward"], given["bend_right"], given["length"]]
     expected = values[:3] + body.apply(bore.apply(arm))
     np.testing.assert_allclose(pole.foot(values), expected, atol=1e-14)
-
-
-def test_a_pole_leans_where_it_is_said_to(pole):
-    for direction, (north, east) in ((0.0, (-1, 0)), (np.pi / 2, (0, -1)), (np.pi, (1, 0))):
-        roll, pitch = roll_pitch(tuple(pole.leaning(30 * GON, direction, 9.8)))
-        placed = pole.foot(point(pole, length=2.0, roll=roll, pitch=pitch))
-        reach = 2 * np.sin(30 * GON)
-        expected = [reach * north, reach * east, 2 * np.cos(30 * GON)]
-        np.testing.assert_allclose(placed, expected, atol=1e-12)
 
 
 def bent_pole(setup, tilt):
@@ -126,33 +111,6 @@ def test_each_source_has_its_closed_form(pole):
         for name, pair in expected.items():
             for got, wanted in zip(of(pole, name, tilt), pair, strict=True):
                 np.testing.assert_allclose(got, wanted, rtol=1e-7, atol=1e-12, err_msg=name)
-
-
-def test_correlated_parameters_count_with_their_covariance(pole):
-    """A bias of x and a scale of x that cancel where the pole leans forward by 30 gon."""
-    force = pole.leaning(30 * GON, 0.0, STANDARD_GRAVITY)[0]
-    direction = NINE.vector({"b_x": 1.0, "s_x": -1.0 / force})
-    whole = 1e-6 * np.outer(direction, direction)
-    cancelling, forgetting = (
-        of(pole, "calibration", 30 * GON, calibrated(covariance=each))[0][0]
-        for each in (whole, np.diag(np.diag(whole)))
-    )
-    assert cancelling < 1e-9
-    assert forgetting > 1e-5
-
-
-def test_beyond_a_knee_noise_counts_more_and_a_change_of_bias_as_before(pole):
-    """A pole leans forward by 50 gon: x feels 6.9 m/s², with half the gain left, y nothing."""
-    tilt, model, none = 50 * GON, get_model("saturation(knee=6)"), np.zeros((3, 3))
-    ideal = calibrated(model, covariance=none)
-    clipping = calibrated(model, np.full(3, 0.5), none)
-    for name in ("drift", "temperature"):  # before the sensor clips
-        np.testing.assert_allclose(
-            of(pole, name, tilt, clipping), of(pole, name, tilt, ideal), rtol=1e-6, atol=1e-12
-        )
-    c, sigma = np.cos(tilt), SHEET.sigma_mean(2.0)
-    expected = 2.0 * sigma / STANDARD_GRAVITY * np.sqrt((2 * c) ** 2 + 1 / c**2)
-    assert of(pole, "noise", tilt, clipping)[0][0] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("tilt", TILTS[1:])

@@ -2,7 +2,6 @@
 
 from itertools import product
 
-import matplotlib.figure
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,7 +14,6 @@ from studies.positions.stopping import (
     RULES,
     plain,
     simulate,
-    stopping_figure,
     summary_table,
 )
 
@@ -62,24 +60,10 @@ def test_stopping_does_not_bias_what_the_noise_is_not_part_of(sessions):
             assert ratio.mean() == pytest.approx(1, abs=4 * ratio.std() / np.sqrt(len(part)))
 
 
-def test_sessions_depend_on_the_seed_and_on_nothing_else():
-    first, again, other = (simulate("robot", "known", 1.0, 0, 9, seed=seed) for seed in (1, 1, 2))
-    pd.testing.assert_frame_equal(again, first)
-    assert not np.array_equal(again["actual_roll"], other["actual_roll"])
-
-
 def test_a_session_that_does_not_get_there_ends_and_says_so():
     table = simulate("gravity", "known", 0.5, 0, 5, most_positions=12)
     assert not table["kept"].any()
     assert (table["positions"] == 12).all()
-
-
-def test_the_figure_shows_all_settings(summary):
-    figure = stopping_figure(summary.reset_index())
-    assert isinstance(figure, matplotlib.figure.Figure)
-    left, right = figure.axes
-    assert len(left.lines) == 3 * 2 + 2  # and the fixed scheme for each approach
-    assert len(right.containers) == 3 * 2
 
 
 def test_what_the_residuals_seem_to_say_is_right_on_average():

@@ -38,27 +38,23 @@ MODULE = """\
 from accelstudy.files.shipped import shipped
 configfile: "outer.yaml"
 module inner:
-    snakefile: {snakefile}
+    snakefile: str(shipped("workflow/Snakefile"))
     config: config["inner"]
     prefix: "inner"
 use rule * from inner as inner_*
 rule part:
-    output: "{{part}}.txt"
-    shell: "echo {{wildcards.part}} > {{output}}"
+    output: "{part}.txt"
+    shell: "echo {wildcards.part} > {output}"
 rule study:
     default_target: True
     input:
         rules.inner_all.input,
         table=rules.inner_collect.output.cells,
-        parts=expand("{{part}}.txt", part=config["parts"]),
+        parts=expand("{part}.txt", part=config["parts"]),
     output: report("done.txt", category="Outer")
-    shell: "cp {{input.parts}} {{output}} && test -s {{input.table}}"
+    shell: "cp {input.parts} {output} && test -s {input.table}"
 """
 """The workflow as a part of another one, as the guide to configurations has it."""
-SOURCES = {
-    "installed": 'str(shipped("workflow/Snakefile"))',
-    "on GitHub": 'github("someone/accelstudy", path="workflow/Snakefile", branch="main")',
-}
 
 
 def words(folder, *arguments, snakefile=ROOT / "Snakefile", cores=2, config=TINY):
@@ -315,39 +311,13 @@ def check_report(folder, results):
     assert "1 mgon = 0.0009" in text  # what a caption says of the study
 
 
-@pytest.fixture
-def on_github(tmp_path, monkeypatch):
-    """Let git take a repository of this machine, with the workflow alone, for one on GitHub."""
-    there = tmp_path / "there" / "accelstudy.git"
-    shutil.copytree(ROOT / "workflow", there / "workflow")
-
-    def git(*arguments):
-        author = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
-        subprocess.run(["git", *author, *arguments], cwd=there, check=True)
-
-    git("init", "--quiet", "--initial-branch", "main")
-    git("add", ".")
-    git("commit", "--quiet", "--message", "the workflow")
-    settings = {
-        "XDG_CACHE_HOME": tmp_path / "cache",
-        "GIT_CONFIG_COUNT": 1,
-        "GIT_CONFIG_KEY_0": f"url.{there.parent}/.insteadOf",
-        "GIT_CONFIG_VALUE_0": "https://github.com/someone/",
-    }
-    for name, value in settings.items():
-        monkeypatch.setitem(ENVIRONMENT, name, str(value))
-
-
-@pytest.mark.usefixtures("on_github")
-@pytest.mark.parametrize("source", SOURCES)
-def test_a_module_with_a_prefix(source, single, tmp_path):
+def test_a_module_with_a_prefix(single, tmp_path):
     """All is in the folder of the prefix; a job finds its tables and figures there."""
     outer = tmp_path / "outer"
     shutil.copytree(single / "results", outer / "inner" / "results")
     results = outer / "inner" / "results" / "tiny"
-    if source == "installed":
-        (results / "explorer.html").unlink()
-    (outer / "Snakefile").write_text(MODULE.format(snakefile=SOURCES[source]))
+    (results / "explorer.html").unlink()
+    (outer / "Snakefile").write_text(MODULE)
     (outer / "outer.yaml").write_text(yaml.safe_dump({"parts": ["a"], "inner": TINY}))
     for words in ([], ["--report", "report.zip"]):
         result = snakemake(outer, "--cores", 1, *words)
