@@ -28,7 +28,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report campaigns diagnose-example positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
+.PHONY: help env test golden golden-renew coverage test-processors test-processors-part test-cluster test-breaks smoke reproduce anew unlock report campaigns positions hidden-effects hidden-docs real-noise optimal-schemes pictures benchmarks docs wheel lint lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-18s%s\n", $$1, $$2 }' Makefile
@@ -87,10 +87,6 @@ report: reproduce ## make results/paper/report.zip, to be opened in a browser
 
 campaigns: $(READY) ## calibrate the campaigns of a batch, by default public ones
 	snakemake --cores $(CORES) --snakefile workflow/campaigns.smk --configfile $(CAMPAIGNS)
-
-diagnose-example: $(READY) ## simulate a campaign with a hidden effect, find it, and study what was found
-	snakemake --cores $(CORES) --snakefile workflow/diagnose.smk --configfile config/diagnose-example.yaml
-	snakemake --cores $(CORES) --configfile config/config.yaml results/diagnose-example/diagnosis/model.yaml
 
 positions: $(READY) ## study how good schemes are, and sessions that stop by themselves
 	python -m studies.positions results/positions

@@ -18,7 +18,6 @@ from usual import NINE, ROBOT, G
 
 import accelstudy as acs
 from accelstudy.adjustment import calibrate
-from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.basics.wording import number
 from accelstudy.campaign.calibration.fit import fit_campaign
@@ -31,7 +30,6 @@ from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.output import write_diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
-from accelstudy.diagnosis.round_trip import parse_round_trip
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import examine
 from accelstudy.leveling.error import cap_forces, holds_in_use, leveling_error
@@ -353,15 +351,3 @@ def test_a_figure_that_fails_takes_nothing_with_it(written, tmp_path, monkeypatc
         page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
         assert said in page.replace("&#x27;", "'")
         assert page.count("<svg") == 1
-
-
-@pytest.mark.parametrize(("change", "words"), [
-    ({"model": "nine"}, "unknown model 'nine'"),
-    ({"campaign": {"schem": "rings-24"}}, "did you mean 'scheme'"),
-    ({"campaign": {"sigma": -1}}, "sigma: must be from 1e-09"),
-])  # fmt: skip
-def test_the_example_is_checked(change, words):
-    content = yaml.safe_load((ROOT / "config/diagnose-example.yaml").read_text(encoding="utf-8"))
-    assert parse_round_trip(content).campaign.name == "diagnose-example"
-    with pytest.raises(InputError, match=words):
-        parse_round_trip({**content, **change})

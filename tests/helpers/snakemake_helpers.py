@@ -38,7 +38,7 @@ IMPORTED = {
 }  # fmt: skip
 FORKED_JOB = str(Path(__file__).with_name("forked_job.py"))
 FORKS.set_forkserver_preload(sorted(IMPORTED))
-TARGETS = ("study", "campaigns", "round_trip", "total")
+TARGETS = ("study", "campaigns", "total")
 """Lines of Snakemake's list of jobs that are no jobs."""
 
 
