@@ -30,8 +30,6 @@ PREFIX = "accelstudy."
 NOTHING = "registers nothing; expected a class or a function under @register"
 HOW = "; of a plug-in: name its file with --plugin or, in a configuration, under plugins"
 """What a message adds to the names that are known."""
-MAX_PLUGIN_BYTES = 1_000_000
-"""Bytes of the largest file of code."""
 _CODE = (".py", ".yaml", ".yml", ".json", ".j2")
 
 _warn_once = cache(warn)
@@ -131,10 +129,6 @@ def _load_file(path: Path) -> None:
     try:
         if path.exists() and not path.is_file():  # a folder, or a device that never ends
             raise InputError(f"{path}: is no file; give one with Python code")
-        if path.stat().st_size > MAX_PLUGIN_BYTES:
-            raise InputError(
-                f"{path}: larger than {MAX_PLUGIN_BYTES // 10**6} MB; is it the right file?"
-            )
         content = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None

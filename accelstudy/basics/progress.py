@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import partial
-from threading import Timer
 from typing import TYPE_CHECKING, TypeVar
 
 import click
@@ -21,9 +20,6 @@ from accelstudy.basics.errors import OPTIONS, for_user, printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
-
-DELAY = 2.0
-"""Seconds after which work gets a bar."""
 
 Item = TypeVar("Item")
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -108,32 +104,24 @@ def track(items: Iterable[Item], what: str, total: float | None = None) -> Itera
 
 @contextmanager
 def _progress_bars() -> Iterator[Progress]:
-    """Bars on standard error that appear after a while and vanish at the end."""
+    """Bars on standard error that vanish at the end; none on a terminal that cannot take back."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    bars = Progress(
+    console = Console(stderr=True)
+    with Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
-        refresh_per_second=5,
+        console=console,
+        disable=not console.is_interactive,
         transient=True,
         redirect_stdout=False,
         redirect_stderr=False,
-    )
-    start = Timer(DELAY, bars.start)
-    start.daemon = True
-    if bars.console.is_interactive:  # a dumb terminal cannot take back what it shows
-        start.start()
-    token = _bars.set(bars)
-    try:
-        yield bars
-    finally:
-        _bars.reset(token)
-        start.cancel()
-        if start.ident is not None:
-            start.join()
-        if bars.live.is_started:
-            bars.stop()
+    ) as bars:
+        token = _bars.set(bars)
+        try:
+            yield bars
+        finally:
+            _bars.reset(token)

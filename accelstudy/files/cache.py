@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import shutil
 import stat
 from collections.abc import Callable
 from pathlib import Path
@@ -65,9 +64,6 @@ def _write(file: Path, content: bytes) -> None:
     give it the name.
     """
     folder = file.parent
-    with contextlib.suppress(OSError):  # an earlier version left it open to the group of the user
-        if folder.lstat().st_mode & _OTHERS:
-            shutil.rmtree(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     folder.mkdir(mode=0o700, exist_ok=True)
     _check_own(folder, stat.S_ISDIR)

@@ -5,19 +5,17 @@ Everything is written to a temporary folder on the same disk first, and moved wh
 
 from __future__ import annotations
 
-import fcntl
 import os
-import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from errno import ENOTDIR
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 
 from accelstudy.basics.errors import InputError
 
-_PREFIX, _SUFFIX = ".accelstudy-", ".part"
+_PREFIX = ".accelstudy-"
 
 
 @dataclass(frozen=True)
@@ -197,43 +195,22 @@ def is_temporary(path: Path) -> bool:
 def _staging(near: Path, out: Path, name: str) -> Iterator[Path]:
     """A path in a private folder in `near` or, if that is not there, in the nearest folder above.
 
-    The name of the folder cannot be predicted, so nobody can place a link there. It is locked while
-    it is in use, so the next run recognises the leftovers of a killed run and removes them. Errors
-    name `out` instead of the path.
+    The name of the folder cannot be predicted, so nobody can place a link there. Errors name `out`
+    instead of the path.
     """
     folder = next(path for path in (near, *near.absolute().parents) if path.exists())
     if not folder.is_dir():
         raise NotADirectoryError(ENOTDIR, f"{folder} is not a folder")
-    for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
-        if (lock := _locked(left)) is not None:
-            shutil.rmtree(left, ignore_errors=True)
-            os.close(lock)
-    made = Path(mkdtemp(prefix=_PREFIX, dir=folder))
-    lock = _locked(made)  # before it has the ending by which other runs know leftovers
-    stage = made.rename(made.with_name(made.name + _SUFFIX))
-    part = stage / name
-    try:
-        yield part
-    except InputError as error:
-        if str(part) not in str(error):
-            raise
-        raise InputError(str(error).replace(str(part), str(out))) from None
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
-
-
-def _locked(folder: Path) -> int | None:
-    """Descriptor that locks a temporary folder; None if it is in use, or cannot be locked."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    with TemporaryDirectory(
+        prefix=_PREFIX, suffix=".part", dir=folder, ignore_cleanup_errors=True
+    ) as stage:
+        part = Path(stage) / name
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return descriptor
-        except OSError:
-            os.close(descriptor)
-    return None
+            yield part
+        except InputError as error:
+            if str(part) not in str(error):
+                raise
+            raise InputError(str(error).replace(str(part), str(out))) from None
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -122,7 +122,6 @@ def write_table(path: str | Path, table: pd.DataFrame, provenance: Mapping[str, 
 def read_table(
     path: str | Path | Sequence[str | Path],
     columns: Sequence[str] | None = None,
-    rows: tuple[str, Collection[str]] | None = None,
 ) -> pd.DataFrame:
     """Read a table from a file, a folder of files, or several files.
 
@@ -130,7 +129,6 @@ def read_table(
     ----------
     path : path or several
     columns : names; by default all
-    rows : name of a column, and texts of which it must have one; by default all rows
 
     Raises
     ------
@@ -142,36 +140,15 @@ def read_table(
 
     if not isinstance(path, str | Path):
         _check_seeds(path)
-        return pd.concat([read_table(each, columns, rows) for each in path], ignore_index=True)
+        return pd.concat([read_table(each, columns) for each in path], ignore_index=True)
     path = Path(path)
     if path.is_dir():
         paths = tables_in(path)
         if not paths:
             raise InputError(f"{path}: holds no tables")
-        return read_table(paths, columns, rows)
+        return read_table(paths, columns)
     with whole_parquet(path, REMEDY) as file:
-        if rows is None:
-            return file.read(columns).to_pandas()
-        import pyarrow.compute as pc  # slow to import
-
-        name, texts = rows
-        wanted = file.schema_arrow.names if columns is None else list(columns)
-        groups = [i for i in range(file.num_row_groups) if _may_have(file, i, name, texts)]
-        table = file.read_row_groups(groups, list(dict.fromkeys([*wanted, name])))
-        chosen = pc.is_in(table[name], pa.array([*texts], pa.string()))
-        return table.filter(chosen).select(wanted).to_pandas()
-
-
-def _may_have(file: pq.ParquetFile, group: int, name: str, texts: Collection[str]) -> bool:
-    """Whether a group of rows may have one of some texts in a column.
-
-    Arrow itself skips no group of a column that is stored as a dictionary.
-    """
-    column = file.metadata.row_group(group).column(file.schema_arrow.get_field_index(name))
-    known = column.statistics
-    if known is None or not known.has_min_max:
-        return True
-    return any(known.min <= text <= known.max for text in texts)
+        return file.read(columns).to_pandas()
 
 
 def tables_in(folder: Path) -> list[Path]:

@@ -313,8 +313,9 @@ def read_estimates(
         As `accelstudy.files.tables.read_table`; if a cell stands in two files, as an earlier
         configuration may have left them.
     """
-    names = [cells] if isinstance(cells, str) else cells
-    table = read_table(path, rows=None if names is None else ("cell", names))
+    table = read_table(path)
+    if cells is not None:
+        table = table[table["cell"].isin([cells] if isinstance(cells, str) else cells)]
     if (twice := table.duplicated(["cell", "replicate", "parameter"])).any():
         cell = table.loc[twice, "cell"].iloc[0]
         raise InputError(

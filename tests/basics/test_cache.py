@@ -64,16 +64,6 @@ def test_what_is_damaged_or_can_be_somebody_elses_is_not_there(wrong, monkeypatc
     assert [path.read_bytes() for path in folder.iterdir()] == [stored(b"true")]
 
 
-def test_a_folder_that_a_group_could_write_is_made_anew():
-    """Earlier versions made it with the umask of the user, which often lets the group write."""
-    folder = cache_folder("planted")
-    folder.mkdir(parents=True)
-    folder.chmod(0o775)
-    assert value() == value() == "true"
-    assert folder.stat().st_mode & 0o777 == 0o700
-    assert [path.name for path in folder.iterdir()] == ["key"]
-
-
 def test_where_nothing_can_be_stored_it_is_made_each_time(tmp_path):
     (tmp_path / "caches").write_text("no folder", encoding="utf-8")
     assert value() == value() == "true"

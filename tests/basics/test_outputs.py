@@ -3,9 +3,6 @@
 import errno
 import os
 import resource
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -169,10 +166,10 @@ def test_what_is_in_the_way(tmp_path):
 def test_a_folder_that_cannot_be_written(tmp_path, monkeypatch):
     """It is found before anything is computed; permissions do not bind root."""
 
-    def closed(dir, **options):
-        raise PermissionError(errno.EACCES, "Permission denied", f"{dir}/.accelstudy-x.part")
+    def closed(suffix, prefix, dir):
+        raise PermissionError(errno.EACCES, "Permission denied", f"{dir}/{prefix}x{suffix}")
 
-    monkeypatch.setattr("accelstudy.files.outputs.mkdtemp", closed)
+    monkeypatch.setattr("tempfile.mkdtemp", closed)
     expected = f"{tmp_path}/a/b: cannot be written: Permission denied"
     assert refused(tmp_path / "a/b", CALIBRATION) == expected
 
@@ -206,26 +203,6 @@ def test_a_planted_link_is_not_followed(tmp_path):
     assert (tmp_path / "victim").read_text() == "precious"
     assert (tmp_path / "out.csv").read_text() == "new"
     assert not (tmp_path / "out.csv").is_symlink()
-
-
-def test_what_a_killed_run_left_is_removed(tmp_path):
-    """But not what a run beside this one is writing."""
-    with result_folder(tmp_path / "beside", CALIBRATION) as beside:
-        program = (
-            "import sys, time\nfrom accelstudy.files.outputs import whole_file\n"
-            f"with whole_file({str(tmp_path / 'file')!r}) as path:\n"
-            "    path.write_text('x'); print(path.parent, flush=True); time.sleep(60)"
-        )
-        with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
-            left = Path(process.stdout.readline().decode().strip())
-            process.send_signal(signal.SIGKILL)
-            process.wait()
-        assert left.exists()
-        with whole_file(tmp_path / "file") as path:
-            path.write_text("whole")
-        assert not left.exists()
-        write(beside, calibration_json="1")
-    assert content(tmp_path) == {"file": b"whole", "beside/calibration.json": b"1"}
 
 
 def test_two_runs_that_write_one_file_do_not_meet(tmp_path):

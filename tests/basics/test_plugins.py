@@ -122,8 +122,6 @@ def test_one_that_is_no_file_is_one_line():
     os.mkfifo("pipe.py")  # nobody writes to it, so to open it would last for ever
     for path in (".", "/dev/zero", "pipe.py"):
         assert f"{path}: is no file" in refusal("--plugin", path, "effects")
-    Path("large.py").write_text("#" * 1_000_001)
-    assert "large.py: larger than 1 MB" in refusal("--plugin", "large.py", "effects")
 
 
 def test_one_that_fails_at_work_is_one_line():
@@ -215,14 +213,6 @@ def test_a_model_in_a_file_names_it_and_loads_nothing(named):
     assert plugins.loaded_files() == []
     plugins.load_files(["ripple.py"])
     assert get_model("model.yaml").effects[1].name == "ripple"
-
-
-def test_the_list_of_a_lot_loads_nothing():
-    Path("evil.py").write_text("open('evil', 'w')")
-    content = {"batch": "b", "plugins": ["evil.py"], "campaigns": [{"campaign": "mine"}]}
-    Path("list.yaml").write_text(yaml.safe_dump({**content, "model": "bias+evil"}))
-    assert "list.yaml needs the plug-in evil.py" in refusal("lot", "list.yaml", "--out", "new")
-    assert not Path("evil").exists()
 
 
 @pytest.mark.parametrize("template", ["study", "campaigns"])

@@ -1,11 +1,10 @@
-"""What a command tells while it works: after a while, on a terminal only, and never if quiet."""
+"""What a command tells while it works: on a terminal only, and never if quiet."""
 
 import io
 from contextlib import redirect_stderr
 
 import pytest
 
-from accelstudy.basics import progress
 from accelstudy.basics.progress import feedback, say, show, stage, track, warn
 from accelstudy.commands.main import main
 
@@ -15,20 +14,10 @@ class Terminal(io.StringIO):
         return True
 
 
-class Timer(progress.Timer):
-    """A timer without a clock: what shall happen after no time happens, all else never does."""
-
-    def start(self):
-        if self.interval == 0:
-            self.function()
-
-
 @pytest.fixture(autouse=True)
-def at_once(monkeypatch):
+def terminal(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(progress, "DELAY", 0.0)
-    monkeypatch.setattr(progress, "Timer", Timer)
 
 
 def work():
@@ -48,7 +37,7 @@ def seen(screen, quiet=False):
 
 
 def test_what_takes_long_gets_bars_on_a_terminal_alone(monkeypatch):
-    """Not if quiet, in a pipe, used from Python, or fast."""
+    """Not if quiet, in a pipe, or used from Python."""
     text = seen(Terminal())
     assert "null simulation" in text
     assert "sets" in text
@@ -56,9 +45,6 @@ def test_what_takes_long_gets_bars_on_a_terminal_alone(monkeypatch):
     with redirect_stderr(Terminal()) as screen:
         work()
     assert screen.getvalue() == ""
-    monkeypatch.setattr(progress, "DELAY", 2.0)
-    assert seen(Terminal()) == ""
-    monkeypatch.setattr(progress, "DELAY", 0.0)
     monkeypatch.setenv("TERM", "dumb")
     assert seen(Terminal()) == ""
 
