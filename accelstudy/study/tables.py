@@ -94,12 +94,21 @@ def simulate_cells(
 
 def tables_of(results: Iterable[CellStatistics]) -> dict[str, pd.DataFrame]:
     """Each of `TABLES` with the rows of some cells, in order and in the units shown to people."""
+    makers = (_cell, _summary, _correlations, _leveling, _quantiles)
+    parts = zip(*([make(one) for make in makers] for one in results), strict=True)
+    return {name: _joined(part) for name, part in zip(TABLES, parts, strict=True)}
+
+
+def _joined(parts: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Join the columns of cells; what is a single value holds in every row of its cell."""
     import pandas as pd
 
-    makers = (_cell, _summary, _correlations, _leveling, _quantiles)
-    rows = [[pd.DataFrame(make(one)) for make in makers] for one in results]
-    parts = dict(zip(TABLES, zip(*rows, strict=True), strict=True))
-    return {name: pd.concat(part, ignore_index=True) for name, part in parts.items()}
+    counts = [next((len(each) for each in part.values() if np.ndim(each)), 1) for part in parts]
+    columns = {
+        name: [np.broadcast_to(part[name], n) for part, n in zip(parts, counts, strict=True)]
+        for name in parts[0]
+    }
+    return pd.DataFrame({name: np.concatenate(each) for name, each in columns.items()})
 
 
 def _cell(statistics: CellStatistics) -> dict[str, Any]:
