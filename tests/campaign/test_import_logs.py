@@ -72,7 +72,7 @@ def calibration():
     return made, made.apply(pd.DataFrame(FORCES, columns=["fx", "fy", "fz"]))[CALIBRATED]
 
 
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(layouts())
 def test_text_in_any_layout_gives_the_same_numbers(calibration, layout):
     content, suffix, options = layout

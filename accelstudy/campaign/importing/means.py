@@ -85,11 +85,6 @@ def _rows(
                 f"{log.path}: which column is the robot's {missing}? Name it by "
                 f"`columns` {missing}=..."
             )
-    elif {*angles} & {*settings.columns}:
-        raise InputError(
-            f"{log.path}: columns {', '.join(angles)}: give the standard deviation of the "
-            "robot's angles (`robot_sigma`)"
-        )
     elif angles:
         warnings.append(
             f"columns {', '.join(angles)} are left out; `robot_sigma` takes them for the robot's"

@@ -45,9 +45,6 @@ GAP_RATIO = 5.0
 """A step of time that is this many times the usual one is a gap."""
 _NANOSECONDS = re.compile(r"(.*?)n(ano)?(secs?)", re.IGNORECASE)
 """Whole seconds of a stamp of ROS, where there is no other time, and the rest of it."""
-_TIME_OR_CONDITION = re.compile(
-    r".*(time|date|stamp|secs?|seq|index|temp|vibration|status).*|t|n|id", re.IGNORECASE
-)
 _USUAL_RATE = 100.0
 """1/s; of several units of time the likely one gives the rate nearest to it."""
 
@@ -107,11 +104,8 @@ def read_log(
         told = {**_units(source, places), **told}
         chosen = _laid_over(like, overlay(told, given), kind)
     conversion = conversion_of(chosen.unit, chosen.scale, chosen.offset)
-    dated = places.get("time") in source.dates
-    if "time" in places and chosen.time_unit != "s" and (dated or "nanoseconds" in places):
-        name = source.names[places["time"]]
-        raise InputError(f"{source.path}: column {name} tells its unit; leave `time_unit` out")
-    factor = 1e-9 if dated else UNITS["s"][chosen.time_unit]
+    factor = UNITS["s"]["s" if "nanoseconds" in places else chosen.time_unit]
+    factor = 1e-9 if places.get("time") in source.dates else factor
     return SensorLog(source, chosen, places, factor, conversion)
 
 
@@ -151,12 +145,6 @@ def _places(
     if not places and len(source.names) == 3:
         places = dict(zip(AXES, range(3), strict=True))
     for key in (key for key in AXES if key not in places):
-        named = [name for i, name in enumerate(source.names) if i not in source.dates]
-        if sum(not (source.named and _TIME_OR_CONDITION.fullmatch(name)) for name in named) == 2:
-            raise InputError(
-                f"{source.path}: two axes, as of an inclinometer, cannot be calibrated: the length "
-                "of the force is compared with gravity, and that takes all three axes"
-            )
         raise _not_found(source, key)
     _check_different(source, places)
     for key in conditions:
@@ -210,14 +198,10 @@ def find_column(source: Source, key: str, column: Place | None = None) -> int | 
         plain = without_unit(str(column))
         found = [i for i, name in enumerate(names) if without_unit(name) == plain]
         if not (source.named and isinstance(column, str) and len(found) == 1):
-            if not re.fullmatch(r"[0-9]{1,9}", str(column)):
+            if not re.fullmatch(r"[0-9]{1,9}", str(column)) or int(column) >= len(names):
                 raise InputError(
-                    f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}"
-                )
-            if int(column) >= len(names):
-                raise InputError(
-                    f"{source.path}: {key}: no column {column}; there are {len(names)}, counted "
-                    "from 0"
+                    f"{source.path}: {key}: no column {column!r}; there are {short_list(names)}, "
+                    "counted from 0"
                 )
             found = [int(column)]
     if len(found) != 1:
