@@ -136,28 +136,6 @@ def noisy_lines(replicates, seed=0):
     return PEARSON + 0.3 * noise
 
 
-def test_replicates_do_not_depend_on_their_batch():
-    lines = noisy_lines(50)
-    together = york(lines)
-    assert together.converged.all()
-    assert len(np.unique(together.iterations)) > 1  # some go on when others have ended
-    for i in range(0, 50, 7):
-        alone = york(lines[i : i + 1])
-        np.testing.assert_allclose(alone.parameters[0], together.parameters[i], rtol=1e-12)
-        np.testing.assert_allclose(alone.cofactors[0], together.cofactors[i], rtol=1e-10)
-        np.testing.assert_allclose(alone.omega[0], together.omega[i], rtol=1e-10)
-        assert alone.iterations[0] == together.iterations[i]
-
-
-def test_each_replicate_may_have_its_own_initial_values():
-    lines = noisy_lines(5)
-    result = york(lines, initial=np.linspace([4, -1], [7, 0], 5))
-    expected = york(lines)
-    np.testing.assert_array_less(
-        np.abs(result.parameters - expected.parameters), 1e-6 * expected.sigma_priori
-    )
-
-
 def assert_no_result(result, i):
     assert not result.converged[i]
     for name in ("parameters", "residuals", "cofactors", "omega", "sigma_posteriori"):

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import (
     GON,
-    MGON,
     STANDARD_GRAVITY,
     UNITS,
     angle_note,
@@ -30,20 +29,15 @@ from accelstudy.basics.units import (
 @pytest.mark.parametrize(("value", "given", "unit", "expected"), [
     (400, "gon", "rad", 2 * math.pi),
     (1000, "mgon", "rad", GON),
-    (1, "mgon", "rad", MGON),
     (90, "deg", "rad", math.pi / 2),
     (3600, "arcsec", "rad", math.pi / 180),
     (2, "mrad", "rad", 2e-3),
     (200, "ppm", "1", 2e-4),
     (3, "%", "1", 0.03),
     (1, "g", "m/s^2", 9.80665),
-    (1, "mg", "m/s^2", 9.80665e-3),
-    (50, "mm/s^2", "m/s^2", 0.05),
     (1, "mg/K", "m/s^2/K", 9.80665e-3),
     (3.6, "mm/s^2/h", "m/s^2/s", 1e-6),
     (9.80665, "ug/g^2", "s^2/m", 1e-6),
-    (50, "ppm/K", "1/K", 5e-5),
-    (100, "ug", "m/s^2", 9.80665e-4),
     (7, "K", "K", 7),  # a unit that is shown as it is
 ])  # fmt: skip
 def test_conversions(value, given, unit, expected):
@@ -91,14 +85,12 @@ def test_an_unknown_unit_is_named_with_what_is_known(unit, said):
 
 
 @pytest.mark.parametrize(("text", "unit", "expected"), [
-    ("10mgon", "rad", 10 * MGON),
     ("0.01deg", "rad", math.radians(0.01)),
     ("0.01°", "rad", math.radians(0.01)),
     ("2mm/s2", "m/s^2", 2e-3),
     ("2 mm/s²", "m/s^2", 2e-3),
     ("50µg", "m/s^2", 50e-6 * STANDARD_GRAVITY),
     (".5 %", "1", 0.005),
-    (" 2 m ", "m", 2.0),
     ("1.5e1mm", "m", 0.015),
     ("-3h", "s", -10800.0),
     ("0", "m", 0.0),

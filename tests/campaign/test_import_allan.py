@@ -35,26 +35,6 @@ def test_definition():
     assert averaging_factors(0) == []
 
 
-def test_channels_are_turned():
-    rng = np.random.default_rng(2)
-    samples = np.column_stack([3 + rng.standard_normal((100, 2)), np.full(100, 0.1)])
-    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
-    found = pooled_deviation([samples], STEP, [turn]).deviation
-    np.testing.assert_allclose(found, allan_deviation(samples @ turn, STEP).deviation, rtol=1e-9)
-    assert (allan_deviation(samples, STEP).deviation[:, 2] == 0).all()
-
-
-def test_records_are_pooled():
-    records = [white(seed, 3 * 500).reshape(-1, 3) + seed for seed in range(20)]
-    curve = pooled_deviation(records, STEP)
-    assert curve.deviation.shape == (len(curve.tau), 3)
-    assert curve.tau[-1] <= 2.5
-    assert curve.differences[0] == 20 * 499
-    assert curve.pooled[0] == pytest.approx(0.02, rel=0.02)
-    with_short = pooled_deviation([*records, np.zeros((1, 3))], STEP)
-    np.testing.assert_array_equal(with_short.differences, curve.differences)
-
-
 @pytest.mark.parametrize("duration", [0.5, 2.0, 5.0])
 def test_white_noise_is_found_white(duration):
     records = [white(seed, 3 * 500).reshape(-1, 3) for seed in range(30)]

@@ -341,25 +341,17 @@ def test_positions_that_hardly_differ_are_one_that_is_repeated(free):
     assert same.any()
     assert cosines[~same].max() < np.cos(1 * GON)
 
-    apart, search = random_directions(12), Search(task, criterion, 13)
-    assert search.join(apart) is apart
-    beside = np.cross(apart[0], apart[1])
-    near = apart[0] + 0.01 * GON * beside / np.linalg.norm(beside)
-    thirteen = np.vstack([apart, near / np.linalg.norm(near)])
-    joined = search.join(thirteen)
-    np.testing.assert_array_equal(joined[0], joined[12])
-    np.testing.assert_array_equal(joined[1:12], thirteen[1:12])
-    assert any(np.array_equal(joined[0], thirteen[i]) for i in (0, 12))
-    kept = Constraints(least_angle=0.001 * GON)
-    assert replace(search, constraints=kept).join(thirteen) is thirteen
-
     # In a row, the first and the last are near each other by way of the second alone.
+    apart, search = random_directions(12), Search(task, criterion, 14)
     beside = np.cross(apart[0], apart[3])
     row = apart[0] + np.outer([0.0, 0.7 * GON, 1.4 * GON], beside / np.linalg.norm(beside))
     row /= np.linalg.norm(row, axis=1, keepdims=True)
     assert row[0] @ row[1] > np.cos(1 * GON) > row[0] @ row[2]
-    joined = search.join(np.vstack([row, apart[1:]]))
-    np.testing.assert_array_equal(joined[:3], np.tile(row[1], (3, 1)))
+    given = np.vstack([row, apart[1:]])
+    np.testing.assert_array_equal(search.join(given), np.vstack([row[[1, 1, 1]], apart[1:]]))
+    kept = Constraints(least_angle=0.001 * GON)
+    assert replace(search, constraints=kept).join(given) is given
+    assert search.join(apart) is apart
 
 
 def test_what_is_equal_but_for_rounding_keeps_its_order():

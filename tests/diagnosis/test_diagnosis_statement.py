@@ -74,10 +74,6 @@ def made(*explanations):
     ([("bias_drift+warm_up", 0.6), ("bias_drift+quadratic_scale", 0.35)],
      [("", {"bias_drift": 0.95})],
      [(("warm_up",), 0.6), (("quadratic_scale",), 0.35)]),
-    # three things
-    ([("bias_drift+hysteresis+quadratic_scale", 0.6), ("hysteresis+scale_asymmetry+warm_up", 0.35)],
-     [(SLOW, {"bias_drift": 0.6, "warm_up": 0.35}), ("", {"hysteresis": 0.95}),
-      (EVEN, {"quadratic_scale": 0.6, "scale_asymmetry": 0.35})], []),
     # a rival that hardly matters belongs to what is certain, but not to its names
     ([("bias_drift", 0.6), ("warm_up", 0.32), ("thermal_bias", 0.05)],
      [(SLOW, {"bias_drift": 0.6, "warm_up": 0.32})], []),
@@ -107,7 +103,6 @@ def test_what_is_certain_of_a_set_and_what_is_open(explanations, certain, beside
      "an error in the attitude of the rig: base tilt, encoder offset or encoder scale"),
     ([("bias_drift", 0.5), ("warm_up+hysteresis", 0.42)],
      "a slow change in time (bias drift or warm up), and perhaps hysteresis"),
-    ([("thermal_bias", 0.5), ("warm_up", 0.42)], "thermal bias or warm up"),
     ([("hysteresis", 0.68), ("coloured_noise", 0.25)], "hysteresis, unless it is coloured noise"),
     ([("bias_drift+hysteresis", 0.5), ("saturation", 0.45)],
      "bias drift with hysteresis, or saturation"),

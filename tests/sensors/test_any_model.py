@@ -9,22 +9,16 @@ import pandas as pd
 import pytest
 import yaml
 from calling import call, refusal, succeed
-from study_helpers import content, grid
 
 import accelstudy as acs
-from accelstudy.adjustment.quality import solve
-from accelstudy.adjustment.quality.redundancy import _leveling_slope
 from accelstudy.approaches import get_approach
-from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.document import calibration_document
 from accelstudy.campaign.calibration.export import export
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.leveling import level
 from accelstudy.campaign.calibration.sensor_calibration import read_calibration
-from accelstudy.campaign.format import read_campaign
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.document import diagnosed_calibration, study_overlay
-from accelstudy.drawing.style import model_title
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
@@ -88,23 +82,6 @@ def test_what_cannot_feed_a_model_says_so_in_one_line(arguments, words, made, mo
     assert "'vibration_rectification'" in text
     assert words in text
     assert not (made / "no").exists()
-
-
-def test_a_study_of_compositions(tmp_path):
-    path = tmp_path / "model.yaml"
-    path.write_text(yaml.safe_dump({"models": {"mine": ["bias", "scale", "quadratic_scale"]}}))
-    composed = grid(models=[f"{NINE} + warm_up( tau=300 )", str(path)])
-    plain = parse_study(content(grids=[grid()])).cells
-    cells = parse_study(content(grids=[grid(), composed], holds={"interval_s": 60})).cells
-    own = cells[len(plain) :]
-    assert {cell.name for cell in plain} < {cell.name for cell in cells}
-    names = [f"{NINE}+warm_up(tau=300)", "bias-scale+quadratic_scale"]
-    assert [cell.model for cell in own[::2]] == names
-    assert own[0].estimated_model.n_parameters == 12
-    assert all(len(cell.name.split("/")) == 3 for cell in cells)
-    assert model_title(own[0].model) == "9 + warm up (300)"
-    with pytest.raises(InputError, match=r"holds\.interval_s: missing; the effect 'warm_up'"):
-        parse_study(content(grids=[composed]))
 
 
 # --- what a diagnosis found, used the next day ----------------------------------------------------
@@ -266,17 +243,6 @@ def test_the_rig_stays_where_it_was(tmp_path):
     assert len(export(read_calibration(path), "matrix").splitlines()) == 3
 
 
-def test_positions_are_judged_by_leveling_at_the_reference_temperature(made):
-    """A change of what temperature does is no change there, and one of the rig nowhere."""
-    campaign = read_campaign(made / "c")
-    model = get_model(f"{NINE}+thermal_bias+encoder_scale")
-    fit = fit_campaign(campaign, model, get_approach("robot"))
-    slope = _leveling_slope(solve(model, fit.approach, fit.observed), 0.5, 10)
-    zero = np.all(slope == 0, axis=(0, 1))
-    names = [p.name for p, is_zero in zip(model.parameters, zero, strict=True) if is_zero]
-    assert names == ["b_T_x", "b_T_y", "b_T_z", "k_roll", "k_pitch"]
-
-
 def test_a_model_that_becomes_a_registered_one_is_a_study_too():
     campaign = acs.simulate_campaign(scheme="fibonacci-30")
     diagnosis = diagnose(campaign, get_model("bias-scale"))
@@ -295,13 +261,3 @@ def test_a_large_effect_is_fitted_from_the_affine_part_on():
     )  # fmt: skip
     fit = fit_campaign(campaign, get_model(f"{NINE}+saturation(knee=5)"), get_approach("gravity"))
     np.testing.assert_allclose(fit.parameters[9:], [0.5, -0.5, -0.5], atol=0.01)
-
-
-def test_a_part_of_an_effect_is_calibrated_and_read_again(made, tmp_path):
-    model = get_model(f"{NINE}+saturation(knee=9)[k_sat_z]")
-    path = tmp_path / "calibration.json"
-    fit = fit_campaign(read_campaign(made / "c"), model, get_approach("robot"))
-    path.write_text(json.dumps(calibration_document(fit)), encoding="utf-8")
-    calibration = read_calibration(path)
-    assert calibration.model.parameter_names[9:] == ("k_sat_z",)
-    assert "saturation(knee=9)[k_sat_z]" in run("export", path)

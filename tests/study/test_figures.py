@@ -226,10 +226,8 @@ def test_effects_of_the_models_causes_and_approaches_have_colours_of_their_own()
 
 @pytest.mark.parametrize(("model", "title"), [
     ("bias-scale-nonorthogonality", "9: + non-orthogonality"),
-    ("bias-scale-nonorthogonality-thermal_bias", "9 + thermal bias"),
     ("bias-scale-base_tilt-hysteresis", "6 + base tilt + hysteresis"),
     (f"{NINE}+warm_up(tau=300)+quadratic_scale", "9 + warm up (300) + quadratic scale"),
-    ("bias+warm_up(tau=300)", "bias + warm up (300)"),
     ("mine", "mine"),
 ])  # fmt: skip
 def test_titles_of_models_are_short(model, title):

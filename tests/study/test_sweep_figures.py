@@ -150,16 +150,12 @@ TWO_GRIDS = [
 @pytest.mark.parametrize(("grids", "factor", "held", "x"), [
     # The value nearest to the default, of those with most.
     (robot_of([1, 3.2, 5, 20]), SENSOR, ["robot noise 3.2 mgon (one of 4)"], [0.001, 0.005]),
-    (robot_of([1, 5, 20, 50]), SENSOR, ["robot noise 5 mgon (one of 4)"], [0.001, 0.005]),
-    # Single values other than the default.
-    (robot_of(20), SENSOR, ["robot noise 20 mgon"], [0.001, 0.005]),
     ([grid(schemes=SIZES, sensor_sigma_mps2=0.005, robot_sigma_mgon=10)], POSITIONS,
      ["sensor noise 5 mm/s²", "robot noise 10 mgon"], [12, 24, 50]),
     # An error of gravity alone needs no zero.
     ([grid(gravity_error_mps2=ERRORS)], GRAVITY_ERROR,
      ["sensor noise 2 mm/s²", "robot noise 3.2 mgon"], ERRORS),
     (TWO_GRIDS, SENSOR, ["robot noise 10 mgon (one of 4)"], [0.001, 0.005]),
-    (TWO_GRIDS, ROBOT, ["sensor noise 2 mm/s² (one of 3)"], [1, 3.2, 5]),
     ([grid(gravity_error_mps2=[0, 0.01]), grid(gravity_sigma_mps2=[0.001, 0.01])], GRAVITY_SD,
      ["sensor noise 2 mm/s²", "robot noise 3.2 mgon", "error of gravity 0 mm/s² (one of 2)"],
      [0, 0.001, 0.01]),
