@@ -15,8 +15,6 @@ from accelstudy.drawing.style import INK, approach_colour
 Layers = alt.LayerChart | alt.FacetChart
 PALE_OPACITY = 0.2
 """Opacity of set-ups that are not compared with the chosen one."""
-BLUES = ("#F7FBFF", "#6BAED6", "#08306B")
-"""Of correlations from none to 1, as in the figures."""
 
 
 def all_charts(approaches: Sequence[str], fields: Sequence[str]) -> dict[str, Any]:
@@ -31,7 +29,6 @@ def all_charts(approaches: Sequence[str], fields: Sequence[str]) -> dict[str, An
         "roll": tilt_chart("roll", approaches, fields),
         "pitch": tilt_chart("pitch", approaches, fields),
         "sds": sds_chart(approaches),
-        "correlations": correlation_chart(),
     }
     look = alt.Config(
         font="system-ui, sans-serif",
@@ -101,27 +98,6 @@ def sds_chart(approaches: Sequence[str]) -> Layers:
         rows.mark_rule(size=2).encode(x="sd_posteriori_mean_low:Q", x2="sd_posteriori_mean_high:Q"),
         rows.mark_tick(thickness=2, size=14).encode(x="sd_linear:Q", color=alt.value(INK)),
         _points(rows, approaches).encode(x="sd_empirical:Q"),
-    )
-
-
-def correlation_chart() -> Layers:
-    """Matrix of correlations; its data: `first`, `second` and `correlation`."""
-    size = alt.ExprRef("min(12, width / 2.7 / domain('x').length)")
-    axis = alt.Axis(title=None, labelFontSize=size, labelOverlap=False, ticks=False)
-    fields = alt.Chart(alt.NamedData("data"), height="container").transform_calculate(
-        size="abs(datum.correlation)",
-        label="datum.size < 0.005 ? '' : replace(format(datum.correlation, '.2f'), '0.', '.')",
-    )
-    fields = fields.encode(
-        x=alt.X("second:N", sort=None, axis=axis),
-        y=alt.Y("first:N", sort=None, axis=axis),
-        tooltip=["first:N", "second:N", "correlation:Q"],
-    )
-    scale = alt.Scale(domain=[0, 1], range=list(BLUES), type="pow", exponent=0.6)
-    white = alt.condition("datum.size > 0.45", alt.value("white"), alt.value(INK))
-    return alt.layer(
-        fields.mark_rect().encode(color=alt.Color("size:Q", scale=scale, legend=None)),
-        fields.mark_text(fontSize=size).encode(text="label:N", color=white),
     )
 
 

@@ -1,4 +1,4 @@
-"""What an explorer shows of a study, from its tables: set-ups, their parameters, correlations.
+"""What an explorer shows of a study, from its tables: set-ups, and their parameters.
 
 A set-up is a cell of the study. Each function returns a table with numbers in the units that people
 see; `records` and `packed` make them texts that the page reads again.
@@ -118,30 +118,10 @@ def parameters(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
     """Parameters of cells, a row each: `i`, the number of its cell, its unit, and its numbers."""
     ends = _ends(tables, "sd_posteriori", ["cell", "name"], ["end"])
     ends = ends.add_prefix("sd_posteriori_mean_")
-    summary = _numbered(cells, tables["summary"]).join(ends, on=["cell", "parameter"])
+    of_cell = cells[["cell", "approach"]].assign(i=range(len(cells))).set_index("cell")
+    summary = tables["summary"].drop(columns="approach").join(of_cell, on="cell")
+    summary = summary.join(ends, on=["cell", "parameter"])
     summary.columns = summary.columns.str.replace("_ci95_", "_")
     stems = summary.columns.str.replace("_(low|high)$", "", regex=True)
     table = in_shown_units(summary, *summary.columns[stems.isin(IN_UNITS)])
     return table.loc[:, stems.isin(["i", "approach", "parameter", "unit", *SHARES, *IN_UNITS])]
-
-
-def correlations(cells: pd.DataFrame, tables: Tables) -> pd.DataFrame:
-    """Correlations of the parameters of cells, a row each, row by row of a matrix.
-
-    Below the diagonal are the means of those of the adjustment, above it the empirical ones.
-    """
-    table = _numbered(cells, tables["correlations"])
-    place = table.groupby("i").cumcount()
-    u = np.sqrt(table.groupby("i")["i"].transform("size")).round()
-    value = table["adjustment"].where(place // u > place % u, table["empirical"])
-    return table[["i", "approach"]].assign(
-        first=table["parameter_1"],
-        second=table["parameter_2"],
-        correlation=value.where(place // u != place % u).round(3),
-    )
-
-
-def _numbered(cells: pd.DataFrame, table: pd.DataFrame) -> pd.DataFrame:
-    """Rows of a table with `i`, the number of their cell, and its approach."""
-    of_cell = cells[["cell", "approach"]].assign(i=range(len(cells))).set_index("cell")
-    return table.drop(columns="approach", errors="ignore").join(of_cell, on="cell")

@@ -24,7 +24,6 @@ from accelstudy.study.config import Study
 from accelstudy.study.explorer import charts
 from accelstudy.study.explorer.content import (
     compress,
-    correlations,
     noise_levels,
     parameters,
     records,
@@ -92,7 +91,6 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
         by=next(iter(noises), "scheme" if len(set(rows["scheme"])) > 1 else "model"),
         unit=unit,
         units=units,
-        approaches=approaches,
         tables=comma_list([f"{name}.parquet" for name in TABLES]),
         packed={
             "vega": vega(),
@@ -101,7 +99,6 @@ def explorer_page(study: Study, tables: Mapping[str, pd.DataFrame]) -> str:
             "page": compress(json.dumps(page)),
             "setups": compress(records(rows)),
             "parameters": compress(records(details)),
-            "correlations": compress(records(correlations(cells, tables))),
         },
     )
 
