@@ -84,9 +84,12 @@ def known(campaign):
 
 
 def affine(outcome, gauge):
-    """K in a gauge, and the bias in m/s²."""
+    """K turned from the left into a triangle, which has the same KᵀK, and the bias in m/s²."""
     found = outcome.content["affine"]
-    return np.array(found["gauges"][gauge]), np.array(found["bias_mps2"])
+    k = np.array(found["matrix"])
+    order = slice(None) if gauge == "upper" else slice(None, None, -1)
+    turned = np.linalg.cholesky((k.T @ k)[order, order]).T[order, order]
+    return turned, np.array(found["bias_mps2"])
 
 
 def no_effect_is_missing(campaign, name, least):

@@ -12,7 +12,6 @@ from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import (
     held_out,
     position_tests,
-    redundancy_numbers,
     reliability,
     solve,
     variance_components,
@@ -37,9 +36,9 @@ def thermal_session(seed=2):
 
 @BOTH
 def test_leaving_out_is_a_calibration_without_the_position(approach):
-    """With columns, standard deviations that differ, and observed gravity."""
+    """To first order; with columns, standard deviations that differ, and observed gravity."""
     model, observed = thermal_session()
-    found = held_out(model, approach, observed)
+    found = held_out(solve(model, approach, observed))
     assert found.n_predicted == 24
     for position in (0, 10, 23):
         rest = observed.take(np.delete(np.arange(24), position))
@@ -51,40 +50,25 @@ def test_leaving_out_is_a_calibration_without_the_position(approach):
             told = np.array(specific_force(*alone.angles[0].T, x[-1])).T
             psi = alone.forces[0] - model.sense(told, x[:-1], x[-1], alone.hold)
         np.testing.assert_allclose(
-            found.misclosures[position], np.ravel(psi), rtol=0, atol=1e-5 * SIGMA
+            found.misclosures[position], np.ravel(psi), rtol=0, atol=2e-3 * SIGMA
         )
         if approach is ROBOT:
             expected = np.ravel(roll_pitch(tuple(f_b.T))) - alone.angles[0, 0]
             expected[0] = (expected[0] + np.pi) % (2 * np.pi) - np.pi
-            np.testing.assert_allclose(found.angles[position], expected, atol=1e-8)
-
-
-@BOTH
-def test_a_held_out_error_is_the_residual_over_its_redundancy(approach):
-    """L R_ii⁻¹ e_i, which for one condition is w_i / r_i; linear, so of first order."""
-    solution = solve(NINE, approach, observed := draw(4))
-    found = held_out(NINE, approach, observed)
-    expected = position_tests(solution).gross_errors
-    np.testing.assert_allclose(found.misclosures, expected, rtol=0, atol=2e-3 * SIGMA)
-    if approach is GRAVITY:
-        w = solution.misclosures[:, 0]
-        np.testing.assert_allclose(expected[:, 0], w / redundancy_numbers(solution).positions)
-    root = solution.whitening @ solution.root[0]
-    cofactors = root @ np.swapaxes(root, 1, 2)
-    np.testing.assert_allclose(found.cofactors, cofactors, rtol=0, atol=2e-3 * SIGMA**2)
+            np.testing.assert_allclose(found.angles[position], expected, atol=1e-6)
 
 
 def test_held_out_attitudes_at_the_poles():
     """Two of the faces have the x axis vertical, where roll has no meaning."""
     observed = draw(1, "faces-edges-18")
-    found = held_out(NINE, ROBOT, observed)
+    found = held_out(solve(NINE, ROBOT, observed))
     vertical = np.abs(get_scheme("faces-edges-18").directions[:, 0]) > 0.999
     assert np.count_nonzero(vertical) == 2
     np.testing.assert_array_equal(np.isnan(found.angles[:, 0]), vertical)
     assert not np.isnan(found.angles[:, 1]).any()
     assert not np.isnan(found.misclosures).any()
     assert np.all(found.rms_angles < 30 * MGON)
-    assert held_out(NINE, GRAVITY, observed).rms_angles is None
+    assert held_out(solve(NINE, GRAVITY, observed)).rms_angles is None
 
 
 def test_a_position_that_the_others_need_is_not_predicted():
@@ -94,7 +78,7 @@ def test_a_position_that_the_others_need_is_not_predicted():
     ring = np.stack([np.cos(level), np.sin(level), 0 * level], axis=-1)
     directions = np.concatenate([ring, [[0, 0, 1.0]]])
     observed = session(model, np.zeros(6), directions).observations(Noise())
-    found = held_out(model, ROBOT, observed)
+    found = held_out(solve(model, ROBOT, observed))
     assert found.n_predicted == 12
     assert np.isnan(found.misclosures[-1]).all()
     assert found.rms < 1e-6

@@ -295,4 +295,4 @@ def test_nothing_is_detectable_without_redundancy():
         assert np.isnan(values).all()
     assert tests.worst() is None
     assert suspects(NINE, GRAVITY, observed) == ()
-    assert held_out(NINE, GRAVITY, observed) is None
+    assert held_out(solution) is None

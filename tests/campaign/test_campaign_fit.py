@@ -1,17 +1,14 @@
-"""Calibration of measured campaigns: known parameters, public data, gauges, exports."""
+"""Calibration of measured campaigns: known parameters, public data, exports."""
 
 import re
 
 import numpy as np
 import pytest
 from campaign_helpers import FIVE_AXES, simulated_campaign
-from hypothesis import given
-from hypothesis import strategies as st
 from usual import GRAVITY, NINE, ROBOT
 
 from accelstudy.basics.errors import InputError
 from accelstudy.campaign.calibration.assessment import assess
-from accelstudy.campaign.calibration.document import GAUGES, to_gauge
 from accelstudy.campaign.calibration.fit import fit_campaign, initial_values
 from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.calibration.wording import verdict_lines
@@ -46,21 +43,6 @@ def test_a_robot_is_needed_for_the_robot_approach():
     without = Campaign("plain", campaign.positions, campaign.forces, campaign.gravity)
     with pytest.raises(InputError, match="roll_robot_gon"):
         fit_campaign(without, NINE, ROBOT)
-
-
-angles = st.floats(-0.05, 0.05)
-
-
-@given(st.lists(angles, min_size=9, max_size=9))
-def test_all_gauges_measure_the_same_norm(values):
-    k = np.eye(3) + np.reshape(values, (3, 3))
-    for gauge in GAUGES:
-        turned = to_gauge(k, gauge)
-        np.testing.assert_allclose(turned.T @ turned, k.T @ k, rtol=0, atol=1e-12)
-        assert np.all(np.diag(turned) > 0)
-    np.testing.assert_allclose(np.tril(to_gauge(k, "upper"), -1), 0, atol=1e-14)
-    np.testing.assert_allclose(np.triu(to_gauge(k, "lower"), 1), 0, atol=1e-14)
-    np.testing.assert_allclose(to_gauge(k, "symmetric"), to_gauge(k, "symmetric").T, atol=1e-12)
 
 
 def test_a_nonlinear_model_has_no_matrix():

@@ -1,4 +1,8 @@
-"""How well a calibration predicts positions that it did not use."""
+"""How well a calibration predicts positions that it did not use.
+
+Without position i the parameters change by dx = Q_xx Ãᵢᵀ R_ii⁻¹ e_i, and its misclosure becomes
+L R_ii⁻¹ e_i: to first order, as one position of many changes the derivatives by next to nothing.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.adjustment.gauss_helmert import ConditionEquations, Linearisation, adjust
-from accelstudy.adjustment.observations import Observations
-from accelstudy.adjustment.quality.solution import Solution, solve
-from accelstudy.approaches import Approach
+from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.leveling.angles import angles_of, wrap_angle
-from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
 NEAR_POLE = 0.1
 """Cosine of pitch below which an error of roll says nothing of the tilt."""
-MAX_REFITS = 200
-"""Number of positions up to which each is left out in an adjustment of its own. Among more, one
-position changes the parameters so little that the derivatives at the common solution suffice."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +28,11 @@ class HeldOut:
     ----------
     misclosures : (n, c) array, m/s², |f_b| − g, or the output less that in the robot's attitude;
         NaN where the others do not determine the parameters
-    cofactors : (n, c, c) array, (m/s²)², covariance matrices a priori of the misclosures
     angles : (n, 2) array, rad, calibrated roll and pitch less the robot's; None without a robot.
         NaN in roll where the x axis is nearly vertical
     """
 
     misclosures: Array
-    cofactors: Array
     angles: Array | None
 
     @property
@@ -62,93 +56,28 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(predicted**2))) if len(predicted) else np.nan
 
 
-def held_out(model: SensorModel, approach: Approach, observed: Observations) -> HeldOut | None:
-    """Leave each position out in turn, calibrate, and predict it; None if r < c.
-
-    Parameters
-    ----------
-    model, approach, observed : as in `calibrate`, one session
-    """
-    problem = CalibrationProblem.of(model, approach, observed)
-    n, c, u = observed.forces.shape[1], approach.n_conditions, len(problem.weights)
-    if n * c + np.count_nonzero(problem.weights) - u < c:
-        return None
-    if n > MAX_REFITS:
-        x, misclosures, cofactors = _derived(solve(model, approach, observed))
-    else:
-        x, misclosures, cofactors = _refitted(problem, c)
-    angles = None
-    if observed.angles is not None and approach.uses_angles:
-        p = x[:, : model.n_parameters]
-        g = x[:, -1] if problem.with_gravity else np.full(n, problem.conditions.gravity)
-        # Each position has parameters of its own, so they are sessions of one position.
-        hold = None if observed.hold is None else observed.hold.take(np.arange(n)[:, None])
-        f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
-        readings = observed.angles[0]
-        attitude = readings - model.errors_of_reading(readings[:, None], p, hold)[:, 0]
-        angles = _attitude_error(f_b, attitude)
-    return HeldOut(misclosures, cofactors, angles)
-
-
-def _refitted(problem: CalibrationProblem, c: int) -> tuple[Array, Array, Array]:
-    """Parameters (n, u), misclosures (n, c) and their cofactors, each without one position."""
-    n, u = problem.observations.shape[1], len(problem.weights)
-    forces = np.repeat(np.moveaxis(problem.observations[..., :3], -1, 0), n, axis=1)
-    initial, direct = (
-        np.repeat(np.pad(values, ((0, 0), (0, c))), n, axis=0)
-        for values in (problem.initial, problem.direct)
-    )
-    result = adjust(
-        _WithoutOne(problem.conditions, c),
-        np.repeat(problem.observations, n, axis=0),
-        problem.cofactors,
-        initial,
-        parameter_observations=direct,
-        parameter_weights=np.pad(problem.weights, (0, c)),
-        latent=np.concatenate([forces, np.eye(n)[None]]),
-    )
-    return result.parameters[:, :u], -result.parameters[:, u:], result.cofactors[:, u:, u:]
-
-
-def _derived(solution: Solution) -> tuple[Array, Array, Array]:
-    """Results as of `_refitted` by derivatives at the common solution, dx = Q_xx Ãᵀ R_ii⁻¹ e_i."""
+def held_out(solution: Solution) -> HeldOut | None:
+    """Predict each position of a session by all others; None if the redundancy is below c."""
     n, c = solution.misclosures.shape
+    if solution.redundancy < c:
+        return None
+    model, observed = solution.model, solution.observed
     root, rank = solution.root
     root = np.where((rank == c)[:, None, None], root, np.nan)
     scaled = root @ np.swapaxes(root, 1, 2) @ solution.errors[: n * c].reshape(n, c, 1)
+    misclosures = (solution.whitening @ scaled)[..., 0]
+    if observed.angles is None or not solution.approach.uses_angles:
+        return HeldOut(misclosures, None)
     design = solution.design[: n * c].reshape(n, c, -1)
-    steps = (np.swapaxes(design, 1, 2) @ scaled)[..., 0] @ solution.cofactors
-    scatter = solution.whitening @ root
-    return (
-        solution.parameters + steps,
-        (solution.whitening @ scaled)[..., 0],
-        scatter @ np.swapaxes(scatter, 1, 2),
-    )
-
-
-@dataclass(frozen=True)
-class _WithoutOne:
-    """Condition equations in which replicate i does without position i, all of equal shape.
-
-    The conditions of the position are not removed. Each gets an unknown shift, the last c
-    parameters, which absorbs all information of the position. At the end it is minus the misclosure
-    that the others predict. The last row of `latent` marks the position.
-    """
-
-    conditions: ConditionEquations
-    n_conditions: int
-
-    def linearise(self, parameters: Array, adjusted: Array, latent: Array) -> Linearisation:
-        c, left_out = self.n_conditions, latent[-1]
-        at = self.conditions.linearise(parameters[:-c], adjusted, latent[:-1])
-        shifts = np.eye(c)[:, :, None, None] * left_out
-        carried = () if at.latent is None else at.latent
-        return Linearisation(
-            at.psi + parameters[-c:, :, None] * left_out,
-            np.concatenate([at.jac_parameters, shifts], axis=1),
-            at.jac_observations,
-            np.concatenate([carried, left_out[None]]),
-        )
+    x = solution.parameters + (np.swapaxes(design, 1, 2) @ scaled)[..., 0] @ solution.cofactors
+    p = x[:, : model.n_parameters]
+    g = x[:, -1] if observed.sigma_gravity > 0 else np.full(n, solution.gravity)
+    # Each position has parameters of its own, so they are sessions of one position.
+    hold = None if observed.hold is None else observed.hold.take(np.arange(n)[:, None])
+    f_b = model.correct(observed.forces[0][:, None], p, g, hold)[:, 0]
+    readings = observed.angles[0]
+    attitude = readings - model.errors_of_reading(readings[:, None], p, hold)[:, 0]
+    return HeldOut(misclosures, _attitude_error(f_b, attitude))
 
 
 def _attitude_error(f: Array, angles: Array) -> Array:

@@ -133,7 +133,7 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
         tests=quality.position_tests(solution),
         reliability=quality.reliability(solution),
         suspects=quality.suspects(*session, alpha=OUTLIER_LEVEL, sigma_known=fit.trusts_sigma),
-        held_out=quality.held_out(*session),
+        held_out=quality.held_out(solution),
         components=variance_components(*session) if fit.sigma_known else None,
         tilt=tilt,
         implausible=(

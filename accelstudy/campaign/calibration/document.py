@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
@@ -21,14 +21,10 @@ from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
 
 Array = NDArray[np.float64]
-Gauge = Literal["upper", "lower", "symmetric"]
-GAUGES: tuple[Gauge, ...] = ("upper", "lower", "symmetric")
-"""Ways to fix the rotation from the left up to which the norm of gravity determines K in
-f_b = K (f_s − b); all have the same KᵀK and the same residuals."""
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:
-    """Describe a fit: parameters with sigmas, correlation, accuracy, matrix and gauges.
+    """Describe a fit: parameters with sigmas, correlation, accuracy and matrix.
 
     All numbers are in SI but those whose key names another unit, and in forward, right, down.
     """
@@ -187,22 +183,6 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
     return table
 
 
-def to_gauge(matrix: ArrayLike, gauge: Gauge) -> Array:
-    """Turn K (3, 3) into a gauge: the matrix R K, R a rotation, that is triangular or symmetric.
-
-    The diagonal is positive. "upper" is the gauge of Thalmann & Neuner (2018, eq. 4).
-    """
-    k = np.asarray(matrix, dtype=float)
-    gram = k.T @ k
-    if gauge == "upper":
-        return np.asarray(np.linalg.cholesky(gram).T)
-    if gauge == "lower":
-        # The Cholesky factor with rows and columns in reverse order.
-        return np.asarray(np.linalg.cholesky(gram[::-1, ::-1]).T[::-1, ::-1])
-    values, vectors = np.linalg.eigh(gram)
-    return np.asarray((vectors * np.sqrt(values)) @ vectors.T)
-
-
 def _ranges(fit: CampaignFit) -> dict[str, list[float]]:
     """Smallest and largest value over the holds of a calibration.
 
@@ -230,12 +210,7 @@ def _affine(fit: CampaignFit) -> dict[str, Any] | None:
     form = affine_form(fit.model, fit.parameters)
     if form is None:
         return None
-    matrix, bias = form
-    return {
-        "matrix": matrix,
-        "bias_mps2": bias,
-        "gauges": {gauge: to_gauge(matrix, gauge) for gauge in GAUGES},
-    }
+    return dict(zip(("matrix", "bias_mps2"), form, strict=True))
 
 
 def json_number(value: Any) -> float | None:
