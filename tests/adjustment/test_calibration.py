@@ -171,23 +171,6 @@ def test_estimates_scatter_as_the_adjustment_says(approach, scheme):
 
 
 @BOTH
-def test_observed_gravity_spreads_the_mean_scale_as_theory_says(approach):
-    noise = Noise(sigma_gravity=0.002)
-    result = simulate(approach, 1000, 8, noise=noise)
-    fixed = simulate(approach, 1, 8)
-    assert result.redundancy == fixed.redundancy  # one unknown and one observation more
-    mean = result.parameters[:, 3:6].mean(axis=1) - X[3:6].mean()
-    expected = math.sqrt(
-        fixed.cofactors[0, 3:6, 3:6].mean() + (noise.sigma_gravity / G * (1 + 200e-6)) ** 2
-    )
-    limit = STANDARD_ERRORS / math.sqrt(2 * 1000)
-    assert mean.std() == pytest.approx(expected, rel=limit)
-    assert abs(mean.mean()) < STANDARD_ERRORS * expected / math.sqrt(1000)
-    # Whatever value of gravity is observed, the conditions cannot improve it.
-    assert result.sigma_priori[0, 9] == pytest.approx(noise.sigma_gravity, rel=1e-9)
-
-
-@BOTH
 def test_a_wrong_gravity_is_a_common_scale_and_nothing_else(approach):
     observed = ideal_session().observations(Noise(gravity_error=1e-3))
     result = calibrate(NINE, approach, observed)

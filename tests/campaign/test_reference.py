@@ -19,8 +19,6 @@ from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.leveling.angles import angles_of
 from accelstudy.positions.points import evenly_spread
-from accelstudy.sequential.advisor import next_rows
-from accelstudy.simulation.sessions import Noise
 
 SESSIONS = 120
 NOISE, NOISE_OF_REFERENCE = 1e-3, 0.5e-3
@@ -128,17 +126,6 @@ def test_the_part_of_the_reference_is_what_its_errors_add(known):
     part = fit.sigma**2 - np.diag(fit.by_reference)
     assert np.all(fit.sigma > sigma)
     np.testing.assert_allclose(np.sqrt(part), sigma, rtol=0.05)
-
-
-def test_the_next_position_shares_the_errors(campaign):
-    """Rows of a candidate are those that it has as a position of the session."""
-    directions = np.array([[0.2, -0.3, 0.93], [0.6, 0.64, -0.48]])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    rows = next_rows(campaign, TWELVE, ROBOT, Noise(NOISE), directions)
-    assert rows.shape == (2, 3, 12 + 9)
-    _, common = campaign.reference.errors(angles_of(-G * directions), G)
-    tilt = np.linalg.norm(common[:, 1], axis=-1)  # of pitch, which no cosine stretches
-    assert np.all(np.linalg.norm(rows[..., 12:], axis=(1, 2)) > 0.5 * tilt * G / NOISE)
 
 
 def test_the_diagnosis_asks_for_positions_with_the_same_covariance(campaign):

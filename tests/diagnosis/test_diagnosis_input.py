@@ -108,15 +108,6 @@ def test_no_effect_is_silently_absent(gravity):
         assert all(examined.untestable.values())
 
 
-def test_counts_are_diagnosed_like_what_they_count(robot):
-    """Up to the rounding of the conversion, the numbers are the same."""
-    scale, offset = np.array([0.0236, -0.0236, 0.0236]), np.array([33123.0, 33275.0, 32364.0])
-    counts = replace(robot, unit="counts", nominal=Conversion(scale, offset))
-    plain, counted = (diagnosis_document(diagnose(c, NINE)) for c in (robot, counts))
-    assert plain["verdict"] == counted["verdict"]
-    assert plain["global_test"] == pytest.approx(counted["global_test"])
-
-
 def test_counts_that_are_coarse_are_named_as_such(robot, tmp_path):
     """0.0236 m/s² a count and 0.002 m/s² of noise: the step is found as it is."""
     scale = np.full(3, 0.0236)

@@ -11,7 +11,6 @@ from usual import NINE, PAPER
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
 from accelstudy.leveling.sensitivity import FORCES, leveling_sensitivity, total_effects
-from accelstudy.sensors.models import get_model
 from accelstudy.study.sensitivity import sensitivity_table
 
 SETTINGS = {"base_samples": 1024, "resamples": 50, "seed": 1}
@@ -96,18 +95,6 @@ def test_the_table_is_the_grid():
     assert len(table) == 2 * 3 * 2 * 3
     attitudes = table[["roll_gon", "pitch_gon"]].drop_duplicates().to_numpy().tolist()
     assert attitudes == [[0, 5], [0, 0], [0, 50], [-10, 5], [-10, 0], [-10, 50]]
-
-
-def test_a_force_without_noise_gives_no_variance():
-    table = leveling_sensitivity(
-        [30], [20], 0.0, 1024, 5, 1, get_model("bias-scale"), np.zeros(6), 1e-3 * np.eye(6)[0]
-    ).set_index(["output", "input"])
-    assert not table.loc["roll", "defined"].any()  # b_x alone varies, and roll lacks it
-    assert table.loc["roll", "total_effect"].isna().all()
-    assert table.loc["pitch", "defined"].all()
-    assert table.loc[("pitch", "b_x"), "total_effect"] == pytest.approx(1, abs=0.02)
-    others = table.loc["pitch"].drop("b_x")
-    assert (others[["total_effect", "ci95"]] == 0).all(axis=None)
 
 
 # --- with the parameters of a calibration (figures 5 and 6) --------------------------------------

@@ -17,14 +17,12 @@ from places import ROOT
 from study_helpers import simulated as simulated_of
 from usual import NINE, G
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
-from accelstudy.design.estimability import estimability
 from accelstudy.design.spaces import Constraints, Sphere
 from accelstudy.files.tables import read_origin, read_table
-from accelstudy.leveling.error import cap_forces, leveling_error, tilt_error
+from accelstudy.leveling.error import cap_forces, leveling_error
 from accelstudy.pages import render_lines
 from accelstudy.planning import candidates as known
 from accelstudy.planning.answer import answer
@@ -86,18 +84,6 @@ def left(model, sizes, approach="gravity", sigma=SIGMA):
     question, equipment = asked(), {"gravity": BY_HAND, "robot": ROBOT}[approach]
     information = information_of(question, equipment, MCLAREN.directions, sigma)
     return tilt_of(question, information, model, sizes)
-
-
-@pytest.mark.parametrize(("model", "approach"), [
-    (NINE.name, "gravity"), (f"{NINE.name}-quadratic-cubic", "robot"), ("bias-scale", "robot"),
-])  # fmt: skip
-def test_columns_of_one_model_are_the_designs_of_all(model, approach):
-    model = get_model(model)
-    zeros = np.zeros(model.n_parameters)
-    error = tilt_error(model, zeros, model, zeros, cap_forces(30 * GON, 200))
-    own = estimability(MCLAREN, model, get_approach(approach))
-    found = left(model, {}, approach)
-    np.testing.assert_allclose(found.rms, error.rms_of_all(own.cofactors), rtol=1e-8)
 
 
 def test_what_is_neglected_leaves_what_a_calibration_of_such_a_sensor_leaves():

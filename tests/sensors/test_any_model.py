@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 from calling import call, refusal, succeed
 
 import accelstudy as acs
@@ -50,23 +49,6 @@ def made(tmp_path_factory):
 def parameters(path):
     document = json.loads(path.read_text(encoding="utf-8"))
     return {p["name"]: (p["value"], p["sigma"]) for p in document["parameters"]}
-
-
-def test_a_composition_is_calibrated_and_checked(made):
-    truth = yaml.safe_load((made / "truth.yaml").read_text(encoding="utf-8"))
-    known = {p["name"]: p["value"] for e in truth["sensor"] + truth["effects"]
-             for p in e["parameters"]}  # fmt: skip
-    run("calibrate", made / "c", "--model", HIDDEN, "--approach", "robot", "--out", made / "k")
-    found = parameters(made / "k/calibration.json")
-    assert set(found) == set(known)
-    assert max(abs(value - known[name]) / sigma for name, (value, sigma) in found.items()) < 4.5
-    document = json.loads((made / "k/calibration.json").read_text(encoding="utf-8"))
-    assert document["model"] == HIDDEN
-    assert document["quality"]["global_test"]["accepted"]
-    assert 1 < document["quality"]["tilt_rms_mgon"]["roll"] < 20
-    text = run("check-sigmas", made / "c", "--model", HIDDEN, "--replicates", "50")
-    assert text.count("b_T_") == 3
-    assert "thermal_scale" in run("effects", "--campaign", made / "c", "--model", HIDDEN)
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

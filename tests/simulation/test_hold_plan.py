@@ -38,23 +38,6 @@ def test_what_is_drawn_is_uniform_and_independent():
     np.testing.assert_array_equal(FULL.hold(n).yaw, hold.yaw)
 
 
-def test_use_is_in_the_ranges_of_the_calibration_and_in_random_order():
-    forces = cap_forces(0.8, 300)
-    hold = FULL.use(forces, 24)
-    for name, (low, high) in {
-        "time": (0, 690), "temperature": (10, 40), "vibration": (0.5, 2)
-    }.items():  # fmt: skip
-        values = hold.column(name)
-        assert low <= values.min() < low + 0.1 * (high - low)
-        assert high - 0.1 * (high - low) < values.max() <= high
-    steps = np.stack([hold.step_x, hold.step_y, hold.step_z], axis=1)
-    before = forces - steps
-    # Each attitude but the last comes before another one; the first has none before it.
-    distance = np.abs(before[:, None] - forces).max(axis=-1)
-    assert np.sort(distance.min(axis=1)).max() < 0.02 * math.sqrt(3)
-    assert not np.array_equal(np.argmin(distance, axis=1), np.arange(-1, 299))
-
-
 @pytest.mark.parametrize(
     ("effect", "column"),
     [("thermal_scale", "temperature"), ("bias_drift", "time"), ("settling", None), ("bias", None)],

@@ -14,7 +14,6 @@ from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import get_effect
-from accelstudy.schemes import get_scheme
 from accelstudy.sensors.sensor import SensorModel
 
 
@@ -77,22 +76,6 @@ def test_what_is_added_changes_nothing_else_that_is_drawn():
 # --- columns -------------------------------------------------------------------------------------
 
 
-def test_columns_are_those_of_the_settings():
-    campaign, _ = simulate(interval=None, sigma_known=False, approach="gravity", yaw="random")
-    for name in ("time", "temperature", "vibration", "yaw", "angles", "sigma_angle", "n_samples"):
-        assert getattr(campaign, name) is None
-    assert campaign.sigma_force is None
-    campaign, _ = simulate(
-        interval=30, temperature=(10, 50), vibration=(0.2, 0.4), yaw="random", n_samples=100
-    )
-    assert campaign.time.tolist() == [30.0 * i for i in range(24)]
-    np.testing.assert_allclose(campaign.temperature, np.linspace(10, 50, 24))
-    assert 0.2 <= campaign.vibration.min() < campaign.vibration.max() <= 0.4
-    assert np.ptp(campaign.yaw) > np.pi
-    assert set(campaign.n_samples) == {100}
-    assert campaign.sigma_angle == 3.2 * MGON
-
-
 def test_courses_of_temperature():
     abba, _ = simulate(temperature=(20, 40), temperature_order="ABBA")
     assert abba.temperature.tolist() == [20.0] * 6 + [40.0] * 12 + [20.0] * 6
@@ -103,28 +86,6 @@ def test_courses_of_temperature():
         ]
     )
     assert stats.kstest(random, stats.uniform(20, 20).cdf).pvalue > 1e-4
-
-
-def test_repeats_and_order():
-    directions = get_scheme("faces-6").directions
-
-    def attitudes(**settings):
-        campaign, _ = simulate(scheme="faces-6", effects=ZERO, sigma=1e-9, **settings)
-        return np.round(-campaign.forces / campaign.gravity, 6)
-
-    np.testing.assert_array_equal(attitudes(repeats=2), np.tile(directions, (2, 1)))
-    np.testing.assert_array_equal(
-        attitudes(repeat_first=4), np.concatenate([directions, directions[:4]])
-    )
-    mixed = attitudes(repeats=3, order="random", repeat_first=2)
-    assert not np.array_equal(mixed[:18], np.tile(directions, (3, 1)))
-    np.testing.assert_array_equal(mixed[18:], mixed[:2])
-    found, counts = np.unique(mixed[:18], axis=0, return_counts=True)
-    assert len(found) == 6
-    assert set(counts) == {3}
-
-
-ZERO = ("bias: 0, 0, 0", "scale: 0, 0, 0", "nonorthogonality: 0, 0, 0")
 
 
 def test_sds_within_the_holds():

@@ -3,18 +3,13 @@
 Limits of single statistics are 4.5 standard errors.
 """
 
-from dataclasses import replace
-
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.special import gammaln
 from scipy.stats import binom
 from study_helpers import NINE, grid, run_study
 from usual import STANDARD_ERRORS
 
-from accelstudy.study import replicates as module
-from accelstudy.study.compiling import calibrator
 from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import coverage_columns
 
@@ -187,36 +182,6 @@ def test_empirical_correlations_are_those_of_the_adjustment(study):
 
 
 # --- what did not converge -----------------------------------------------------------------------
-
-
-def test_some_replicates_fail(monkeypatch, tmp_path):
-    """Replicates with a hopeless observation are NaN and counted; others alone make statistics."""
-    grids, failed = [grid(approaches="gravity")], [3, 50]
-    whole = run_study(tmp_path / "whole", grids=grids)["estimates"]
-
-    def spoilt(cell):
-        def calibrate(model, approach, observed):
-            forces = observed.forces.copy()
-            forces[failed] = np.nan
-            return calibrator(cell)(model, approach, replace(observed, forces=forces))
-
-        return calibrate
-
-    monkeypatch.setattr(module, "calibrator", spoilt)
-    tables = run_study(tmp_path / "spoilt", grids=grids)
-    rows, summary = tables["estimates"], of(tables["summary"], f"{MCLAREN}/gravity")
-    good, bad = rows[rows["converged"]], rows[~rows["converged"]]
-    assert [*bad["replicate"].unique()] == failed
-    assert bad[["estimate", "sigma_priori", "omega"]].isna().all().all()
-    others = ~whole["replicate"].isin(failed)
-    pd.testing.assert_frame_equal(good, whole[others], check_exact=True)
-    for name, found in good.groupby("parameter", observed=True):
-        in_si = {"mm/s^2": 1e-3, "ppm": 1e-6, "mgon": np.pi / 200e3}[summary.loc[name, "unit"]]
-        error = (found["estimate"] - found["truth"]) / in_si
-        assert summary.loc[name, "bias_plain"] == pytest.approx(error.mean(), rel=1e-9)
-        assert summary.loc[name, "sd_plain"] == pytest.approx(error.std(), rel=1e-9)
-    for table in (summary, tables["cells"]):
-        assert {*zip(table["n_replicates"], table["n_converged"], strict=True)} == {(60, 58)}
 
 
 def test_no_replicate_converges(tmp_path):
