@@ -290,8 +290,7 @@ DESIGN = Command(
         "What the positions are to be good for": (
             "criterion tilt_range neglect discriminate prior after"
         ),
-        "What the positions must keep to": (
-            "attitudes mountings roll pitch pole_distance least_angle"
-        ),
+        "What the positions must keep to": "attitudes roll pitch pole_distance least_angle",
     },
+    retired={"--mountings": "--attitudes takes a CSV file of the attitudes that a mount allows"},
 )

@@ -9,13 +9,14 @@ Kiefer & Wolfowitz (1960) and Whittle (1973) is the case in which the bound is r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.design.criteria import Criterion
-from accelstudy.design.spaces import Constraints, Space
+from accelstudy.design.newton import settle
+from accelstudy.design.spaces import Attitudes
 from accelstudy.design.task import Task
 
 Array = NDArray[np.float64]
@@ -49,27 +50,33 @@ class Continuous:
     bound: float
 
 
-def continuous_optimum(
-    task: Task, criterion: Criterion, space: Space, constraints: Constraints, n: int
-) -> Continuous:
+@dataclass(frozen=True)
+class _Slope:
+    """A linear function of normal matrices."""
+
+    slope: Array
+
+    def value(self, normal: Array) -> Array:
+        return np.sum(normal * self.slope, axis=(-2, -1))
+
+    def gradient(self, normal: Array) -> Array:
+        return np.broadcast_to(self.slope, normal.shape)
+
+
+def continuous_optimum(task: Task, criterion: Criterion, allowed: Attitudes, n: int) -> Continuous:
     """Find the best shares for n positions among the attitudes that are allowed singly.
 
     Parameters
     ----------
     task : Task
     criterion : Criterion, convex
-    space : Space
-    constraints : Constraints; least angles and a number of mountings are ignored, so the bound
-        holds with and without them
+    allowed : Attitudes; a least angle is ignored, so the bound holds with and without it
     n : int
     """
-    fine = allowed(space, constraints, BOUND_ATTITUDES)
-    fine_flat = _flat(task, fine)
-    points = (
-        fine if len(fine) <= SHARED_ATTITUDES else allowed(space, constraints, SHARED_ATTITUDES)
-    )
-    flat, shares = _flat(task, points), np.full(len(points), 1 / len(points))
-    u = len(task.names)
+    allowed = replace(allowed, least_angle=None)
+    fine, points = allowed.sample(BOUND_ATTITUDES), allowed.sample(SHARED_ATTITUDES)
+    fine_flat, flat = _flat(task, fine), _flat(task, points)
+    shares, u = np.full(len(points), 1 / len(points)), len(task.names)
     best = Continuous(points, shares, np.inf, -np.inf)
     for _ in range(ROUNDS):
         shares = _share(task.prior, criterion, flat, shares, n)
@@ -78,25 +85,18 @@ def continuous_optimum(
         normal = task.prior + n * (shares @ flat).reshape(u, u)
         value = float(criterion.value(normal))
         slope = criterion.gradient(normal).ravel()
-        here, low = flat @ slope, np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]
-        lowest, least = _lowest(task, slope.reshape(u, u), space, constraints, fine[low])
-        least = min(least, float(here.min()))
+        lowest = fine[np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]]
+        if allowed.points is None:
+            lowest = settle(task, _Slope(slope.reshape(u, u)), allowed, lowest)
+        here, there = flat @ slope, _flat(task, lowest) @ slope
+        least = min(float(here.min()), float(there.min()))
         bound = max(best.bound, value + n * (least - float(shares @ here)))
         best = Continuous(points, shares, value, bound)
         if value - bound < MAX_GAP:
             break
-        points = np.concatenate([points, lowest])
-        flat = np.concatenate([flat, _flat(task, lowest)])
+        points, flat = np.concatenate([points, lowest]), np.concatenate([flat, _flat(task, lowest)])
         shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
     return best
-
-
-def allowed(space: Space, constraints: Constraints, count: int) -> Array:
-    """About `count` allowed attitudes, evenly spread; all of a finite set."""
-    attitudes = constraints.keep(space.directions(count))
-    if 0 < len(attitudes) < count / 2 and space.tangents(attitudes[:1]).shape[2]:
-        attitudes = constraints.keep(space.directions(min(9999, count * count // len(attitudes))))
-    return attitudes
 
 
 def _flat(task: Task, directions: Array) -> Array:
@@ -116,27 +116,3 @@ def _share(prior: Array, criterion: Criterion, flat: Array, shares: Array, n: in
         shares = shares * np.sqrt(np.maximum(gain, 0.0) / gain.max())
         shares = shares / shares.sum()
     return shares
-
-
-def _lowest(
-    task: Task, gradient: Array, space: Space, constraints: Constraints, points: Array
-) -> tuple[Array, float]:
-    """Attitudes near given ones where derivatives are smallest, and the smallest derivative."""
-
-    def slopes(directions: Array) -> Array:
-        return np.einsum("kuw,uw->k", task.informations(directions), gradient)
-
-    step = np.sqrt(4 * np.pi / BOUND_ATTITUDES)
-    for _ in range(12):
-        tangents = space.tangents(points)
-        if not tangents.shape[2]:
-            break
-        moves = step * np.concatenate([np.zeros_like(tangents[..., :1]), tangents, -tangents], 2)
-        around = np.moveaxis(points[..., None] + moves, 2, 1)
-        around = around / np.linalg.norm(around, axis=-1, keepdims=True)
-        flat = around.reshape(-1, 3)
-        values = np.where(constraints.allow(flat), slopes(flat), np.inf)
-        best = np.argmin(values.reshape(around.shape[:2]), axis=1)
-        points = around[np.arange(len(points)), best]
-        step /= 2
-    return points, float(slopes(points).min())

@@ -94,12 +94,12 @@ class Estimator:
         return np.asarray(self._flat @ covariance.reshape(*cofactors.shape[:-2], -1).T)
 
     def gradient(self, cofactors: Array, shifts: Array | None, weights: Array) -> Array:
-        """Derivative of Σ weightₐ squareₐ by a normal matrix (u, u), symmetric."""
-        left = cofactors @ (weights @ self._flat).reshape(cofactors.shape)
+        """Derivative of Σ weightₐ squareₐ by normal matrices (..., u, u), symmetric."""
+        left = cofactors @ np.tensordot(weights, self.forms, (0, 0))
         slope = -left @ cofactors
         if shifts is not None:
             by_shifts = left @ shifts
-            slope -= by_shifts + by_shifts.T
+            slope -= by_shifts + by_shifts.swapaxes(-1, -2)
         return np.asarray(slope)
 
 
@@ -144,12 +144,13 @@ class Criterion:
         return np.asarray((np.logaddexp.reduce(logs) - np.log(len(logs))) / self.power)
 
     def gradient(self, normal: Array) -> Array:
-        """Derivative by a symmetric normal matrix (u, u), symmetric."""
+        """Derivative by symmetric normal matrices (..., u, u), symmetric."""
         errors = [one.covariances(normal) for one in self.estimators]
         squares = [one.squares(*at) for one, at in zip(self.estimators, errors, strict=True)]
         whole = np.concatenate(squares)
-        relative = whole / whole.max()
-        weights = relative ** (self.power - 1) / np.sum(relative**self.power) / whole.max()
+        largest = whole.max(axis=0)
+        relative = whole / largest
+        weights = relative ** (self.power - 1) / np.sum(relative**self.power, axis=0) / largest
         slope, first = np.zeros_like(normal), 0
         for one, at in zip(self.estimators, errors, strict=True):
             slope += one.gradient(*at, weights[first : first + len(one.forms)])

@@ -1,11 +1,10 @@
-"""The attitudes to choose from: where they lie, how they can move, and what constrains them."""
+"""The attitudes that positions may have: all or some of them, and what constrains them."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from io import StringIO
-from itertools import combinations, product
 from pathlib import Path
 
 import numpy as np
@@ -20,137 +19,102 @@ from accelstudy.positions.points import corners, edges, evenly_spread, faces
 
 Array = NDArray[np.float64]
 
-MOST_MOUNTINGS = 150
-"""Number of choices of mountings that are tried; of more, a random part."""
+TOLERANCE = 1e-7
+"""rad, by which rounding may break a constraint."""
 
 
-class Space(ABC):
-    """A set of attitudes, as directions of gravity in the body frame.
+@dataclass(frozen=True, eq=False)
+class Attitudes:
+    """Attitudes to choose from, as directions of gravity in the body frame; angles in rad.
 
     Attributes
     ----------
     text : str, for people
+    points : (k, 3) array of unit vectors; None for all attitudes
+    roll, pitch : (least, most); None where there is no limit
+    pole_distance : float, least angle between the x axis and the vertical, where roll is undefined
+    least_angle : float, between any two positions
     """
 
-    text: str
+    text: str = "all attitudes"
+    points: Array | None = None
+    roll: tuple[float, float] | None = None
+    pitch: tuple[float, float] | None = None
+    pole_distance: float | None = None
+    least_angle: float | None = None
 
-    @abstractmethod
-    def directions(self, count: int) -> Array:
-        """Attitudes of the set, (k, 3): all of a finite set, else about `count`, evenly spread."""
+    def __post_init__(self) -> None:
+        for name in ("roll", "pitch"):
+            ends = getattr(self, name)
+            if ends and not ends[0] < ends[1]:
+                raise InputError(f"{name}: the first angle must be less than the second")
 
-    def tangents(self, directions: Array) -> Array:
-        """Unit vectors along which positions (n, 3) can move, (n, 3, d); d = 0 of a finite set."""
-        return np.zeros((len(directions), 3, 0))
+    @property
+    def constraints(self) -> list[str]:
+        """All constraints, for people."""
+        texts = [
+            f"{name} from {_angle_text(ends[0])} to {_angle_text(ends[1])}"
+            for name in ("roll", "pitch")
+            if (ends := getattr(self, name))
+        ]
+        if self.pole_distance is not None:
+            texts.append(f"at least {_angle_text(self.pole_distance)} from the roll pole")
+        if self.least_angle is not None:
+            texts.append(f"at least {_angle_text(self.least_angle)} between positions")
+        return texts
 
-    def parts(self, rng: np.random.Generator) -> list[Space]:
-        """Parts of the set, of which one is to be chosen; often only the set itself."""
-        return [self]
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Least and largest roll and pitch, (2,) each."""
+        # Beyond the pole another roll begins; without limits of it, positions may move across.
+        free = self.roll is None and self.pole_distance is None
+        steepest = np.inf if free else np.pi / 2 - (self.pole_distance or 0.0)
+        ends = np.array([self.roll or (-np.inf, np.inf), self.pitch or (-np.inf, np.inf)])
+        ends[1] = np.maximum(ends[1, 0], -steepest), np.minimum(ends[1, 1], steepest)
+        return ends[:, 0], ends[:, 1]
+
+    def sample(self, count: int) -> Array:
+        """Allowed attitudes: all of a finite set, else about `count`, evenly spread."""
+        if self.points is not None:
+            return self._within(self.points)
+        allowed = self._within(evenly_spread(count))
+        if 0 < len(allowed) < count / 2:
+            allowed = self._within(evenly_spread(min(9999, count * count // len(allowed))))
+        return allowed
+
+    def _within(self, directions: Array) -> Array:
+        low, high = self.limits
+        angles = angles_to(directions)
+        inside = (angles >= low - TOLERANCE) & (angles <= high + TOLERANCE)
+        return directions[inside.all(axis=1)]
+
+    def are_apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
+        """Which of k directions are far enough from all of the others, (k,)."""
+        if self.least_angle is None or not len(others):
+            return np.ones(len(directions), dtype=bool)
+        limit = np.cos(self.least_angle - TOLERANCE)
+        return np.asarray(np.all(directions @ others.T <= limit, axis=1))
 
 
-class Sphere(Space):
-    """All attitudes."""
-
-    text = "all attitudes"
-
-    def directions(self, count: int) -> Array:
-        """Points of the Fibonacci lattice."""
-        return evenly_spread(count)
-
-    def tangents(self, directions: Array) -> Array:
-        """Return two directions across gravity."""
-        away = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
-        first = np.cross(directions, away)
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
-        return np.stack([first, np.cross(directions, first)], axis=-1)
-
-
-@dataclass(frozen=True, eq=False)
-class FiniteSet(Space):
-    """A finite set of attitudes.
-
-    Attributes
-    ----------
-    points : (k, 3) array of unit vectors
-    """
-
-    points: Array
-    text: str
-
-    def directions(self, count: int) -> Array:
-        """All of them."""
-        return self.points
-
-
-def cube() -> FiniteSet:
+def cube() -> Attitudes:
     """Attitudes of a cube on a table: on its faces, edges and corners."""
     points = np.vstack([faces(), edges(), corners()])
-    return FiniteSet(_unit(points), "a cube: 6 faces, 12 edges, 8 corners")
+    return Attitudes("a cube: 6 faces, 12 edges, 8 corners", _unit(points))
 
 
-def attitudes_by_eye(step: float) -> FiniteSet:
+def attitudes_by_eye(step: float) -> Attitudes:
     """Attitudes that a person can judge by eye: roll and pitch in whole steps, rad."""
     turns = max(1, round(np.pi / 2 / step))
     rolls = np.arange(4 * turns) * np.pi / 2 / turns
     pitches = np.arange(-turns + 1, turns) * np.pi / 2 / turns
-    points = [-np.array(specific_force(r, p, 1.0, np)) for p in pitches for r in rolls]
-    return FiniteSet(
-        _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
+    points = [directions_at(np.array([r, p])) for p in pitches for r in rolls]
+    return Attitudes(
         f"a block held by hand: roll and pitch in steps of {np.degrees(np.pi / 2 / turns):g}°",
+        _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
     )
 
 
-@dataclass(frozen=True)
-class Mountings(Space):
-    """Turns about one horizontal axis per mounting of the sensor: circles about its axes.
-
-    Attributes
-    ----------
-    count : int, mountings
-    axes : tuple of axes in the sensor to choose from; by default x, y, z and their bisectors
-    """
-
-    count: int
-    axes: tuple[tuple[float, float, float], ...] = tuple(
-        (float(x), float(y), float(z))
-        for x, y, z in product((1, 0, -1), repeat=3)
-        if (x, y, z) > (0, 0, 0) and abs(x) + abs(y) + abs(z) <= 2
-    )
-
-    @property
-    def text(self) -> str:  # type: ignore[override]
-        """How many of them."""
-        one = self.count == 1
-        return f"{self.count} {'mounting' if one else 'mountings, each'} turned about one axis"
-
-    def directions(self, count: int) -> Array:
-        """Even steps about each axis."""
-        steps = max(8, count // len(self.axes))
-        angle = 2 * np.pi * np.arange(steps) / steps
-        circles = []
-        for axis in _unit(np.array(self.axes)):
-            one = Sphere().tangents(axis[None])[0]
-            circles.append(np.cos(angle)[:, None] * one[:, 0] + np.sin(angle)[:, None] * one[:, 1])
-        return np.vstack(circles)
-
-    def mounting(self, directions: Array) -> NDArray[np.int_]:
-        """Index of the axis, (n,), that is horizontal in each position."""
-        return np.asarray(np.argmin(np.abs(directions @ _unit(np.array(self.axes)).T), axis=1))
-
-    def tangents(self, directions: Array) -> Array:
-        """Turn about the axis of the mounting."""
-        axes = _unit(np.array(self.axes))[self.mounting(directions)]
-        return _unit(np.cross(axes, directions))[..., None]
-
-    def parts(self, rng: np.random.Generator) -> list[Space]:
-        """Choices of as many axes as there are mountings."""
-        chosen = list(combinations(self.axes, self.count))
-        if len(chosen) > MOST_MOUNTINGS:
-            keep = rng.choice(len(chosen), MOST_MOUNTINGS, replace=False)
-            chosen = [chosen[i] for i in sorted(keep)]
-        return [Mountings(self.count, axes) for axes in chosen]
-
-
-def read_attitudes(path: Path) -> FiniteSet:
+def read_attitudes(path: Path) -> Attitudes:
     """Read the attitudes of a CSV file.
 
     It has the columns x, y, z (directions of gravity in the body frame) or roll_U, pitch_U, where U
@@ -182,97 +146,25 @@ def read_attitudes(path: Path) -> FiniteSet:
     if len(bad):
         raise InputError(f"{path}: row {bad[0] + 1}: {', '.join(columns)} must be numbers")
     if len(columns) == 2:
-        roll, pitch = to_si(values, columns[0].rpartition("_")[2], "rad").T
-        values = -np.stack(specific_force(roll, pitch, 1.0, np), axis=-1)
+        values = directions_at(to_si(values, columns[0].rpartition("_")[2], "rad"))
     if not len(values) or not np.all(np.linalg.norm(values, axis=1) > 0):
         raise InputError(f"{path}: no attitudes in it, or a direction of length zero")
     points = np.unique(_unit(values).round(12), axis=0)
-    return FiniteSet(_unit(points), f"{len(points)} attitudes of {path.name}")
+    return Attitudes(f"{len(points)} attitudes of {path.name}", _unit(points))
 
 
-def attitudes(directions: Array) -> Array:
-    """Roll and pitch, rad, (n, 2), of directions of gravity."""
+def angles_to(directions: Array) -> Array:
+    """Roll and pitch, rad, (..., 2), of directions of gravity."""
     return angles_of(-np.asarray(directions))
+
+
+def directions_at(angles: Array) -> Array:
+    """Directions of gravity, (..., 3), at roll and pitch (..., 2), rad."""
+    return -np.stack(specific_force(angles[..., 0], angles[..., 1], 1.0), axis=-1)
 
 
 def _unit(points: Array) -> Array:
     return np.asarray(points / np.linalg.norm(points, axis=-1, keepdims=True))
-
-
-TOLERANCE = 1e-7
-"""rad, by which rounding may break a constraint."""
-
-
-@dataclass(frozen=True)
-class Constraints:
-    """Constraints that positions must meet; rad, None where there is none.
-
-    Attributes
-    ----------
-    roll, pitch : (least, most)
-    pole_distance : float, least angle between the x axis and the vertical, where roll is undefined
-    least_angle : float, between any two positions
-    """
-
-    roll: tuple[float, float] | None = None
-    pitch: tuple[float, float] | None = None
-    pole_distance: float | None = None
-    least_angle: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, (least, most) in self._ranges.items():
-            if not least < most:
-                raise InputError(f"{name}: the first angle must be less than the second")
-
-    @property
-    def _ranges(self) -> dict[str, tuple[float, float]]:
-        """Ranges of angles by their names."""
-        return {name: ends for name in ("roll", "pitch") if (ends := getattr(self, name))}
-
-    @property
-    def texts(self) -> list[str]:
-        """All of them, for people."""
-        texts = [
-            f"{name} from {_angle_text(a)} to {_angle_text(b)}"
-            for name, (a, b) in self._ranges.items()
-        ]
-        if self.pole_distance is not None:
-            texts.append(f"at least {_angle_text(self.pole_distance)} from the roll pole")
-        if self.least_angle is not None:
-            texts.append(f"at least {_angle_text(self.least_angle)} between positions")
-        return texts
-
-    def allow(self, directions: Array) -> NDArray[np.bool_]:
-        """Which of directions (n, 3) meet the constraints on single positions, (n,)."""
-        allowed = np.ones(len(directions), dtype=bool)
-        if self._ranges:
-            angles = dict(zip(("roll", "pitch"), attitudes(directions).T, strict=True))
-        for name, (least, most) in self._ranges.items():
-            allowed &= (angles[name] >= least - TOLERANCE) & (angles[name] <= most + TOLERANCE)
-        if self.pole_distance is not None:
-            x, y, z = directions.T
-            allowed &= np.arctan2(np.hypot(y, z), np.abs(x)) >= self.pole_distance - TOLERANCE
-        return allowed
-
-    def keep(self, directions: Array) -> Array:
-        """Those of directions (n, 3) that meet the constraints on single positions."""
-        return directions[self.allow(directions)]
-
-    def are_apart(self, directions: Array, others: Array) -> NDArray[np.bool_]:
-        """Which of k directions are far enough from all of the others, (k,)."""
-        if self.least_angle is None or not len(others):
-            return np.ones(len(directions), dtype=bool)
-        limit = np.cos(self.least_angle - TOLERANCE)
-        return np.asarray(np.all(directions @ others.T <= limit, axis=1))
-
-    def are_met(self, directions: Array) -> bool:
-        """Whether a set of positions meets all constraints."""
-        allowed = bool(np.all(self.allow(directions)))
-        if self.least_angle is None or not allowed:
-            return allowed
-        near = directions @ directions.T > np.cos(self.least_angle - TOLERANCE)
-        np.fill_diagonal(near, False)
-        return not near.any()
 
 
 def _angle_text(angle: float) -> str:

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from accelstudy.basics.arguments import tidy
 from accelstudy.basics.units import GON, MGON
 from accelstudy.design.criteria import MINIMAX
-from accelstudy.design.search import STEPS
-from accelstudy.leveling.distribution import NOISE
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
@@ -32,12 +30,6 @@ from accelstudy.simulation.sessions import Noise
 
 USUAL_SHARE, MIN_SHARE = 0.6, 0.4
 """Parts of the number of evenly spread positions that the best positions need."""
-MISSED = (math.inf, 1.03, 1.01, 1.003, 1.002, 1.0)
-"""What noise alone leaves over the target, beyond which positions miss it, as moves on finer grids
-bring less: before any move, and after those on each grid."""
-NOISE_SHARE = 0.99
-"""Part of an accuracy that has to be of the noise for a search to end early. Moves lower what noise
-leaves, and may raise what neglected effects leave."""
 SURE_SHARE = 0.99
 """Where one position less, of the same information each, misses the target by 1 % or more, it is
 not tried."""
@@ -53,17 +45,19 @@ class CalibrationKind:
     equipment : Equipment
     model : SensorModel
     hold : float, s
+    starts : int, random sets from which positions are searched
     """
 
     question: Question
     equipment: Equipment
     model: SensorModel
     hold: float
+    starts: int = 1
 
     @classmethod
-    def of(cls, question: Question, candidate: Candidate) -> CalibrationKind:
+    def of(cls, question: Question, candidate: Candidate, starts: int = 1) -> CalibrationKind:
         """The kind of a candidate."""
-        return cls(question, candidate.equipment, candidate.model, candidate.hold)
+        return cls(question, candidate.equipment, candidate.model, candidate.hold, starts)
 
     @property
     def least(self) -> int:
@@ -84,26 +78,22 @@ class CalibrationKind:
         return self.equipment.seconds(max(self.least, math.ceil(needed)), self.hold)
 
     def request(self, n: int) -> Request:
-        """Request for the best n positions, as `accelstudy design` takes it.
-
-        It has one random set to start from: more find designs that are better by 0.1 % at most.
-        """
+        """Request for the best n positions, as `accelstudy design` takes it."""
         noise = Noise()
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
             angle = tidy(angle_sigma(self.question, self.equipment) / MGON, 6) * MGON
             noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), angle)
         tilt_range = tidy(self.question.tilt_range / GON, 6) * GON
         at = self.model.name, self.equipment.approach, MINIMAX
-        return Request(n, *at, tilt_range, noise, starts=1)
+        return Request(n, *at, tilt_range, noise, starts=self.starts)
 
     def best(self, n: int) -> Candidate | None:
         """Calibration in the best n positions; None if so many are not allowed, or too few."""
         if not self.least <= n <= self.most:
             return None
         request = self.request(n)
-        found = request.search.finish(_positions(request, len(STEPS)), bounded=False)
         content = {"title": "minimax", "source": "accelstudy design"}
-        content["directions"] = found.directions.tolist()
+        content["directions"] = _positions(request).tolist()
         return self._in_positions(remember(content, f"{MINIMAX}-{n}"), request)
 
     def fewest(self, needed: float) -> Candidate | None:
@@ -115,7 +105,12 @@ class CalibrationKind:
         low, high = self.least - 1, self.most + 1
         while high - low > 1:
             n = min(max(math.ceil(needed), low + 1), high - 1)
-            share = self._share(n)
+            best = self.best(n)
+            share = (
+                math.inf
+                if best is None
+                else self.question.accuracy(best.tilt) / self.question.target
+            )
             needed = n * share**2 if share < math.inf else needed
             if share > 1:
                 low = n
@@ -124,27 +119,6 @@ class CalibrationKind:
             if share * _of_one_less(n) > 1:
                 break
         return self.best(high)
-
-    def _share(self, n: int) -> float:
-        """Accuracy of the best n positions over the target, as fine as the next step needs it.
-
-        That is whether they reach it, and whether one position less is worth a try.
-        """
-        request, share = self.request(n), math.inf
-        for moves, missed in enumerate(MISSED):
-            scheme = Scheme("", "", _positions(request, moves), "generated", "")
-            candidate = self._in_positions(scheme)
-            if candidate is None:
-                continue
-            share, noise = (
-                self.question.accuracy(tilt) / self.question.target
-                for tilt in (candidate.tilt, candidate.tilt.of(NOISE))
-            )
-            if noise > missed:
-                break
-            if noise > NOISE_SHARE * share and share * _of_one_less(n) <= 1:
-                break
-        return share
 
     def _in_positions(self, scheme: Scheme, request: Request | None = None) -> Candidate | None:
         alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
@@ -157,11 +131,8 @@ def _of_one_less(n: int) -> float:
 
 
 @cache
-def _positions(request: Request, moves: int) -> NDArray[np.float64]:
-    """Positions of a search after the moves on so many grids."""
-    if moves == 0:
-        return request.search.exchange(1)
-    return request.search.move(_positions(request, moves - 1), STEPS[moves - 1])
+def _positions(request: Request) -> NDArray[np.float64]:
+    return request.search.optimum(request.starts, bounded=False).directions
 
 
 def cheapest(question: Question, compared: Iterable[Candidate]) -> Candidate | None:

@@ -13,7 +13,7 @@ import numpy as np
 from accelstudy.basics.units import GON, MGON, angle_note, display_unit, to_display  # noqa: F401
 from accelstudy.basics.wording import amount, interval, number, quantity_text, words
 from accelstudy.pages import render_lines
-from accelstudy.planning.answer import OTHER_CONFIDENCE, Answer
+from accelstudy.planning.answer import Answer
 from accelstudy.planning.candidates import Candidate, shortest  # noqa: F401
 from accelstudy.planning.question import Question
 from accelstudy.planning.reasons import (  # noqa: F401
@@ -27,7 +27,8 @@ from accelstudy.sensors.models import NINE
 from accelstudy.sensors.sensor import SensorModel
 
 SENTENCES = "planning/wording.txt.j2"
-
+QUOTED = 0.95
+"""Share of the calibrations that is quoted where the rms is asked for."""
 
 HERE = sys.modules[__name__]
 
@@ -84,7 +85,7 @@ def _row(answer: Answer, rank: int, candidate: Candidate) -> list[str]:
         f"{candidate.hold:g}",
         f"{candidate.seconds / 60:.1f}",
         *cells,
-        f"{about}{amount(source.quantile_of_both(OTHER_CONFIDENCE), 'rad')}",
+        f"{about}{amount(source.quantile_of_both(QUOTED), 'rad')}",
         limits(answer.question, candidate),
     ]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from os import PathLike
@@ -34,7 +34,7 @@ from accelstudy.basics.units import (
 )
 from accelstudy.basics.wording import amount
 from accelstudy.design.search import round_directions
-from accelstudy.design.spaces import Mountings, attitudes
+from accelstudy.design.spaces import angles_to
 from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import new_file
 from accelstudy.pages.result import Result
@@ -49,10 +49,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 REFERENCE = "mclaren-24"
-PLACEMENT = np.radians(5.0)
-"""rad, sd about each of two axes by which a block held by hand misses its attitude."""
-MISPLACED_SETS = 200
-"""Number of simulated sets of misplaced positions."""
 
 
 class Design(Result):
@@ -82,10 +78,8 @@ class Design(Result):
         bounds.SIGMA_GRAVITY.check_key(key("gravity_sigma"), gravity_sigma)
         request = Request(noise=Noise(sigma, robot_sigma, gravity_sigma), **given)
         with stage("search"):
-            found, groups = request.search.optimum(request.starts), None
-            if isinstance(request.space, Mountings):
-                groups = _fewest_axes(request.space, found.directions)
-            order = field_order(request.task, found.directions, groups)
+            found = request.search.optimum(request.starts)
+            order = field_order(request.task, found.directions)
             return cls(request, found.directions[order], found.efficiency)
 
     @property
@@ -112,31 +106,9 @@ class Design(Result):
         return np.array([np.nan, *np.arccos(np.clip(cosines, -1, 1))])
 
     @cached_property
-    def axes(self) -> list[str] | None:
-        """Horizontal axis of each position's mounting, if mountings were asked for."""
-        space = self.request.space
-        if not isinstance(space, Mountings):
-            return None
-        chosen = _fewest_axes(space, self.directions)
-        return [" ".join(f"{c:g}" for c in space.axes[i]) for i in chosen]
-
-    @cached_property
     def rms(self) -> Array:
         """Expected rms of roll and of pitch, rad, (2,)."""
         return self.request.task.rms_tilt(self.directions)
-
-    @property
-    def rms_by_hand(self) -> Array | None:
-        """Rms of roll and of pitch, (2,), if a hand misses the attitudes; None without a hand."""
-        if self.request.attitudes != "hand":
-            return None
-        rng = np.random.default_rng(np.random.SeedSequence([self.request.seed, MISPLACED_SETS]))
-        missed = self.directions + PLACEMENT * rng.standard_normal(
-            (MISPLACED_SETS, *self.directions.shape)
-        )
-        missed /= np.linalg.norm(missed, axis=2, keepdims=True)
-        squares = [self.request.task.rms_tilt(directions) ** 2 for directions in missed]
-        return np.sqrt(np.mean(squares, axis=0))
 
     def nameable(self, directions: Array) -> dict[str, tuple[float, str]]:
         """Size from which each parameter of two rivals can be told from the other effect, SI."""
@@ -156,7 +128,7 @@ class Design(Result):
         """How it was made and how good it is, as plain data in the units of files."""
         request, noise = self.request, self.request.noise
         with angles_in("gon"):
-            constraints = request.constraints.texts
+            constraints = request.allowed.constraints
         content = {
             "version": __version__,
             "criterion": f"{request.chosen.name}: {request.chosen.text}",
@@ -166,7 +138,7 @@ class Design(Result):
             "sigma_mps2": tidy(noise.sigma_force, 6),
             "robot_sigma_mgon": tidy(noise.sigma_angle / MGON, 6),
             "gravity_sigma_mps2": tidy(noise.sigma_gravity, 6),
-            "attitudes": request.space.text,
+            "attitudes": request.allowed.text,
             "constraints": constraints,
             "prior": list(request.prior),
             "after": None if request.after is None else get_scheme(request.after).name,
@@ -183,8 +155,8 @@ class Design(Result):
     def to_frame(self) -> pd.DataFrame:
         """Return the positions, with angles in the unit that the names say."""
         unit = attitude_unit()
-        roll, pitch = to_attitude(attitudes(self.directions)).T
-        rows = pd.DataFrame(
+        roll, pitch = to_attitude(angles_to(self.directions)).T
+        return pd.DataFrame(
             {
                 "position": range(1, len(roll) + 1),
                 f"roll/{unit}": roll.round(2) + 0.0,
@@ -192,7 +164,6 @@ class Design(Result):
                 f"turn/{unit}": to_attitude(self.turns),
             }
         )
-        return rows.assign(**{"turned about": self.axes}) if self.axes else rows
 
     def table(self) -> str:
         """Return the positions as text."""
@@ -235,8 +206,6 @@ class Design(Result):
             f"\nExpected rms of leveling for tilts up to {tilt}, with {given}{effects}:"
         )
         yield f"  these {self.name}{after}: {_both(self.rms)}"
-        if (placed := self.rms_by_hand) is not None:
-            yield f"  if a hand misses them by 5° (sd per axis): {_both(placed)}"
         rms = request.task.rms_tilt(reference.directions)
         theirs = _both(rms) if np.isfinite(rms).all() else "do not determine the model"
         yield f"  the {reference.n_positions} of {REFERENCE}{after}: {theirs}"
@@ -270,12 +239,11 @@ class Design(Result):
 
     def write(self, file: Path, place: Path) -> None:
         """Write a file that becomes `place`, by which the scheme is named."""
-        extra = {"turn_about": self.axes} if self.axes else None
         name = path_name(place.stem, "scheme")
         kind = self.request.chosen.name
         kind = f"{kind}-optimal" if len(kind) == 1 else kind
         title, source = f"{name} ({kind})", f"accelstudy design, seed {self.request.seed}"
-        write_design(file, name, title, source, self.directions, self.provenance, extra)
+        write_design(file, name, title, source, self.directions, self.provenance)
 
 
 @contextmanager
@@ -293,21 +261,6 @@ def _both(rms: Any) -> str:
     return f"roll {roll:.2f} {unit}, pitch {pitch:.2f} {unit}"
 
 
-def _fewest_axes(space: Mountings, directions: Array) -> NDArray[np.int_]:
-    """Axis of each position, (n,), such that as few axes as possible serve all."""
-    axes = np.array(space.axes) / np.linalg.norm(space.axes, axis=1, keepdims=True)
-    fits = np.abs(directions @ axes.T) < 1e-6
-    left, chosen = np.ones(len(directions), dtype=bool), np.zeros(len(directions), dtype=int)
-    while left.any():
-        best = int(np.argmax(fits[left].sum(axis=0)))
-        taken = left & fits[:, best]
-        if not taken.any():
-            break
-        chosen[taken] = best
-        left &= ~taken
-    return chosen
-
-
 def write_design(
     path: Path,
     name: str,
@@ -315,7 +268,6 @@ def write_design(
     source: str,
     directions: Array,
     made: Mapping[str, Any],
-    columns: Mapping[str, Sequence[Any]] | None = None,
 ) -> None:
     """Write a scheme that `accelstudy.schemes.get_scheme` reads.
 
@@ -325,16 +277,10 @@ def write_design(
     name, title, source : str, of the scheme
     directions : (n, 3) array of unit vectors
     made : mapping, plain data: how it was made, and how good it is
-    columns : mapping of name to n values, optional, further columns of the positions
     """
-    roll, pitch = (to_recorded(attitudes(directions), "rad") / 1000).T
+    roll, pitch = (to_recorded(angles_to(directions), "rad") / 1000).T
     positions = [
-        {
-            "position": i + 1,
-            "roll_gon": _gon(roll[i]),
-            "pitch_gon": _gon(pitch[i]),
-            **{key: values[i] for key, values in (columns or {}).items()},
-        }
+        {"position": i + 1, "roll_gon": _gon(roll[i]), "pitch_gon": _gon(pitch[i])}
         for i in range(len(directions))
     ]
     content = {

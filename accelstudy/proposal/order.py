@@ -22,7 +22,7 @@ MAX_TOUR_RATIO = 1.15
 taken."""
 
 
-def field_order(task: Task, directions: Array, groups: Order | None = None) -> Order:
+def field_order(task: Task, directions: Array) -> Order:
     """Order positions (n, 3) for the field.
 
     The order is a round trip of small turns. The last position is near the first, so a steady
@@ -34,22 +34,15 @@ def field_order(task: Task, directions: Array, groups: Order | None = None) -> O
     ----------
     task : Task
     directions : (n, 3) array of unit vectors
-    groups : (n,) array, optional
-        Positions of one group (mounting) stay together.
     """
-    groups = np.zeros(len(directions), dtype=int) if groups is None else groups
     angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
-    members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
     rng = np.random.default_rng(np.random.SeedSequence(len(directions)))
-    trips: list[tuple[float, Order]] = []
-    for _ in range(TOURS):
-        parts = [_round_trip(angles, rng.permutation(group)) for group in members]
-        trips.append((sum(_length(angles, part) for part in parts), np.concatenate(parts)))
-    longest = MAX_TOUR_RATIO * min(length for length, _ in trips) + 1e-9
-    turns = range(len(directions) if len(members) == 1 else 1)
-    near = [[np.roll(tour, turn) for turn in turns] for length, tour in trips if length <= longest]
-    shown = np.concatenate([_drift_shown(task, directions[tours]) for tours in near])
-    return np.concatenate(near)[first_best(-shown)]
+    trips = [_round_trip(angles, rng.permutation(len(directions))) for _ in range(TOURS)]
+    lengths = np.array([_length(angles, trip) for trip in trips])
+    near = np.flatnonzero(lengths <= MAX_TOUR_RATIO * lengths.min() + 1e-9)
+    turns = range(len(directions))
+    orders = np.array([np.roll(trips[i], turn) for i in near for turn in turns])
+    return orders[first_best(-_drift_shown(task, directions[orders]))]
 
 
 def _length(angles: Array, tour: Order) -> float:

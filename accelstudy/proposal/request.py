@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -14,15 +14,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
 from accelstudy.design.criteria import CRITERIA, DISCRIMINATE, ROBUST, Criterion, get_criterion
 from accelstudy.design.search import STARTS, Search
-from accelstudy.design.spaces import (
-    Constraints,
-    Mountings,
-    Space,
-    Sphere,
-    attitudes_by_eye,
-    cube,
-    read_attitudes,
-)
+from accelstudy.design.spaces import Attitudes, attitudes_by_eye, cube, read_attitudes
 from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -33,7 +25,6 @@ from accelstudy.simulation.sessions import Noise
 SPACES = ("all", "cube", "hand")
 HAND_STEP = np.pi / 6
 """rad, step in which a person judges roll and pitch by eye."""
-MOUNTINGS = Range(1, 9)
 MOST_POSITIONS = Range(1, 300)
 
 
@@ -50,7 +41,6 @@ class Request:
     noise : Noise
     gravity : float, m/s²
     attitudes : str, of `SPACES`, or the path of a CSV file with those that are allowed
-    mountings : int, optional, how often the sensor may be mounted; each is turned about one axis
     roll, pitch : (least, most), rad, optional
     pole_distance, least_angle : float, rad, optional
     prior : tuple of str, parameters known before, as "bias=20mg" or "s_x=500ppm"
@@ -68,7 +58,6 @@ class Request:
     noise: Noise = field(default_factory=Noise)
     gravity: float = STANDARD_GRAVITY
     attitudes: str = "all"
-    mountings: int | None = None
     roll: tuple[float, float] | None = None
     pitch: tuple[float, float] | None = None
     pole_distance: float | None = None
@@ -142,33 +131,30 @@ class Request:
         return get_criterion(own, self.task)
 
     @cached_property
-    def space(self) -> Space:
-        """The attitudes to choose from."""
-        if self.mountings is not None:
-            if self.attitudes != "all":
-                raise InputError("mountings: need all attitudes; leave out `attitudes`")
-            MOUNTINGS.check_key("mountings", self.mountings)
-            return Mountings(self.mountings)
+    def allowed(self) -> Attitudes:
+        """The attitudes to choose from, and what constrains the positions."""
         if self.attitudes == "all":
-            return Sphere()
-        if self.attitudes == "cube":
-            return cube()
-        if self.attitudes == "hand":
-            return attitudes_by_eye(HAND_STEP)
-        if self.attitudes.endswith(".csv") or "/" in self.attitudes:
-            return read_attitudes(Path(self.attitudes))
-        raise UnknownNameError("attitudes", self.attitudes, (*SPACES, "a path ending in .csv"))
-
-    @cached_property
-    def constraints(self) -> Constraints:
-        """The constraints on the positions."""
-        return Constraints(self.roll, self.pitch, self.pole_distance, self.least_angle)
+            chosen = Attitudes()
+        elif self.attitudes == "cube":
+            chosen = cube()
+        elif self.attitudes == "hand":
+            chosen = attitudes_by_eye(HAND_STEP)
+        elif self.attitudes.endswith(".csv") or "/" in self.attitudes:
+            chosen = read_attitudes(Path(self.attitudes))
+        else:
+            raise UnknownNameError("attitudes", self.attitudes, (*SPACES, "a path ending in .csv"))
+        return replace(
+            chosen,
+            roll=self.roll,
+            pitch=self.pitch,
+            pole_distance=self.pole_distance,
+            least_angle=self.least_angle,
+        )
 
     @property
     def search(self) -> Search:
         """The search for the positions."""
-        at = self.positions, self.space, self.constraints, self.seed
-        return Search(self.task, self.chosen, *at)
+        return Search(self.task, self.chosen, self.positions, self.allowed, self.seed)
 
 
 def _split_size(text: str, key: str, needs_size: bool = True) -> tuple[str, str]:

@@ -8,7 +8,7 @@ sensor is what is known of each beforehand. Both are designs of one step at a ti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON
 from accelstudy.design.information import Information
-from accelstudy.design.spaces import Constraints, attitudes_by_eye, cube, read_attitudes
+from accelstudy.design.spaces import attitudes_by_eye, cube, read_attitudes
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import Promise
@@ -60,15 +60,15 @@ def candidate_positions(
         If there is no such set, the file cannot be read, or nothing is left.
     """
     if name == "cube":
-        directions = cube().directions(0)
+        chosen = cube()
     elif name == "grid":
-        directions = attitudes_by_eye(GRID_STEP).directions(0)
+        chosen = attitudes_by_eye(GRID_STEP)
     elif name.endswith(".csv"):
-        directions = read_attitudes(Path(name)).directions(0)
+        chosen = read_attitudes(Path(name))
     else:
         raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
     roll, pitch = (None if most is None else (-most, most) for most in (max_roll, max_pitch))
-    left = Constraints(roll, pitch, pole_distance).keep(directions)
+    left = replace(chosen, roll=roll, pitch=pitch, pole_distance=pole_distance).sample(0)
     if not len(left):
         raise InputError(f"attitudes: none of {name} is within the limits that are given")
     # Simple attitudes first: with vertical axes, then with horizontal ones.

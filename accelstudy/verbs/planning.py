@@ -127,7 +127,6 @@ def find_positions(
     attitudes: Annotated[
         str, Names("attitudes", "accelstudy.proposal.request", "SPACES", True)
     ] = "all",
-    mountings: Annotated[int, Range(1, 9)] | None = None,
     roll: tuple[HalfTurn, HalfTurn] | None = None,
     pitch: tuple[QuarterTurn, QuarterTurn] | None = None,
     pole_distance: Annotated[Quantity, angle(0.0, 100 * GON)] | None = None,
@@ -168,8 +167,6 @@ def find_positions(
     attitudes : str
         Those to choose from: all; cube: on faces, edges and corners; hand: in steps of 30° that an
         eye can judge; or a CSV file of those that are allowed.
-    mountings : int
-        How often the sensor may be mounted; each mounting is turned about one horizontal axis.
     roll : two of float in rad, or str with a unit
         Least and largest roll.
     pitch : two of float in rad, or str with a unit

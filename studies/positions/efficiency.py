@@ -15,7 +15,7 @@ from accelstudy.basics.units import display_unit, to_display
 from accelstudy.design.continuous import continuous_optimum
 from accelstudy.design.criteria import get_criterion
 from accelstudy.design.search import Search
-from accelstudy.design.spaces import Constraints, Sphere
+from accelstudy.design.spaces import Attitudes
 from accelstudy.design.task import Task
 from accelstudy.drawing.style import FULL, INK, approach_colour, log_ticks, new_figure
 from accelstudy.schemes import Scheme, get_scheme, scheme_names
@@ -54,7 +54,7 @@ def efficiency_table(
         criteria = {name: get_criterion(name, task) for name in CRITERIA}
         # For shares that sum to one position; n positions have n times the information.
         bounds = {
-            name: continuous_optimum(task, criterion, Sphere(), Constraints(), 1).bound
+            name: continuous_optimum(task, criterion, Attitudes(), 1).bound
             for name, criterion in criteria.items()
         }
         shown = {scheme.title: scheme.directions for scheme in schemes}

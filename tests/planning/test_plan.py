@@ -20,7 +20,7 @@ from usual import NINE, G
 from accelstudy.basics.units import GON, MGON, angles_in
 from accelstudy.data_sheets import DataSheet, data_sheet_names, get_data_sheet, sheet_of_sigma
 from accelstudy.design.continuous import continuous_optimum
-from accelstudy.design.spaces import Constraints, Sphere
+from accelstudy.design.spaces import Attitudes
 from accelstudy.files.tables import read_origin, read_table
 from accelstudy.leveling.error import cap_forces, leveling_error
 from accelstudy.pages import render_lines
@@ -151,7 +151,6 @@ def test_the_answer_is_the_cheapest_that_reaches_the_target(plan):
     assert times == sorted(times)
     kinds = {(r.equipment, r.model.name) for r in plan.ranked}
     assert len(kinds) == len(plan.ranked)
-    assert 60 < plan.stricter.scheme.n_positions < 90
 
 
 def test_simulation_agrees_with_linear_theory(plan):
@@ -361,7 +360,7 @@ def test_one_position_less_does_not_suffice(plan):
     value, error = rms(by_hand(kind.best(n - 1).scheme.directions, 30 * GON))
     assert value > 10 * MGON + 2 * error
     request = kind.request(n - 1)
-    optimum = continuous_optimum(request.task, request.chosen, Sphere(), Constraints(), n - 1)
+    optimum = continuous_optimum(request.task, request.chosen, Attitudes(), n - 1)
     assert np.exp(optimum.bound / 2) > 10 * MGON
     assert f"{n - 1} positions leave" in part_lines("answer", plan)[2]
 
