@@ -256,11 +256,6 @@ def error_as_line(name: str, *own: Path) -> Iterator[None]:
     """
     try:
         yield
-    except SyntaxError as error:
-        file = "" if error.filename in (name, None) else f"{Path(error.filename).name}, "
-        raise InputError(
-            f"{name}: {file}line {error.lineno}: not valid Python: {error.msg}"
-        ) from None
     except KeyboardInterrupt:
         raise
     except BaseException as error:
@@ -272,19 +267,3 @@ def error_as_line(name: str, *own: Path) -> Iterator[None]:
                 where += f"line {frame.lineno}: "
         what = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
         raise InputError(f"{name}: {where}{' '.join(what.split())}") from None
-
-
-@contextmanager
-def errors_as_lines() -> Iterator[None]:
-    """Turn whatever the code of a loaded file raises while it is used into one line."""
-    try:
-        yield
-    except (InputError, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        guilty = next((f.filename for f in reversed(frames) if f.filename in _files), None)
-        if guilty is None:
-            raise
-        with error_as_line(guilty, Path(guilty)):
-            raise

@@ -68,9 +68,7 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the chosen command."""
-        from accelstudy.basics.plugins import errors_as_lines  # which help does without
-
-        with interruptible(), errors_as_lines():
+        with interruptible():
             return super().invoke(ctx)
 
 
