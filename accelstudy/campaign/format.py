@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import yaml
 from numpy.typing import NDArray
 
@@ -19,17 +18,16 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.gross_errors.recognition import check_plausible
-from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MAX_CELL, TABLES, Header
+from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MAX_CELL, TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
-from accelstudy.files.parquet import whole_parquet, write_parquet
 from accelstudy.files.reading import overlay, read_layer, read_text
 from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import usual_norm
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[Any]]
-"""The table of positions as it is in its file, by name: text from CSV, values from Parquet."""
+"""The table of positions by name: texts of its file, or numbers that are to be written."""
 
 MOST_NAMED = 5
 """Largest number of unknown columns with a warning each."""
@@ -54,7 +52,7 @@ _OF_HEADER = {
 def read_campaign(
     folder: str | Path, given: Mapping[str, Any] | None = None, *, plausible: bool = True
 ) -> Campaign:
-    """Read a campaign folder: `campaign.yaml` and `positions.csv` or `positions.parquet`.
+    """Read a campaign folder: `campaign.yaml` and `positions.csv`.
 
     With ``unit: g`` forces are multiples of standard gravity, 9.80665 m/s². This unit is the same
     everywhere, while `gravity` is the local value. If the data are scaled so that local gravity is
@@ -81,14 +79,8 @@ def read_campaign(
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(
-            f"{folder}: no such folder; a campaign is a folder with {HEADER} and "
-            f"{' or '.join(TABLES)}"
-        )
-    header = read_header(folder, given)
-    path = find_table(folder)
-    if path is None:
-        raise InputError(f"{folder}: no table of positions; expected either {' or '.join(TABLES)}")
+        raise InputError(f"{folder}: no such folder; a campaign is one with {HEADER} and {TABLE}")
+    header, path = read_header(folder, given), folder / TABLE
     columns, warnings = read_positions(path)
     campaign = parse_table(columns, header, path, plausible)
     return replace(campaign, warnings=tuple(warnings))
@@ -100,36 +92,16 @@ def read_header(folder: Path, given: Mapping[str, Any] | None = None) -> Header:
     return validate(Header, overlay(read_layer(path), given or {}), path)
 
 
-def find_table(folder: Path) -> Path | None:
-    """Table of positions in a campaign folder; None if there is none, an error if there are two."""
-    tables = [folder / name for name in TABLES if (folder / name).exists()]
-    if len(tables) > 1:
-        raise InputError(
-            f"{folder}: two tables of positions; expected either {' or '.join(TABLES)}"
-        )
-    return tables[0] if tables else None
-
-
 def read_positions(path: Path) -> tuple[Columns, list[str]]:
-    """Read the columns of a table, as text from CSV and as values from Parquet.
-
-    Returns
-    -------
-    columns : mapping of name to values
-    warnings : list of str
+    """Read the columns of a table, and warnings about them.
 
     Raises
     ------
     InputError
         If the file is missing or incomplete, or a column occurs twice.
     """
-    if path.suffix != ".csv":
-        with whole_parquet(path) as file:
-            names = [str(name) for name in file.schema_arrow.names]
-            _check_names(names, path)
-            table = file.read(columns=[name for name in names if name in KNOWN])
-            of_parquet = {n: table[n].to_pylist() if n in KNOWN else () for n in names}
-        return of_parquet, ignored_in(of_parquet, path)
+    if not path.exists() and path.with_suffix(".parquet").exists():
+        raise InputError(f"{path}: no such file; save {path.stem}.parquet as CSV")
     try:
         text = read_text(path)
     except UnicodeDecodeError as error:
@@ -173,7 +145,9 @@ def columns_of(text: str, path: Path) -> Columns:
                 f"{path}: line {line}: {len(row)} values for {len(names)} columns; "
                 "is the file whole?"
             )
-    _check_names(names, path)
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: {name!r}: the column stands twice")
     return {name: [row[i] for _, row in lines[1:]] for i, name in enumerate(names)}
 
 
@@ -181,18 +155,7 @@ def _not_whole(path: Path, error: Exception) -> InputError:
     return InputError(f"{path}: not a whole CSV file in UTF-8 ({one_line(error)})")
 
 
-def _check_names(names: Sequence[str], path: Path) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"{path}: {name!r}: the column stands twice")
-
-
-def write_campaign(
-    campaign: Campaign,
-    folder: str | Path,
-    table: Literal["csv", "parquet"] = "csv",
-    plausible: bool = True,
-) -> None:
+def write_campaign(campaign: Campaign, folder: str | Path, plausible: bool = True) -> None:
     """Write a campaign folder, in the unit that the campaign had.
 
     Parameters
@@ -200,9 +163,7 @@ def write_campaign(
     campaign : Campaign
         Its `warnings` are not written.
     folder : path
-        Made if it does not exist. A table of positions in it is replaced, be it CSV or Parquet;
-        other files stay.
-    table : "csv" or "parquet"
+        Made if it does not exist; other files in it stay.
     plausible : bool
         As in `read_campaign`.
 
@@ -213,21 +174,15 @@ def write_campaign(
         written.
     """
     folder = Path(folder)
-    path = folder / f"positions.{table}"
+    path = folder / TABLE
     header = validate(Header, _content_of(campaign), folder / HEADER)
     columns = _columns_of(campaign.with_left_out, header)
     parse_table(columns, header, path, plausible)
     try:
-        with whole_file(path) as temporary:
-            if table == "csv":
-                with temporary.open("w", newline="", encoding="utf-8") as file:
-                    writer = csv.writer(file, lineterminator="\n")
-                    writer.writerow(columns)
-                    writer.writerows(zip(*columns.values(), strict=True))
-            else:
-                write_parquet(temporary, pa.table(columns))
-        for name in set(TABLES) - {path.name}:
-            (folder / name).unlink(missing_ok=True)
+        with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*columns.values(), strict=True))
         with whole_file(folder / HEADER) as temporary:
             content = header.model_dump(mode="json", exclude_none=True)
             text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
@@ -370,13 +325,13 @@ def _numbers(columns: Columns, name: str, labels: Sequence[str], path: Path) -> 
     numbers = np.empty(len(values))
     for i, value in enumerate(values):
         where = f"{path}: {name}: {labels[i] if labels else f'row {i + 1}'}"
-        if value is None or value == "":
+        if value == "":
             raise InputError(f"{where}: empty; expected a number")
         try:
-            if isinstance(value, bool) or "_" in str(value):
+            if "_" in str(value):
                 raise ValueError
             numbers[i] = float(value)
-        except (TypeError, ValueError, OverflowError):
+        except ValueError:
             shown = one_line(repr(value), 60)
             raise InputError(f"{where}: {shown} is no number, such as -9.81") from None
         if not np.isfinite(numbers[i]):

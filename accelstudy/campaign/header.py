@@ -43,7 +43,7 @@ from accelstudy.sensors.frames import Frame, parse_frame
 Array = NDArray[np.float64]
 
 HEADER = "campaign.yaml"
-TABLES = ("positions.csv", "positions.parquet")
+TABLE = "positions.csv"
 
 MAX_CELL = 1e12
 """Larger than any measured value in any unit; squares and cubes of smaller ones stay finite."""

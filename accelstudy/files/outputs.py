@@ -63,7 +63,7 @@ CALIBRATION = OutputKind(
 CAMPAIGN = OutputKind(
     "campaign",
     "campaign.yaml",
-    ("positions.csv", "positions.parquet", "segmentation.svg", "segmentation.png"),
+    ("positions.csv", "segmentation.svg", "segmentation.png"),
     replaced=False,
 )
 COMPARISON = OutputKind(

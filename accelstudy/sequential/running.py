@@ -12,13 +12,11 @@ from accelstudy.basics.errors import InputError
 from accelstudy.campaign.format import (
     campaign_of,
     columns_of,
-    find_table,
     ignored_in,
     parse_table,
-    read_campaign,
     read_header,
 )
-from accelstudy.campaign.header import HEADER, Header
+from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
 
@@ -60,17 +58,15 @@ def read_running(folder: str | Path, settled: bool = False) -> Running:
             f"{folder}: no such folder; a running session has one with {HEADER}, and its positions "
             "in positions.csv"
         )
-    header, path = read_header(folder), find_table(folder)
-    if path is not None and path.suffix != ".csv":
-        return Running(read_campaign(folder), "")
+    header, path = read_header(folder), folder / TABLE
     try:
-        text = "" if path is None else read_text(path)
+        text = read_text(path) if path.exists() else ""
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
     end = len(text) if settled else max(text.rfind("\n"), text.rfind("\r")) + 1
     whole, unfinished = text[:end], text[end:]
-    columns = columns_of(whole, path) if path and whole.strip() else {}
-    if path is None or not any(map(len, columns.values())):
+    columns = columns_of(whole, path) if whole.strip() else {}
+    if not any(map(len, columns.values())):
         return Running(_without_positions(header), unfinished)
     campaign = parse_table(columns, header, path)
     warnings = tuple(ignored_in(columns, path))
@@ -147,8 +143,7 @@ class Watch:
 
 def _files(folder: Path) -> list[Path]:
     """Files of a campaign that exist."""
-    found = [folder / HEADER, find_table(folder)] if folder.is_dir() else []
-    return [path for path in found if path is not None and path.is_file()]
+    return [path for path in (folder / HEADER, folder / TABLE) if path.is_file()]
 
 
 def _first(campaign: Campaign, n: int) -> Campaign:

@@ -131,7 +131,6 @@ OF_CAMPAIGN = ["calibrate FOLDER --out OUT",
 READ_BY = {
     "campaign/campaign.yaml": OF_CAMPAIGN, "campaign/positions.csv": OF_CAMPAIGN,
     "counts/campaign.yaml": ["effects --campaign FOLDER"],
-    "parquet/positions.parquet": ["effects --campaign FOLDER"],
     "calibration.json": [
         "apply FILE WHOLE/log.csv --out OUT.csv", "compare WHOLE/calibration.json FILE --out OUT",
         *(f"export FILE --form {form}" for form in ("c", "px4")),
@@ -151,7 +150,6 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     robot = acs.simulate_campaign(n_samples=5, temperature=(10, 40), yaw="random")
     write_campaign(robot, folder / "campaign")
-    write_campaign(robot, folder / "parquet", "parquet")
     write_campaign(replace(robot, unit="counts", nominal=COUNTS), folder / "counts")
     document = acs.calibrate(simulated_campaign(TRUTH), approach="gravity").content
     (folder / "calibration.json").write_text(json.dumps(document), encoding="utf-8")

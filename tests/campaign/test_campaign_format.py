@@ -7,8 +7,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 import yaml
 from calling import refused
@@ -128,17 +126,11 @@ def campaigns(draw):
     )  # fmt: skip
 
 
-@given(campaigns(), st.sampled_from(["csv", "parquet"]))
-def test_what_is_written_is_read_again(written, table):
+@given(campaigns())
+def test_what_is_written_is_read_again(written):
     with TemporaryDirectory() as folder:
-        write_campaign(written, folder, table)
+        write_campaign(written, folder)
         assert_same(read_campaign(folder), written)
-
-
-def test_one_table_replaces_the_other(tmp_path):
-    for table in ("csv", "parquet", "csv"):
-        write_campaign(campaign(name=table), tmp_path, table)
-        assert read_campaign(tmp_path).name == table
 
 
 def test_units_of_the_file(tmp_path):
@@ -249,16 +241,13 @@ def forces(new):
 
 
 def test_unknown_columns_are_named_and_left_out(tmp_path):
-    table = changed(tmp_path, {"temperature_degc": always("20"), "note": always("x")})
-    of_csv = read_campaign(tmp_path)
-    (tmp_path / "positions.csv").unlink()
-    pq.write_table(pa.table(table), tmp_path / "positions.parquet")
-    for read in (of_csv, read_campaign(tmp_path)):
-        assert_same(replace(read, warnings=()), campaign())
-        first, second = read.warnings
-        assert "'temperature_degc'" in first
-        assert "did you mean 'temperature_degC'" in first
-        assert "'note'" in second
+    changed(tmp_path, {"temperature_degc": always("20"), "note": always("x")})
+    read = read_campaign(tmp_path)
+    assert_same(replace(read, warnings=()), campaign())
+    first, second = read.warnings
+    assert "'temperature_degc'" in first
+    assert "did you mean 'temperature_degC'" in first
+    assert "'note'" in second
 
 
 NO_NUMBER = {
@@ -289,23 +278,9 @@ def test_a_wrong_cell_of_any_column_is_said_with_its_place(tmp_path, name):
         read_campaign(tmp_path)
 
 
-@pytest.mark.parametrize(("value", "part"), [
-    ("a", "position 1: 'a' is no number"), (None, "position 1: empty"),
-    (True, "position 1: True is no number"), ([1.0], "position 1: [1.0] is no number"),
-    (np.nan, "position 1: nan is not finite"),
-])  # fmt: skip
-def test_a_wrong_cell_in_parquet(tmp_path, value, part):
-    table = changed(tmp_path, {"fx": always(value)})
-    (tmp_path / "positions.csv").unlink()
-    pq.write_table(pa.table(table), tmp_path / "positions.parquet")
-    with refused(f"positions.parquet: fx: {part}"):
-        read_campaign(tmp_path)
-
-
 FILES = {
     "no header": ("campaign.yaml", None, "campaign.yaml", "no such file"),
-    "no table": ("positions.csv", None, "no table", "positions.csv or positions.parquet"),
-    "two tables": ("positions.parquet", b"", "two tables", "either positions.csv or"),
+    "no table": ("positions.csv", None, "positions.csv", "no such file"),
     "empty": ("positions.csv", b"", "empty", "position, fx, fy, fz"),
     "names only": ("positions.csv", b"position,fx,fy,fz\n", "no positions"),
     "cut": ("positions.csv", b"position,fx,fy,fz\n1,2,3,4\n2,3", "line 3: 2 values for 4 columns"),
@@ -328,17 +303,12 @@ def test_a_wrong_file_is_one_line(tmp_path, name, content, parts):
         read_campaign(tmp_path)
 
 
-def test_a_folder_or_a_parquet_file_that_is_none(tmp_path):
+def test_a_folder_that_is_none_or_has_another_table(tmp_path):
     with refused("no such folder", "campaign.yaml and positions.csv"):
         read_campaign(tmp_path / "none")
-    write_campaign(campaign(), tmp_path, "parquet")
-    path = tmp_path / "positions.parquet"
-    table, content = pq.read_table(path), path.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    with refused("positions.parquet: not a whole Parquet file"):
-        read_campaign(tmp_path)
-    pq.write_table(table.append_column("fx", table["fx"]), path)
-    with refused("'fx': the column stands twice"):
+    write_campaign(campaign(), tmp_path)
+    (tmp_path / "positions.csv").rename(tmp_path / "positions.parquet")
+    with refused("positions.csv: no such file; save positions.parquet as CSV"):
         read_campaign(tmp_path)
 
 

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import matches, path_name
-from accelstudy.campaign.header import HEADER, TABLES
+from accelstudy.campaign.header import HEADER, TABLE
 from accelstudy.campaign.importing.public import import_settings
 from accelstudy.campaign.importing.settings import GravitySettings, ImportSettings
 from accelstudy.config_names import KnownModel
@@ -80,7 +80,7 @@ class Entry(ConfigSection):
 
     def files(self) -> list[str]:
         """Existing files on which the result depends; none for public data."""
-        names = (HEADER, *TABLES) if self.kind == "campaign" else ("",)
+        names = (HEADER, TABLE) if self.kind == "campaign" else ("",)
         paths = [Path(self.source, name) for name in names] if self.public is None else []
         return [str(path) for path in paths if path.is_file()]
 
