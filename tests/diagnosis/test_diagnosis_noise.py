@@ -7,12 +7,11 @@ import pytest
 from diagnosis_helpers import least, most
 from quality_helpers import SIGMA, draw, one, solutions
 from scipy import stats
-from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS, G
+from usual import BOTH, GRAVITY, NINE, ROBOT, G
 
 from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.evidence.noise_tests import (
-    axis_factors,
     axis_test,
     colour_test,
     level_test,
@@ -145,25 +144,6 @@ def test_holds_that_say_nothing_of_their_noise_accuse_nothing():
     ):
         assert nothing.p_value == 1
         assert np.isfinite(nothing.statistic)
-
-
-@pytest.mark.parametrize(("approach", "scheme", "kappa", "sigma_angle"), [
-    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), Noise().sigma_angle),
-    (ROBOT, "mclaren-24", (0.6, 1.0, 3.0), Noise().sigma_angle),
-    (ROBOT, "mclaren-24", (1.0, 1.0, 1.0), 2e-4),  # as large as the noise of the forces
-    (GRAVITY, "fibonacci-96", (0.9, 1.0, 2.0), Noise().sigma_angle),
-])  # fmt: skip
-def test_variance_factors_of_the_axes_are_unbiased(approach, scheme, kappa, sigma_angle):
-    """Gravity takes many positions, so that none of the estimates is cut at 0."""
-    x, y, z = kappa
-    residuals, _ = sessions(
-        approach, f"axis_noise(kappa_x={x}, kappa_y={y}, kappa_z={z})", seed=10, scheme=scheme,
-        runs=300, sigma_angle=sigma_angle,
-    )  # fmt: skip
-    factors = np.array([axis_factors(r) for r in residuals])
-    assert np.mean(factors == 0) < 1e-2
-    error = factors.std(axis=0) / np.sqrt(len(factors))
-    assert np.all(np.abs(factors.mean(axis=0) - kappa) < STANDARD_ERRORS * error)
 
 
 # --- something is wrong --------------------------------------------------------------------------

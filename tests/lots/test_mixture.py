@@ -182,29 +182,6 @@ def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     assert joint.spec == "effect"
 
 
-def test_sizes_of_the_type_say_which_sensors_have_it():
-    """Of what is said with a probability of p, a part p is so, and intervals hold the share."""
-    rng, said, true, inside, n = np.random.default_rng(9), [], [], [], 60
-    first = NAMES[0]
-    for _ in range(n):
-        share = 1.0 if rng.random() < PRIOR_ALL else rng.random()
-        lacks = rng.random(20) < share
-        sizes = np.zeros((20, 3))
-        sizes[:, 0] = 0.43 * (1 + 0.25 * rng.standard_normal(20)) * lacks
-        *_, of_lot = type_of(rng, sizes)
-        alone = replace(of_lot, asked=[(first,)]).sets
-        mixture = mixture_of(np.zeros((20, 1)), typical=alone)
-        said += mixture.having(first).tolist()
-        true += lacks.tolist()
-        _, low, high = mixture.share(first)
-        inside.append(low <= share <= high)
-    assert_so_often(said, true, ((0.0, 0.2), (0.8, 1.0)), 0.05)
-    assert np.mean(inside) > 0.95 - STANDARD_ERRORS * np.sqrt(0.0475 / n)
-    right = (np.array(said) > 0.5) == np.array(true)
-    # With sizes that are known, and as many sensors with it as without: Φ(√λ/2).
-    assert np.mean(right) > stats.norm.cdf(np.sqrt(ROWS) * 0.43 / 2) - 0.03
-
-
 def test_odds_are_the_integral_over_the_sizes_of_the_type():
     _, _, _, sizes = two_effects(np.random.default_rng(1))
     both = NAMES[:2]

@@ -23,7 +23,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.study.config import parse_study
 
 NINE = "bias-scale-nonorthogonality"
-HIDDEN = f"{NINE}+warm_up(tau=400)+thermal_bias"
 
 
 TURNED = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from calling import refused
 from scipy import stats
-from study_helpers import NINE, grid, make_cells, make_study, run_study, simulated
+from study_helpers import NINE, grid, make_cells, make_study, simulated
 
 from accelstudy.basics.units import MGON, STANDARD_GRAVITY
 from accelstudy.effects import get_effect
@@ -99,24 +99,6 @@ def test_cells_know_their_holds():
     plain = make_cells(grid(), seed=8)[f"{NINE}/mclaren-24/robot"]
     other = make_cells(grid(), seed=8, holds=HOLDS)[f"{NINE}/mclaren-24/robot"]
     assert tuple(plain.seed(1, 0).generate_state(2)) != tuple(other.seed(1, 0).generate_state(2))
-
-
-def test_a_study_of_effects_that_depend_on_the_holds(tmp_path):
-    """With the effects the calibration is as linear theory says, and without it is off."""
-    tables = run_study(
-        tmp_path, models={"mine": MINE}, holds=HOLDS, sensor=SENSOR, simulated_effects=MINE,
-        grids=[grid(["mine", NINE], approaches="robot", replicates=300)],
-    )  # fmt: skip
-    summary = tables["summary"]
-    full = summary[summary["model"] == "mine"]
-    assert len(full) == 17
-    assert np.abs(full["sd_empirical"] / full["sd_linear"] - 1).max() < 4.5 / math.sqrt(600)
-    error = full["sd_linear"] / math.sqrt(300)
-    assert (np.abs(full["bias"]) < 4.5 * error).all()
-    short = summary[(summary["model"] == NINE) & summary["parameter"].isin(["b_x", "b_y", "b_z"])]
-    assert (np.abs(short["bias"]) > 20 * short["sd_linear"]).all()
-    leveling = tables["leveling"].set_index("model")
-    assert leveling["pitch_rms_mgon"][NINE] > 5 * leveling["pitch_rms_mgon"]["mine"]
 
 
 @pytest.mark.parametrize("name", ["vibration_rectification", "hysteresis", "encoder_scale"])
