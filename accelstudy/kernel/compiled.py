@@ -64,10 +64,8 @@ def _machine() -> Any:
 
 
 def _compiled(text: str, machine: Any) -> bytes:
-    module = llvm.parse_assembly(text)
-    options = llvm.create_pipeline_tuning_options(speed_level=2)
-    # The text has the vectors already, and its loops are long.
-    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
-    builder = llvm.create_pass_builder(machine, options)
-    builder.getModulePassManager().run(module, builder)
-    return bytes(machine.emit_object(module))
+    """Machine code of a text, whose vectors and sums are written as they should be computed.
+
+    LLVM's passes would take twice as long as all else, and make the code of large models slower.
+    """
+    return bytes(machine.emit_object(llvm.parse_assembly(text)))

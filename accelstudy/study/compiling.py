@@ -25,12 +25,12 @@ from accelstudy.basics.errors import InputError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.study.cell import Cell
 
-POSITIONS_PER_PARAMETER = 20_000
+POSITIONS_PER_PARAMETER = 5_000
 """Positions of all calibrations together, per parameter, from which on compilation saves time.
 
 Measured on one core of a virtual x86-64 server of 2026 with nothing kept on disk: compilation takes
-0.3 s more than NumPy's formulas for 9 parameters, 0.6 s for 12 and 1.2 s for 15; it saves 1.6 µs,
-2.6 µs and 4.6 µs a position with a robot.
+0.1 s more than NumPy's formulas for 12 parameters and 0.3 s for 15, and saves 2.6 µs and 3.8 µs a
+position with a robot.
 """
 
 
