@@ -93,17 +93,6 @@ def test_a_misfit_counts_in_omega():
         assert np.corrcoef(column, expected[:, i])[0, 1] > 0.999
 
 
-def test_a_prior_has_no_error_of_its_own():
-    """The coefficients of a learned function are zero a priori, and so they are in each session."""
-    model = get_model("bias-scale-nonorthogonality+learned(coordinate=order, low=1, high=24)")
-    ideal, _, theory = theory_of("gravity", Noise(), model)
-    assert not theory.chi_squared
-    found, _ = theory.errors(ideal.errors(Noise(), 20_000, np.random.default_rng(4)).force)
-    np.testing.assert_allclose(found.std(axis=0) ** 2, np.diag(theory.covariance), rtol=0.06)
-    assert (theory.sigma**2 >= np.diag(theory.covariance) * (1 - 1e-9)).all()
-    assert (theory.sigma**2 > 1.2 * np.diag(theory.covariance)).any()
-
-
 def test_what_has_no_calibration_has_no_linear_theory():
     ideal = session(NINE, TRUTH, SCHEME.directions)
     observed = ideal.observations(Noise())

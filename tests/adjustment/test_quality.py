@@ -18,7 +18,6 @@ from usual import BOTH, GRAVITY, NINE, ROBOT, STANDARD_ERRORS
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import (
     global_test,
-    held_out,
     holm,
     noncentrality,
     position_tests,
@@ -282,17 +281,3 @@ def test_no_error_of_the_robot_in_the_ellipsoid_does_more():
     largest = np.abs(effect).max(axis=1)
     assert np.all(largest <= found.parameters[position] * (1 + 1e-9))
     assert np.all(largest > 0.95 * found.parameters[position])
-
-
-def test_nothing_is_detectable_without_redundancy():
-    observed = draw(1, "d-optimal-9")
-    solution = solve(NINE, GRAVITY, observed)
-    found, tests = reliability(solution), position_tests(solution)
-    for values in (found.mdb, found.parameters, found.leveling):
-        assert np.isinf(values).all()
-    assert (tests.dof == 0).all()
-    for values in (tests.p_known, tests.p_unknown, tests.p_adjusted()):
-        assert np.isnan(values).all()
-    assert tests.worst() is None
-    assert suspects(NINE, GRAVITY, observed) == ()
-    assert held_out(solution) is None

@@ -31,18 +31,6 @@ def design(scheme, model=NINE, approach=GRAVITY, **more):
 # --- ranks and reasons ---------------------------------------------------------------------------
 
 
-def test_six_faces_do_not_see_the_angles_between_the_axes():
-    found = design("faces-6")
-    assert found.rank == 6
-    assert found.not_estimable == ANGLES
-    assert not found.estimable
-    assert found.condition == np.inf
-    assert found.redundancy == -3
-    assert "rank 6 of 9" in found.reason
-    assert "these positions" in found.reason
-    assert np.isnan(found.sigma).all()
-
-
 def test_six_faces_determine_six_parameters_without_redundancy():
     found = design("faces-6", get_model("bias-scale"))
     assert found.estimable

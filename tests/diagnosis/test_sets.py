@@ -95,18 +95,6 @@ def test_pairs_are_close_to_those_over_all_shapes(problem):
         assert found[names].log_density == pytest.approx(log, abs=0.8)
 
 
-@pytest.mark.parametrize("problem", [ROBOT], indirect=True)
-def test_three_effects_are_found_where_each_is_large(problem):
-    shapes, residuals, evidence = problem
-    rng, names = np.random.default_rng(6), ("warm_up", "scale_asymmetry", "base_tilt")
-    for _ in range(5):
-        added = 12 * sum(shapes[n][0].basis @ rng.standard_normal(shapes[n][0].dim) for n in names)
-        changed = replace(residuals, errors=added + rng.standard_normal(len(added)))
-        found = weigh_sets(shapes, changed, evidence)
-        best = max(found, key=lambda s: s.log_density + set_prior(len(s.best), len(shapes)))
-        assert {h.name for h in best.best} == {*names}
-
-
 def test_of_many_positions_those_that_explain_most_are_tried(problem, monkeypatch):
     shapes, residuals, _ = problem
     monkeypatch.setattr(sets, "RULES", replace(RULES, set_positions=4))

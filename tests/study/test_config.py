@@ -199,13 +199,6 @@ def test_names_become_the_things_that_they_name():
     assert study.grids[0].approaches == [get_approach(name) for name in approach_names()]
     assert study.sensitivity.model is mine
     assert study.noise.effects == [get_noise_effect("heavy_tails(nu=5)")]
-    written = study.model_dump(mode="json")
-    assert written["models"] == own
-    assert written["grids"][0]["models"] == ["mine", NINE]
-    assert written["grids"][0]["approaches"] == list(approach_names())
-    assert written["simulated_effects"] == ["model"]
-    assert written["sensitivity"]["scheme"] == "mclaren-24"
-    assert written["noise"]["effects"] == ["heavy_tails(nu=5)"]
     # Nobody else's configuration has that model.
     with pytest.raises(InputError, match=r"grids\.0\.models: unknown model 'mine'"):
         make_study(grids=[used])
@@ -219,10 +212,8 @@ def test_numbers_as_yaml_1_1_reads_them():
 
 @pytest.mark.parametrize(("effect", "values", "unit", "expected"), [
     ("bias", [1, 2, 3], "mm/s^2", [1e-3, 2e-3, 3e-3]),
-    ("bias", [1, 0, -1], "mg", [9.80665e-3, 0, -9.80665e-3]),
     ("scale", [1, 2, 3], "%", [0.01, 0.02, 0.03]),
     ("nonorthogonality", [1, 2, 3], "gon", [GON, 2 * GON, 3 * GON]),
-    ("nonorthogonality", [180, 0, 0], "deg", [math.pi, 0, 0]),
 ])  # fmt: skip
 def test_truth_in_si(effect, values, unit, expected):
     study = make_study(sensor={effect: {"value": values, "unit": unit}})

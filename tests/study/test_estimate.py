@@ -88,23 +88,6 @@ def test_every_statistic_is_as_far_off_as_it_states(kind, n, apart):
         assert np.median(gains) > 0.1 / apart**2
 
 
-def test_plain_statistics_have_their_textbook_errors():
-    rng = np.random.default_rng(1)
-    x = rng.standard_normal((10_000, 3)) @ ROOT.T * SIGMA
-    mean, sd, rms = (controlled(each, of) for each, of in ((MEAN, x), (SD, x), (ROOT_MEAN, x**2)))
-    np.testing.assert_allclose(mean.error, SIGMA / 100, rtol=0.05)
-    np.testing.assert_allclose(sd.error, SIGMA / 100 / np.sqrt(2), rtol=0.05)
-    np.testing.assert_allclose(rms.error, sd.error, rtol=0.05)
-    correlation = controlled(CORRELATION, x)
-    np.testing.assert_allclose(
-        correlation.error, (1 - KNOWN["correlation"][1] ** 2) / 100, rtol=0.05
-    )
-    np.testing.assert_allclose(correlation.plain, np.corrcoef(x.T)[np.tril_indices(3, -1)])
-    for each in (mean, sd, rms, correlation):
-        assert (each.gain == 1).all()
-        assert (each.value == each.plain).all()
-
-
 def test_a_mean_is_that_of_the_regression_on_linear_theory():
     rng = np.random.default_rng(2)
     y = rng.standard_normal((400, 1))
