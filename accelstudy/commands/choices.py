@@ -93,7 +93,6 @@ def effects(
         "\nMDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
         "\nMIB: size at which the effect can also be told from the one it is most like;"
         "\nwith: setting in which the effect shows best, of those that a diagnosis tries;"
-        "\nworst MDB: where it shows worst of them;"
         "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
         f"\n{angle_note()}."
     )

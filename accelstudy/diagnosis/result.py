@@ -305,16 +305,11 @@ class Diagnosis:
     def probabilities(self) -> dict[str, float]:
         """Posterior of each name, alone or with others; a class stands under its first name.
 
-        Where nothing is missing, they only show which name would come first, each by itself.
+        There is none where nothing is missing.
         """
-        if self.finding.posterior is None:
-            logs = self.detection.densities
-            ranked = sorted(logs, key=lambda name: -logs[name])
-            shares = special.softmax([logs[name] for name in ranked]).tolist() if ranked else []
-            return dict(zip(ranked, shares, strict=True))
-        first = dict[tuple[str, ...], str]()
+        posterior, first = self.finding.posterior, dict[tuple[str, ...], str]()
         total: dict[str, float] = defaultdict(float)
-        for one in self.finding.posterior.all:
+        for one in posterior.all if posterior else ():
             # Two bumped positions have one name.
             names = {first.setdefault(cause.members, cause.name): None for cause in one.causes}
             for name in names:

@@ -56,8 +56,6 @@ class Visibility:
     mib : float, size at which the effect can also be told from the nearest other one, likewise
     confused : tuple of (name, cosine), the nearest other effects
     easiest : Effect, in the shape that all this is said of; None if it is not visible
-    hardest : Effect, in the shape that is hardest to see of those that a diagnosis tries
-    hardest_mdb : float, its MDB
     """
 
     name: str
@@ -67,8 +65,6 @@ class Visibility:
     mib: float = np.inf
     confused: tuple[tuple[str, float], ...] = ()
     easiest: Effect | None = None
-    hardest: Effect | None = None
-    hardest_mdb: float = np.inf
 
     @property
     def unit(self) -> str:
@@ -130,8 +126,7 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
     part of d counts that the nearest rival cannot imitate.
 
     Of the shapes of an effect that a diagnosis tries, the one that shows best is judged, and of
-    those in which all parameters show if there are any. The shape that shows worst is given as
-    well, since a jump may happen at any time.
+    those in which all parameters show if there are any.
     """
     root = np.sqrt(noncentrality(1, alpha, POWER))
     rows = []
@@ -142,7 +137,7 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
         columns = [signature_columns(examined.frame, h) for h in judged]
         sizes = [np.linalg.norm(c, axis=0) for c in columns]
         mdbs = [_size(root, s) for s in sizes]
-        easiest, hardest = int(np.argmin(mdbs)), int(np.argmax(mdbs))
+        easiest = int(np.argmin(mdbs))
         best = judged[easiest]
         near = examined.nearest(best)
         rivals = [
@@ -162,8 +157,6 @@ def visibilities(examined: ExaminedFit, alpha: float = 0.001) -> list[Visibility
                 mib=_size(root, left),
                 confused=near[:3],
                 easiest=best.effect,
-                hardest=judged[hardest].effect,
-                hardest_mdb=mdbs[hardest],
             )
         )
     rows += [Visibility(name, "invisible") for name in examined.invisible]
@@ -215,7 +208,6 @@ def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
         def shown(size: float, unit: str = row.unit, seen: bool = row.status == "visible") -> str:
             return amount(size, unit) if seen else "–"
 
-        worst = _settings(row.hardest)
         rows.append(
             {
                 "effect": row.name,
@@ -225,7 +217,6 @@ def visibility_table(examined: ExaminedFit) -> pd.DataFrame:
                 "MIB": shown(row.mib),
                 "unit": display_unit(row.unit) if row.status == "visible" else "",
                 "with": _settings(row.easiest),
-                "worst MDB": f"{shown(row.hardest_mdb)} with {worst}" if worst else "",
                 "confused with": row.reason
                 or ", ".join(f"{name} {cosine:.2f}" for name, cosine in row.confused),
             }

@@ -75,15 +75,11 @@ def test_an_effect_is_judged_in_the_settings_that_a_diagnosis_tries():
     rows = {row.name: row for row in visibilities(examined)}
     jump = rows["bias_jump"]
     tried = [h.effect.spec for h in examined.candidates["bias_jump"]]
-    assert {jump.easiest.spec, jump.hardest.spec} <= set(tried)
-    assert 600 < jump.easiest.settings["t"] < 1200 < jump.hardest.settings["t"]
-    assert jump.hardest_mdb > 5 * jump.mdb
+    assert jump.easiest.spec in tried
+    assert 600 < jump.easiest.settings["t"] < 1200
     limits = {limit.name: limit.value for limit in upper_limits(examined, True, ())}
     for name in ("bias_jump", "warm_up", "saturation"):
         assert rows[name].mdb < 3 * limits[name], name
-    for row in rows.values():
-        if row.status == "visible" and len(examined.candidates[row.name]) == 1:
-            assert row.mdb == row.hardest_mdb, row.name
     assert rows["bias_drift"].easiest.settings == {}
 
 

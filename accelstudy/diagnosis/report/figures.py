@@ -19,7 +19,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import place_text
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import Diagnosis, LikeShape
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
@@ -54,7 +54,7 @@ def diagnosis_figures(
     if d.gap.held_out is not None:
         figures["gap"] = lambda: gap_figure(d, positions)
     if d.like:
-        figures["location"] = lambda: location_figure(d, positions)
+        figures["location"] = lambda: location_figure(d.like)
     return figures
 
 
@@ -80,14 +80,14 @@ def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
     sharey: Literal["all", "row"] = "row" if d.extended_model is d.model else "all"
     grid = figure.subplots(len(rows), len(panels), sharey=sharey, sharex="col", squeeze=False)
     # Labels of narrow panels must not meet.
-    ticks = MaxNLocator(3 if len(panels) > 2 else 5, steps=[1, 2, 5, 10])
+    ticks = 3 if len(panels) > 2 else 5
     # Residuals that exceed the stated noise must look too large.
     sigma = condition_sigma(d.base, 1.0 if d.sigma_known else d.gap.after or d.gap.before)
     for when, line in zip(rows, grid, strict=True):
         for (label, abscissa), ax in zip(panels.items(), line, strict=True):
             ax.axhspan(-2e3 * sigma, 2e3 * sigma, color=NOISE)
             _draw_residuals(ax, positions, when, abscissa)
-            ax.xaxis.set_major_locator(ticks)
+            ax.xaxis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
             if when == rows[-1]:
                 ax.set_xlabel(label)
         title = "base model" if when == "before" else "with what was found"
@@ -113,7 +113,18 @@ def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[s
     ):
         values = positions[column].to_numpy() / scale
         if np.isfinite(values).all() and np.ptp(values) > 0:
-            panels[label] = _abreast(np.broadcast_to(values[:, None], (len(values), count)))
+            panels[label] = _abreast(np.repeat(values[:, None], count, axis=1))
+    # What is missing shows over the coordinate that has it.
+    coordinate = diagnosis.like[0].coordinate if diagnosis.like else "force"
+    if coordinate in ("force", "time", "temperature"):
+        return panels
+    of, values = coordinate_of(coordinate), coordinate_in_holds(coordinate, diagnosis.frame)
+    words, values = _axis(place_text(coordinate)), values / of.size
+    if values.shape[1] == count:
+        return panels | {_per_unit(words, of.unit): _abreast(values)}
+    parts = {1: [words], 2: ["roll", "pitch"], 3: [f"{words}, {axis}" for axis in "xyz"]}
+    for part, x in zip(parts[values.shape[1]], values.T, strict=True):
+        panels[_per_unit(part, of.unit)] = _abreast(np.repeat(x[:, None], count, axis=1))
     return panels
 
 
@@ -163,7 +174,7 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     colours = [AFTER if name in named else OTHER_COLOUR for name in shown]
     labels = [words(name) for name in shown]
     figure = new_figure(FULL, 22 + 4.4 * len(shown))
-    left, right = figure.subplots(1, 2, sharey=True)
+    left, *right = figure.subplots(1, 1 + bool(probabilities), sharey=True, squeeze=False)[0]
     tested = [max(p_values.get(name, np.nan), SMALLEST_P) for name in shown]
     smallest = float(np.nanmin([*tested, 1.0]))
     left.hlines(labels, tested, 1, color=colours, linewidth=1.2)
@@ -178,8 +189,9 @@ def evidence_figure(diagnosis: Diagnosis) -> Figure:
     left.set_xlabel("p-value alone, all candidates counted")
     left.grid(axis="y", visible=False)
     left.invert_yaxis()
-    draw_shares(right, {words(name): probabilities.get(name) for name in shown}, colours)
-    right.set(xlim=(0, 115), xlabel="posterior probability, alone or with others / %")
+    for ax in right:
+        draw_shares(ax, {words(name): probabilities.get(name) for name in shown}, colours)
+        ax.set(xlim=(0, 115), xlabel="posterior probability, alone or with others / %")
     return figure
 
 
@@ -204,40 +216,17 @@ MAX_PLACES = 5
 """Places that are drawn by themselves; the others count together."""
 
 
-def location_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
-    """Posterior of the places where what is missing may live, and residuals over the best one."""
-    d, best = diagnosis, diagnosis.like[0]
-    bars = {
-        f"{o.target} over\n{_axis(place_text(o.coordinate))}": o.posterior
-        for o in d.like[:MAX_PLACES]
-    }
-    if len(d.like) > MAX_PLACES:
-        bars["all others"] = sum(one.posterior for one in d.like[MAX_PLACES:])
-    count, values = len(_components(positions)), coordinate_in_holds(best.coordinate, d.frame)
-    # Each axis has its own argument, and a panel of its own only where all residuals are one.
-    together = values.shape[1] in (1, count)
-    panels = 1 if together else values.shape[1]
-    figure = new_figure(FULL, 22 + 8 * max(len(bars), 4))
-    left, *axes = figure.subplots(1, 1 + panels, width_ratios=[1.1, *[1.4 / panels] * panels])
-    draw_shares(left, bars, AFTER)
-    left.set(xlim=(0, 118), xlabel="posterior probability / %")
-    left.invert_yaxis()
-    # Without times that of the time is the order.
-    ordered = best.coordinate == "time" and d.frame.hold.time is None
-    of = coordinate_of("order" if ordered else best.coordinate)
-    label = _axis(of.words if best.coordinate == "time" else place_text(best.coordinate))
-    when = "after" if d.verdict == "unknown" and d.found else "before"
-    for k, ax in enumerate(axes):
-        x = np.broadcast_to(values if together else values[:, [k]], (len(values), count))
-        _draw_residuals(ax, positions, when, _abreast(x / of.size))
-        ax.set_title("" if together else ("roll", "pitch")[k] if panels == 2 else "xyz"[k])
-        ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-        ax.sharey(axes[0])
-        ax.tick_params(labelleft=k == 0)
-    same = "\nof the same axis" if together and values.shape[1] > 1 else ""
-    axes[panels // 2].set_xlabel(_per_unit(f"{label}{same}", of.unit))
-    axes[0].set_ylabel("residual / (mm/s²)")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
+def location_figure(like: Sequence[LikeShape]) -> Figure:
+    """Posterior of the places where what is missing may live."""
+    bars = {f"{o.target} over {_axis(place_text(o.coordinate))}": o.posterior
+            for o in like[:MAX_PLACES]}  # fmt: skip
+    if len(like) > MAX_PLACES:
+        bars["all others"] = sum(one.posterior for one in like[MAX_PLACES:])
+    figure = new_figure(FULL, 18 + 6 * len(bars))
+    ax = figure.add_subplot()
+    draw_shares(ax, bars, AFTER)
+    ax.set(xlim=(0, 110), xlabel="posterior probability / %")
+    ax.invert_yaxis()
     return figure
 
 
