@@ -32,7 +32,7 @@ from accelstudy.sequential.advisor import Advice, advise
 from accelstudy.sequential.choice import DEFAULTS, candidate_positions
 from accelstudy.sequential.prior import Prior
 from accelstudy.sequential.promise import Promise
-from accelstudy.sequential.running import read_as_it_is
+from accelstudy.sequential.running import read_running
 
 TYPES = (".yaml", ".yml")
 """Endings of a file that describes a type of sensors."""
@@ -57,7 +57,7 @@ class SessionAdvice(Result):
     def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
         """Advise by the keywords of `accelstudy.advise`, checked."""
         place = campaign_path(campaign)
-        now = as_campaign(campaign) if place is None else read_as_it_is(place).campaign
+        now = as_campaign(campaign) if place is None else read_running(place)
         return Adviser(now, place, **given)(now)
 
     @property

@@ -225,16 +225,10 @@ PUBLIC = Command(public)
 def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
     """Print advice, again and again with --watch."""
     from accelstudy.api.advice import Adviser
-    from accelstudy.sequential.running import Watch, read_as_it_is
+    from accelstudy.sequential.running import Watch, read_running
 
     session = Watch(campaign)
-    if watch:
-        now = next(session.look())
-    else:
-        running = read_as_it_is(campaign)
-        now = running.campaign
-        if running.unfinished:
-            warn(f"{campaign}: the last line of the table is not whole; it is not counted")
+    now = (session.look() if watch else None) or read_running(campaign)
     adviser = Adviser(now, campaign, **given)
     for warning in now.warnings:
         warn(warning)
@@ -246,14 +240,14 @@ def run_advise(campaign: Path, watch: bool, **given: Any) -> None:
         while True:
             time.sleep(POLL)
             try:
-                sessions = list(session.look())
+                changed = session.look()
             except InputError as error:
                 click.echo("")
                 warn(f"waiting for a whole table: {error}")
                 continue
-            for now in sessions:
+            if changed is not None:
                 click.echo("")
-                show(adviser(now).summary())
+                show(adviser(changed).summary())
     except KeyboardInterrupt:
         say("\nended")
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,27 +23,8 @@ MIN_LOOKS = 3
 """Number of looks after which a last line without an end is taken, as editors may leave it out."""
 
 
-@dataclass(frozen=True)
-class Running:
-    """A session so far.
-
-    Attributes
-    ----------
-    campaign : Campaign, with its complete positions
-    unfinished : str, a last line that is still being written; empty if there is none
-    """
-
-    campaign: Campaign
-    unfinished: str
-
-
-def read_running(folder: str | Path, settled: bool = False) -> Running:
-    """Read a session so far.
-
-    Parameters
-    ----------
-    folder : path
-    settled : bool, whether a last line without an end is taken all the same
+def read_running(folder: str | Path) -> Campaign:
+    """Read a session so far; a last line without an end counts if it has all cells.
 
     Raises
     ------
@@ -52,6 +32,20 @@ def read_running(folder: str | Path, settled: bool = False) -> Running:
         As `accelstudy.campaign.format.read_campaign`, but not for positions that are not
         there yet.
     """
+    campaign, ends = _read(folder, whole_lines=True)
+    if ends:
+        return campaign
+    try:
+        campaign, _ = _read(folder, whole_lines=False)
+        odd = "does not end; check that it is whole"
+    except InputError:
+        odd = "is not whole; it is not counted"
+    warning = f"{folder}: the last line of the table {odd}"
+    return replace(campaign, warnings=(*campaign.warnings, warning))
+
+
+def _read(folder: str | Path, whole_lines: bool) -> tuple[Campaign, bool]:
+    """Read a session, and whether its last line has an end."""
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(
@@ -63,30 +57,16 @@ def read_running(folder: str | Path, settled: bool = False) -> Running:
         text = read_text(path) if path.exists() else ""
     except UnicodeDecodeError as error:  # the last character may be incomplete
         raise InputError(f"{path}: not a CSV file in UTF-8 ({error.reason})") from None
-    end = len(text) if settled else max(text.rfind("\n"), text.rfind("\r")) + 1
-    whole, unfinished = text[:end], text[end:]
-    columns = columns_of(whole, path) if whole.strip() else {}
+    used = _whole_lines(text) if whole_lines else text
+    columns = columns_of(used, path) if used.strip() else {}
     if not any(map(len, columns.values())):
-        return Running(_without_positions(header), unfinished)
+        return _without_positions(header), used == text
     campaign = parse_table(columns, header, path)
-    warnings = tuple(ignored_in(columns, path))
-    return Running(replace(campaign, warnings=warnings), unfinished)
+    return replace(campaign, warnings=tuple(ignored_in(columns, path))), used == text
 
 
-def read_as_it_is(folder: str | Path) -> Running:
-    """Read a session once, as it is: a last line without an end counts if it has all cells.
-
-    Errors are those of `read_running`.
-    """
-    running = read_running(folder)
-    if not running.unfinished:
-        return running
-    try:
-        whole = read_running(folder, settled=True).campaign
-    except InputError:  # it is half a line
-        return running
-    odd = f"{folder}: the last line of the table does not end; check that it is whole"
-    return Running(replace(whole, warnings=(*whole.warnings, odd)), "")
+def _whole_lines(text: str) -> str:
+    return text[: max(text.rfind("\n"), text.rfind("\r")) + 1]
 
 
 def _without_positions(header: Header) -> Campaign:
@@ -106,50 +86,29 @@ class Watch:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._files: bytes | None = None
-        self._whole, self._count = b"", -1
-        self._rested, self._complaint = 0, ""
+        self._files: list[str] = []
+        self._used: list[str] = []
+        self._looks = 0
 
-    def look(self) -> Iterator[Campaign]:
-        """Yield the session if it has changed since the last look, position by position.
+    def look(self) -> Campaign | None:
+        """The session if it has changed since the last look, else None.
 
         Raises
         ------
         InputError
-            If the campaign cannot be read. After the first look the table is probably just being
-            written: the error is raised once, and again when it is another one.
+            If it has changed and cannot be read; its table is probably just being written.
         """
-        files = b"".join(path.read_bytes() for path in _files(self.folder))
-        self._rested = self._rested + 1 if files == self._files else 0
-        self._files, first_look = files, self._count < 0
-        if self._rested not in (0, MIN_LOOKS):
-            return
-        try:
-            now = read_running(self.folder, settled=self._rested > 0)
-        except InputError as error:
-            if not first_look and str(error) == self._complaint:
-                return
-            self._complaint = str(error)
-            raise
-        whole, count = files.removesuffix(now.unfinished.encode()).strip(), now.campaign.n_positions
-        changed, before = whole != self._whole, self._count
-        self._whole, self._count, self._complaint = whole, count, ""
-        if first_look:
-            yield now.campaign
-        elif changed and (count or before):
-            for n in range(min(before + 1, count), count + 1):
-                yield _first(now.campaign, n)
+        files = [path.read_bytes().decode(errors="replace") for path in _files(self.folder)]
+        self._looks = self._looks + 1 if files == self._files else 0
+        self._files = files
+        resting = self._looks >= MIN_LOOKS
+        used = files if resting else [*files[:1], *map(_whole_lines, files[1:])]
+        if used == self._used and self._used:
+            return None
+        self._used = used
+        return _read(self.folder, whole_lines=not resting)[0]
 
 
 def _files(folder: Path) -> list[Path]:
-    """Files of a campaign that exist."""
+    """Header and table of a campaign, as far as they exist."""
     return [path for path in (folder / HEADER, folder / TABLE) if path.is_file()]
-
-
-def _first(campaign: Campaign, n: int) -> Campaign:
-    """Return the campaign as it was with n positions."""
-    if n == campaign.n_positions:
-        return campaign
-    later = {int(p): "later" for p in campaign.positions[n:]}
-    part = campaign.without(later)
-    return replace(part, left_out=campaign.left_out)
