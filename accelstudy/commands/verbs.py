@@ -58,10 +58,9 @@ PLAN = Command(
     out="Folder for the table, the figure and a study.",
     optional=True,
     sections={
-        "What is asked": (
-            "tilt_accuracy tilt_range sensor sigma history equipment reference confidence"
-        ),
+        "What is asked": "tilt_accuracy tilt_range sensor sigma history equipment confidence",
         "What is tried": "holds schemes max_time max_positions replicates seed",
         "What the equipment takes": "moving_time robot_moving_time robot_setup_time robot_sigma",
     },
+    retired={"--reference": "`accelstudy import --reference-log` takes a calibrated sensor"},
 )

@@ -84,10 +84,6 @@ class Information:
         root = self._root
         return np.full_like(self.normal, np.nan) if root is None else root @ root.T
 
-    def marginal(self, unknown: int) -> Information:
-        """Information on the other parameters if the first ones are unknown, too."""
-        return Information(_triangle(self.rows)[unknown:, unknown:], self.conditions - unknown)
-
     @property
     def determined(self) -> bool:
         """Whether all parameters are determined."""

@@ -33,8 +33,6 @@ class Answer:
     compared : list of Candidate, all that were compared
     ranked : list of Candidate, for each equipment and model the cheapest that reaches the target,
         by the time they take; empty if none does
-    beside : Candidate, the cheapest with a calibrated sensor beside it that reaches the target by
-        linear theory, or the most accurate if none does; None if the question has no such sensor
     instead : Candidate, the cheapest with a robot, if only calibrations by hand were asked for and
         none reaches the target; None if a robot does not reach it either
     """
@@ -44,7 +42,6 @@ class Answer:
     replicates: int
     compared: list[Candidate]
     ranked: list[Candidate] = field(default_factory=list)
-    beside: Candidate | None = None
     instead: Candidate | None = None
 
     @property
@@ -76,7 +73,7 @@ class Answer:
 def answer(question: Question, seed: int = 1, replicates: int = 200) -> Answer:
     """Compare all calibrations, rank those that reach the target, and simulate the first."""
     compared = _with_most_positions(question, candidates(question))
-    plan = Answer(question, seed, replicates, compared, beside=_with_calibrated_sensor(question))
+    plan = Answer(question, seed, replicates, compared)
     kinds: dict[tuple[str, str], list[Candidate]] = {}
     for c in plan.compared:
         kinds.setdefault((c.equipment.name, c.model.name), []).append(c)
@@ -132,15 +129,6 @@ def _with_a_robot(question: Question) -> Candidate | None:
         return None
     robot = replace(question, equipment=(ROBOT,))
     return cheapest(robot, candidates(robot))
-
-
-def _with_calibrated_sensor(question: Question) -> Candidate | None:
-    """Calibration with a sensor beside it, by linear theory; see `Answer`."""
-    if question.beside is None:
-        return None
-    alone = replace(question, equipment=(question.beside,))
-    compared = _with_most_positions(alone, candidates(alone))
-    return cheapest(alone, compared) or _most_accurate(alone, compared)
 
 
 def _confirm(plan: Answer, candidate: Candidate, first: bool) -> Candidate | None:

@@ -16,7 +16,6 @@ from accelstudy.design.criteria import MINIMAX
 from accelstudy.planning.candidates import (
     LEAST_REDUNDANCY,
     Candidate,
-    angle_sigma,
     in_scheme,
     sigma_of,
     sort_by_time,
@@ -81,10 +80,10 @@ class CalibrationKind:
         """Request for the best n positions, as `accelstudy design` takes it."""
         noise = Noise()
         if self.equipment.name != "gravity":  # with a single noise the best positions are the same
-            angle = tidy(angle_sigma(self.question, self.equipment) / MGON, 6) * MGON
+            angle = tidy(self.question.sigma_angle / MGON, 6) * MGON
             noise = Noise(sigma_of(self.question, self.equipment, n, self.hold), angle)
         tilt_range = tidy(self.question.tilt_range / GON, 6) * GON
-        at = self.model.name, self.equipment.approach, MINIMAX
+        at = self.model.name, self.equipment.name, MINIMAX
         return Request(n, *at, tilt_range, noise, starts=self.starts)
 
     def best(self, n: int) -> Candidate | None:

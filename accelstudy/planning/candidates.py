@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from accelstudy.approaches import get_approach
 from accelstudy.basics.arguments import tidy
 from accelstudy.basics.progress import track
-from accelstudy.basics.units import STANDARD_GRAVITY
 from accelstudy.design.information import Information, position_rows
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.distribution import Tilt
@@ -48,8 +47,6 @@ OF_SENSOR = (
 )
 OF_RIG = ("base_tilt", "encoder_scale", "encoder_offset", "gravity_error")
 """Effects of the sensor and of the rig that a plan considers."""
-ROTATIONS = {"cross_axis_misalignment", "mounting_rotation"}
-"""Effects that have the rotation of the sensor against what tells its attitude."""
 FAMILY = "fibonacci"
 SIZES = (*range(4, 25), 27, *range(30, 61, 5), *range(70, 101, 10), *range(120, 401, 40))
 """Family of evenly spread positions, and the sizes of it that are tried. They show about how many
@@ -158,10 +155,8 @@ def _tilts(
     information = information_of(question, equipment, scheme.directions, sigma)
     found = []
     for model in models:
-        # Beside a reference the rotation between the sensors is unknown.
-        rotated = equipment.reference is None or ROTATIONS & {*names_of(model)}
         redundancy = information.conditions - model.n_parameters
-        if rotated and redundancy >= LEAST_REDUNDANCY * information.conditions:
+        if redundancy >= LEAST_REDUNDANCY * information.conditions:
             tilt = tilt_of(question, information, model, question.sizes)
             found += [] if tilt is None else [(model, tilt, redundancy)]
     return found
@@ -190,19 +185,11 @@ def error_up_to(tilt_range: float) -> TiltError:
 def information_of(
     question: Question, equipment: Equipment, directions: Array, sigma: float
 ) -> Information:
-    """What a calibration tells of the parameters of every effect.
-
-    Errors of a reference, 0 ± 1 and common to all positions, are unknown beside them.
-    """
-    hold, errors = HoldConditions(yaw=np.zeros(len(directions))), None
-    if equipment.reference is not None:
-        errors = partial(equipment.reference.errors, gravity=STANDARD_GRAVITY)
-    noise, model = Noise(sigma, angle_sigma(question, equipment)), every_effect()[0]
-    approach = get_approach(equipment.approach)
-    rows = position_rows(model, approach, noise, directions, hold=hold, errors=errors)
-    shared = rows.shape[-1] - model.n_parameters
-    rows = np.roll(rows, shared, axis=-1)  # errors of the reference come first
-    return Information.of(rows, np.eye(shared, rows.shape[-1])).marginal(shared)
+    """What a calibration tells of the parameters of every effect."""
+    model, approach = every_effect()[0], get_approach(equipment.name)
+    noise = Noise(sigma, question.sigma_angle)
+    hold = HoldConditions(yaw=np.zeros(len(directions)))
+    return Information.of(position_rows(model, approach, noise, directions, hold=hold))
 
 
 def tilt_of(
@@ -213,12 +200,6 @@ def tilt_of(
     estimated = [i for effect in names_of(model) for i in columns[effect]]
     neglected = {effect: (columns[effect], size) for effect, size in sizes.items()}
     return information.tilt(error_up_to(question.tilt_range), estimated, neglected)
-
-
-def angle_sigma(question: Question, equipment: Equipment) -> float:
-    """Noise of roll and pitch, rad, of a level position."""
-    reference = equipment.reference
-    return question.sigma_angle if reference is None else reference.sigma_mps2 / STANDARD_GRAVITY
 
 
 def names_of(model: SensorModel) -> tuple[str, ...]:

@@ -66,10 +66,6 @@ class Plan(Result):
             both = ", not both" if sensor else ""
             raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
         sheet = question.get_sensor(sensor) if sigma is None else sheet_of_sigma(sigma)
-        beside = None
-        if given["reference"] is not None:
-            planned = question.planned_reference(str(given["reference"]), sheet)
-            beside = Equipment("reference", by_hand.moving, question.MOUNTING, planned)
         if given["history"] is not None:
             from accelstudy.data_sheets.measured import with_history  # slow to import
 
@@ -85,7 +81,6 @@ class Plan(Result):
             math.inf if max_time is None else max_time,
             given["max_positions"],
             given["schemes"],
-            beside,
         )
         begin("comparing calibrations, which takes some seconds ...")
         return cls(answer(asked, given["seed"], given["replicates"]))

@@ -8,16 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from accelstudy.approaches import get_approach
 from accelstudy.basics.errors import InputError, key
-from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.data_sheets import DataSheet, get_data_sheet, read_data_sheet
-from accelstudy.design.estimability import estimability
 from accelstudy.effects import get_effect
 from accelstudy.planning.quantities import QUANTITIES
 from accelstudy.schemes import Scheme, get_scheme, is_scheme_file
-from accelstudy.sensors.models import get_model
-from accelstudy.simulation.sessions import Noise
 
 if TYPE_CHECKING:
     from accelstudy.leveling.distribution import Tilt
@@ -27,12 +22,6 @@ HOLDS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0)
 """Durations of a hold that are tried, s."""
 USUAL_HOLD = 10.0
 """s, for a sensor of which only the noise of a position is known."""
-MOUNTING = 300.0
-"""s, to mount a sensor beside a reference on one plate."""
-ALIKE = "alike"
-"""A reference of the same type, calibrated by gravity alone in the positions of a scheme, each held
-for the usual time."""
-OF_ALIKE = ("bias-scale-nonorthogonality", "fibonacci-24")
 NONLINEAR = ("quadratic_scale", "cubic_scale")
 LOGS = (".csv", ".txt", ".gz", ".mat", ".parquet", ".log", ".dat")
 """Endings of files that are no data sheets, though one can be made of them."""
@@ -44,30 +33,19 @@ class Equipment:
 
     Attributes
     ----------
-    name : "gravity", "robot" or "reference"
+    name : "gravity" or "robot", as the approach
     moving : float, s, from the end of a hold to the beginning of the next
     setup : float, s, before the first hold
-    reference : ReferenceSensor, optional, beside the one that is calibrated
     """
 
     name: str
     moving: float
     setup: float
-    reference: ReferenceSensor | None = None
-
-    @property
-    def approach(self) -> str:
-        """Name of the approach."""
-        return "gravity" if self.name == "gravity" else "robot"
 
     @property
     def how(self) -> str:
         """The equipment in words."""
-        return {
-            "gravity": "by hand",
-            "robot": "with a robot",
-            "reference": "by hand beside a calibrated sensor",
-        }[self.name]
+        return "by hand" if self.name == "gravity" else "with a robot"
 
     def seconds(self, positions: int, hold: float) -> float:
         """Time in the field, s."""
@@ -96,7 +74,6 @@ class Question:
     most_seconds : float, s in the field
     most_positions : int
     schemes : tuple of str, names or files of schemes besides those that are always compared
-    beside : Equipment, optional, with a calibrated sensor, by linear theory only
     """
 
     target: float
@@ -109,7 +86,6 @@ class Question:
     most_seconds: float = math.inf
     most_positions: int = 200
     schemes: tuple[str, ...] = ()
-    beside: Equipment | None = None
 
     def __post_init__(self) -> None:
         if not self.holds:
@@ -160,40 +136,6 @@ class Question:
             if is_scheme_file(text) and get_scheme(text).name == scheme.name:
                 return str(Path(text).resolve())
         return scheme.name
-
-
-def planned_reference(text: str, sheet: DataSheet) -> ReferenceSensor:
-    """Sensor beside the one that is calibrated.
-
-    Parameters
-    ----------
-    text : path of the calibration.json of that sensor, or `ALIKE`
-    sheet : DataSheet, of the sensor that is calibrated
-
-    Raises
-    ------
-    InputError
-        If the calibration tells no angles with their sigmas.
-    """
-    if text != ALIKE:
-        # Slow to import, and seldom needed.
-        from accelstudy.campaign.reference_log import reference_sensor, usable_reference
-
-        calibration = usable_reference(Path(text))
-        sigma = calibration.content["sigma_position_mps2"]
-        if not sigma:
-            raise InputError(f"{key('reference')} {text}: it does not tell the noise of a position")
-        return reference_sensor(calibration, sigma)
-    model, scheme = get_model(OF_ALIKE[0]), get_scheme(OF_ALIKE[1])
-    noise = Noise(sheet.sigma_mean(USUAL_HOLD))
-    return ReferenceSensor(
-        calibration=ALIKE,
-        frame="frd",
-        sigma_mps2=noise.sigma_force,
-        effects=[effect.spec for effect in model.effects],
-        parameters=[0.0] * model.n_parameters,
-        covariance=estimability(scheme, model, get_approach("gravity"), noise).cofactors.tolist(),
-    )
 
 
 def confidence_of(text: str) -> float | None:

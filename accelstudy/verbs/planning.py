@@ -35,7 +35,6 @@ def plan(
     sigma: Sigma | None = None,
     history: kinds.File | None = None,
     equipment: str = "both",
-    reference: kinds.File | None = None,
     confidence: Annotated[float | str, kinds.SHARE_OR_RMS] = "rms",
     holds: Hold | Sequence[Hold] = (),
     schemes: kinds.SchemeName | Sequence[kinds.SchemeName] = (),
@@ -70,9 +69,6 @@ def plan(
     equipment : str
         Positions by hand, with gravity alone, or with a robot that tells roll and pitch: gravity,
         robot or both.
-    reference : path or "alike"
-        Compare with a calibrated sensor beside it, too: its calibration.json, or alike, for one of
-        the same type.
     confidence : float or str
         What must reach the accuracy: the rms, or both angles in so many calibrations, as 95%.
     holds : float in s, or str with a unit, or several

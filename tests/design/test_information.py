@@ -31,17 +31,6 @@ def test_information_of_sessions_adds_and_is_that_of_the_normal_equations():
     np.testing.assert_allclose(together @ together.T, errors @ errors.T, rtol=1e-9)
 
 
-def test_parameters_that_are_unknown_beside_others():
-    inside = covariance(ROWS, np.arange(8))[3:, 3:]
-    beside = Information.of(ROWS).marginal(3)
-    errors = beside.errors(range(5))
-    columns = np.arange(3, 8)
-    np.testing.assert_allclose(
-        relative(errors @ errors.T, columns), relative(inside, columns), atol=1e-12
-    )
-    assert beside.conditions == 24
-
-
 def test_what_is_neglected_shifts_the_estimates_and_is_missing():
     """Noise-free sessions of sensors with a neglected parameter, estimated by least squares."""
     estimated, sizes = [0, 1, 2, 3], np.array([0.3, 2.0]) / UNITS[[6, 7]]
