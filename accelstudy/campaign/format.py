@@ -18,7 +18,7 @@ from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import MGON
 from accelstudy.basics.wording import one_line
 from accelstudy.campaign.gross_errors.recognition import check_plausible
-from accelstudy.campaign.header import COLUMNS, FORMER, HEADER, KNOWN, MAX_CELL, TABLE, Header
+from accelstudy.campaign.header import COLUMNS, HEADER, KNOWN, MAX_CELL, TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.reading import overlay, read_layer, read_text
@@ -115,7 +115,7 @@ def read_positions(path: Path) -> tuple[Columns, list[str]]:
 
 def ignored_in(columns: Columns, path: Path) -> list[str]:
     """Warnings about columns that the format does not know."""
-    unknown = [name for name in columns if name not in (*KNOWN, *FORMER)]
+    unknown = [name for name in columns if name not in KNOWN]
     if len(unknown) > MOST_NAMED:
         first = ", ".join(one_line(repr(name), 30) for name in unknown[:MOST_NAMED])
         return [f"{path}: {len(unknown)} columns are not known and ignored: {first}, …"]

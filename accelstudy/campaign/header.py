@@ -111,8 +111,6 @@ COLUMNS = {
 """Columns by the attribute of a campaign that they make up: what is read, checked, written and
 documented."""
 KNOWN = tuple(name for column in COLUMNS.values() for name in column.names)
-FORMER = tuple(f"{what}_f{axis}" for what in ("slope", "sd_slope") for axis in "xyz")
-"""Columns that earlier versions wrote; they are ignored without a warning."""
 
 
 Place = Annotated[StrictInt, Field(ge=0)] | StrictStr

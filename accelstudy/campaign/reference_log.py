@@ -27,7 +27,7 @@ from accelstudy.campaign.importing.windows import Windows
 from accelstudy.campaign.reference import ReferenceSensor
 from accelstudy.files.validation import validate
 from accelstudy.leveling.angles import angles_of, near_pole
-from accelstudy.sensors.frames import FRD, Frame
+from accelstudy.sensors.frames import Frame
 
 Array = NDArray[np.float64]
 
@@ -145,7 +145,14 @@ class ReferenceLog:
         angles = angles_of(frame.to_frd(own))
         resting = [records[n] for n in table.index[used]]
         noise = hold_noise(resting, self.log.step).accuracy.allan
-        reference = reference_sensor(self.calibration, noise, frame)
+        reference = ReferenceSensor(
+            calibration=self.calibration.content["campaign"],
+            frame=frame.name,
+            sigma_mps2=noise,
+            effects=[effect.spec for effect in self.calibration.model.effects],
+            parameters=self.calibration.parameters.tolist(),
+            covariance=self.calibration.covariance.tolist(),
+        )
         sigma, common = reference.errors(angles, gravity)
         poles = near_pole(angles, np.hypot(sigma, np.linalg.norm(common, axis=-1)))
         why = "the x axis of the reference is too near to the vertical for a roll"
@@ -189,9 +196,8 @@ class ReferenceLog:
 
     def _check_size(self, means: Array, gravity: float) -> None:
         """Check that means of the reference, (n, 3), are as large as gravity."""
-        first = self.log.first
+        first, where = self.log.first, f"`reference_log` {self.path}"
         try:
-            where = f"`reference_log` {self.path}"
             check_size(where, means, gravity, first.layout.unit, first.conversion)
         except InputError as error:
             raise InputError(
@@ -247,20 +253,6 @@ class ReferenceLog:
                 "as only a small rotation is estimated"
             )
         return best
-
-
-def reference_sensor(
-    calibration: SensorCalibration, sigma: float, frame: Frame = FRD
-) -> ReferenceSensor:
-    """Reference with a calibration, a noise of its means, m/s², and its axes."""
-    return ReferenceSensor(
-        calibration=calibration.content["campaign"],
-        frame=frame.name,
-        sigma_mps2=sigma,
-        effects=[effect.spec for effect in calibration.model.effects],
-        parameters=calibration.parameters.tolist(),
-        covariance=calibration.covariance.tolist(),
-    )
 
 
 def usable_reference(path: Path) -> SensorCalibration:
