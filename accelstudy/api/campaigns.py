@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
@@ -16,7 +15,6 @@ from accelstudy.api.logs import Log, keys_of, log_of
 from accelstudy.basics.arguments import as_sequence, path_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import matches, natural
-from accelstudy.basics.units import UNITS
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
 from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
@@ -28,7 +26,6 @@ from accelstudy.campaign.simulated import simulate_campaign as simulate
 
 OTHERS = ("reference_log", "reference", "reference_columns", "reference_offset", "settings")
 """Keywords of an import that no file of settings has."""
-_NUMBER = re.compile(r"\s*([0-9.eE+-]+)\s*(.*?)\s*")
 
 
 @dataclass(frozen=True)
@@ -75,14 +72,11 @@ def settings_of(
     given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
 ) -> ImportSettings:
     """Settings of a file, overlaid with those that were given as keywords."""
-    path, apart = given["settings"], (*OTHERS, "range")
-    own = {name: value for name, value in given.items() if name not in apart and value is not False}
+    own = {
+        name: value for name, value in given.items() if name not in OTHERS and value is not False
+    }
     content, names = keys_of({**own, "sensors": sensors or None})
-    settings = read_settings(path, content, names)
-    if given.get("range") is None:
-        return settings
-    content["range_mps2"] = _range(str(given["range"]), settings)
-    return read_settings(path, content, {**names, "range_mps2": key("range")})
+    return read_settings(given["settings"], content, names)
 
 
 def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
@@ -113,21 +107,6 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     if twice:
         raise InputError(f"{twice[0]}: the file is given twice")
     return files
-
-
-def _range(text: str, settings: ImportSettings) -> float:
-    """Range in m/s², of a number with or without a unit."""
-    match = _NUMBER.fullmatch(text)
-    unit = match[2] or "m/s^2" if match else ""
-    sizes = {**UNITS["m/s^2"], "m/s²": 1.0}
-    if unit == "counts" and settings.scale is not None:
-        sizes["counts"] = float(max(map(abs, settings.scale)))
-    try:
-        return float(match[1]) * sizes[unit] if match else sizes[text]
-    except (KeyError, ValueError):
-        raise InputError(
-            f"{key('range')}: expected a number in m/s², g or counts, as 4g, not {text!r}"
-        ) from None
 
 
 def _reference(

@@ -76,7 +76,7 @@ def find_holds(
     unit: kinds.Unit = None,
     scale: kinds.Scale = None,
     offset: kinds.Offset = None,
-    range: Annotated[float | str | None, kinds.NUMBER] = None,
+    range: Annotated[Quantity | None, si("m/s^2", 1e-9, 1e6)] = None,
     frame: kinds.Frame = None,
     threshold: Annotated[Quantity | None, SIGMA] = None,
     window: Seconds = None,
@@ -108,8 +108,8 @@ def find_holds(
     log : Log or path or DataFrame, or several paths
         Text (CSV or columns, perhaps .gz), MATLAB, Parquet, a bag of ROS 1 or 2 (extra ros) or a
         ULog of PX4 (extra px4). Of several files, a folder or a pattern, each file is one position.
-    range : float in m/s², or str
-        Measuring range, ±: 78.5 (m/s²), 8g or 32767counts.
+    range : float in m/s², or str with a unit
+        Measuring range, ±, as 8g.
     threshold : float in m/s², or str with a unit
         Largest sd at rest, m/s². [default: from the log]
     window : float in s, or str with a unit

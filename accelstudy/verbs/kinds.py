@@ -133,14 +133,12 @@ def kind_of_annotation(said: Any) -> Any:
     return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
 
 
-def kind_of_types(
-    expected: str, *types: type, made: Callable[[Any], Any] | None = None, **of: str
-) -> Kind:
-    """Return the kind of values of some types, of which `made` makes what the verb works with."""
+def kind_of_types(expected: str, *types: type, **of: str) -> Kind:
+    """Return the kind of values of some types."""
 
     def read(name: str, value: Any) -> Any:
         check_type(name, value, *types, expected=expected)
-        return value if made is None else made(value)
+        return value
 
     return Kind(read, **of)
 
@@ -206,9 +204,6 @@ RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
 
 TEXT = kind_of_types("a text", str)
 FLAG = kind_of_types("True or False", bool, doc_type="bool")
-NUMBER = kind_of_types(
-    "a number, or a text with its unit", str, int, float, made=str, doc_type="float or str"
-)
 COLUMN = kind_of_types(
     "the name of a column or its number", str, int, doc_type="str or int", name="column"
 )
