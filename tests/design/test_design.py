@@ -18,7 +18,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
 QUADRATIC = get_model("bias-scale-nonorthogonality-quadratic")
-ANGLES = ("alpha_yz", "alpha_zy", "alpha_zx")
 # bias (m/s²), scale, non-orthogonality (rad) in the order of the parameters
 KINDS = {"bias": slice(0, 3), "scale": slice(3, 6), "nonorthogonality": slice(6, 9)}
 

@@ -168,7 +168,6 @@ def said(
                     "gross": {"name": BUMPED, "settings": {"position": 7}}}),
     ("family or set", {"verdict": "narrowed", "found": ["warm_up"], "explanations": [
         {"names": ["warm_up"], "posterior": 0.5}, {"names": ["thermal_bias"], "posterior": 0.4}]}),
-    ("family or set", {"verdict": "named", "found": ["thermal_scale"]}),
     ("family or set", {"verdict": "named", "found": ["warm_up"], "recorded": False}),
     ("family or set", {"verdict": "unknown", "explanations": [
         {"names": ["thermal_bias", "lag"], "posterior": 0.5},
@@ -181,8 +180,6 @@ def said(
     ("nothing", {"verdict": "named", "found": ["warm_up"], "own": ["warm_up"]}),
     ("other name", {"verdict": "named", "found": ["cubic_scale"], "recorded": False}),
     ("other name", {"verdict": "gross_error", "found": [BUMPED]}),
-    ("other name", {"verdict": "named", "found": ["warm_up"], "true": []}),
-    ("unknown", {"verdict": "unknown"}),
     ("noise", {"verdict": "noise_model", "found": ["coloured_noise"]}),
     ("learned", {"verdict": "learned", "found": ["learned"]}),
     ("nothing", {"verdict": "no_effect"}),
