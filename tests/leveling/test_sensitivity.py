@@ -48,18 +48,6 @@ def test_effects_and_intervals_are_those_of_salib():
     np.testing.assert_allclose(ci95[0], expected["ST_conf"], rtol=1e-12)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2018])
-def test_a_seed_gives_the_same_table(seed):
-    def table(seed):
-        return leveling_sensitivity([0, 30], [20], 0.002, 64, 10, seed)
-
-    np.random.seed(5)  # noqa: NPY002 - the legacy state is what is looked at
-    before = np.random.get_state()[1].copy()  # noqa: NPY002
-    assert table(seed).equals(table(seed))
-    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
-    assert not table(seed).equals(table(seed + 7))
-
-
 # --- leveling without parameters (figure 4) ------------------------------------------------------
 
 ATTITUDES = [(0, 0), (50, 0), (-30, 20), (20, -50), (80, 60), (0, 50)]

@@ -237,18 +237,6 @@ def test_a_flange_gives_way_where_its_encoders_do_not_see_it():
     assert read[0, 0] < attitude[0, 0]
 
 
-def test_a_slip_counts_the_holds_where_they_have_no_time():
-    hold = HoldConditions().with_steps(FORCES)
-    found = added(
-        get_effect("mounting_slip(t=12.5)"), np.ones(3), FORCES, some_hold(FORCES, time=None)
-    )
-    assert np.flatnonzero(found.output.any(axis=1))[0] == 12
-    left = hold.take(np.arange(20, 40)).with_steps(FORCES[20:])
-    assert left.order[0] == 21
-    times = [c.settings["t"] for c in get_effect("mounting_slip").candidates(hold, FORCES, G)]
-    np.testing.assert_array_equal(times, np.arange(3.5, 38))
-
-
 def test_a_sensor_that_lags_behind_its_thermometer():
     """As the differential equation of the lag has it, solved by small steps."""
     time, temperature = np.array([100.0, 160.0, 230.0, 400.0]), np.array([20.0, 25.0, 25.0, 10.0])
@@ -375,17 +363,6 @@ def test_every_effect_can_be_estimated(name):
     # Some 250 statements of either kind over all effects.
     assert np.abs(z.mean(axis=0)).max() < 4.5 / math.sqrt(replicates)
     assert np.abs(z.std(axis=0) - 1).max() < 4.5 / math.sqrt(2 * replicates)
-
-
-@pytest.mark.parametrize("approach", [GRAVITY, ROBOT], ids=lambda a: a.name)
-def test_a_wrong_gravity_is_a_common_scale(approach):
-    found = design("gravity_error", approach=approach)
-    assert found.rank == 9
-    assert found.not_estimable == ("s_x", "s_y", "s_z", "delta_g")
-    error, scale = (get_effect(name) for name in ("gravity_error", "scale"))
-    np.testing.assert_allclose(
-        added(error, [0.01]).output, added(scale, 3 * [0.01 / G]).output, rtol=0, atol=1e-14
-    )
 
 
 def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
