@@ -23,6 +23,7 @@ from accelstudy.campaign.importing.sources import Source
 from accelstudy.effects import HoldConditions
 from accelstudy.leveling.angles import specific_force
 from accelstudy.schemes import get_scheme
+from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise, session
 
@@ -245,6 +246,23 @@ def test_the_sensor_takes_along_what_is_its_own(effects, values):
     table, warnings = leveled_rows(taken, rows_of("mounting_rotation", own), sigma=0.0)
     assert_leveled(table)
     assert warnings == []
+
+
+def test_a_log_in_other_axes_is_leveled_in_them():
+    values = {"b_T_x": 2e-3, "b_T_y": -3e-3}
+    own = calibrated("thermal_bias", values)
+    rows = rows_of("thermal_bias", values, temperature=np.linspace(16, 34, 40))
+    frd, frame = leveled_rows(own, rows)[0], parse_frame("rfu")
+    # As counts, whose scale and offset belong to the axes of the log.
+    scale, offset = np.array([0.01, 0.02, 0.005]), np.array([5.0, 6.0, 7.0])
+    rows[AXES] = frame.from_frd(rows[AXES]) / scale + offset
+    layout = LogLayout(unit="counts", scale=[*scale], offset=[*offset], frame="rfu")
+    table, _ = leveled_rows(replace(own, log=layout), rows)
+    turned = frame.from_frd(calibrated_in(frd))
+    np.testing.assert_allclose(calibrated_in(table), turned, atol=1e-8)
+    for sign, angle in zip(frame.signs, ("roll", "pitch"), strict=False):
+        np.testing.assert_allclose(table[f"{angle}_gon"], sign * frd[f"{angle}_gon"], atol=1e-6)
+    np.testing.assert_allclose(sigmas_in(table), sigmas_in(frd), atol=1e-6)
 
 
 def test_a_single_reading_is_as_noisy_as_within_the_holds():

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import yaml
 from calling import succeed
 from log_helpers import G, session, table, write
 from scipy.io import savemat
@@ -90,3 +91,23 @@ def test_command(tmp_path, monkeypatch):
     assert "The figure 'segmentation' could not be drawn (ZeroDivisionError: div" in failed
     assert not list(out.glob("segmentation.*"))
     np.testing.assert_array_equal(read_campaign(out).forces, campaign.forces)
+
+
+def test_command_with_everything(tmp_path):
+    forces, _ = session(holds=4)
+    rows = np.column_stack([np.arange(len(forces)) * 10.0, 1000 * forces + [1, 2, 3]])
+    np.savetxt(tmp_path / "log.txt", rows, "%.1f")
+    content = {"time_unit": "ms", "columns": {"fx": 1, "fy": 2}, "sensor": "A-1", "unit": "g"}
+    (tmp_path / "settings.yaml").write_text(yaml.safe_dump(content))
+    result = succeed(
+        "import",
+        *(tmp_path / "log.txt", "--out", tmp_path / "out", "--settings"),
+        *(tmp_path / "settings.yaml", "--columns", "fz=3", "--time", "0", "--unit", "counts"),
+        *("--scale", "0.001", "--offset", "1,2,3", "--threshold", "0.1", "--no-figure"),
+    )
+    assert "threshold: 0.1 m/s², as given" in result.stdout
+    campaign = read_campaign(tmp_path / "out")
+    assert campaign.n_positions == 4
+    assert campaign.sensor == "A-1"
+    np.testing.assert_allclose(np.linalg.norm(campaign.forces, axis=1), G, atol=0.01)
+    assert not (tmp_path / "out" / "segmentation.svg").exists()

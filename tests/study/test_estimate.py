@@ -10,7 +10,6 @@ from usual import STANDARD_ERRORS
 
 from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, controlled
 from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles, share_below
-from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import TILT, simulated_statistics
 
 OFTEN = 200
@@ -186,19 +185,6 @@ def test_few_controlled_replicates_say_what_many_plain_ones_do(noise, approach, 
     for name in ("roll", "pitch", "both"):
         one, other = few.quantile(TILT, name, 0.95), many.quantile(TILT, name, 0.95)
         assert abs(one.value - other.value) < limit * np.hypot(one.error, other.error)
-
-
-def test_plain_statistics_stand_beside():
-    cell = cell_of(0.1, replicates=300)
-    found, alone = simulated_statistics(cell, 1), plain(cell, 1)
-    errors = simulate(cell, 1).simulated.estimates - cell.true_values
-    np.testing.assert_allclose(found["bias"].plain, errors.mean(axis=0))
-    np.testing.assert_allclose(found["sd"].plain, errors.std(axis=0, ddof=1))
-    for name in STATISTICS:
-        np.testing.assert_array_equal(found[name].plain, alone[name].value)
-        assert np.median(found[name].gain) > 10
-    one, other = found.quantile(TILT, "both", 0.95), alone.quantile(TILT, "both", 0.95)
-    assert one.plain == other.value
 
 
 def test_few_replicates_have_no_control(tmp_path):

@@ -25,19 +25,6 @@ def estimates(cell, seed=1):
 # --- what a cell is ------------------------------------------------------------------------------
 
 
-def test_a_cell_of_the_paper():
-    cells = make_cells(grid(replicates=7))
-    assert [*cells] == [GRAVITY, ROBOT]
-    cell = cells[ROBOT]
-    assert cell.noise == Noise(0.002, 3.2 * MGON, 0.0, 0.0)
-    assert cell.effects == cell.simulated_effects == ("bias", "scale", "nonorthogonality")
-    assert cell.simulated_model is cell.estimated_model
-    assert (cell.replicates, cell.gravity) == (7, 9.80665)
-    assert cell.truth == pytest.approx(PAPER_TRUTH, rel=1e-14)
-    assert cell.positions.n_positions == 24
-    assert cell.conditions.uses_angles
-
-
 def test_all_is_every_combination():
     cells = make_cells(
         grid(models="all", schemes=["faces-6", "rings-24"], approaches="all"),

@@ -200,21 +200,6 @@ def test_no_replicate_converges(tmp_path):
 # --- the tilt ------------------------------------------------------------------------------------
 
 
-def test_an_effect_that_the_model_lacks_shows_in_the_tilt(tmp_path):
-    """At level the axes' angles tilt by themselves: roll by α_zx, pitch by α_zy."""
-    tables = run_study(
-        tmp_path,
-        simulated_effects=["bias", "scale", "nonorthogonality"],
-        grids=[grid(["bias-scale", NINE], approaches="gravity", sensor_sigma_mps2=1e-5)],
-        leveling={"max_tilt_gon": 0.01, "attitudes": 20},
-    )
-    table = tables["leveling"].set_index("model")
-    assert table.loc["bias-scale", "roll_rms_mgon"] == pytest.approx(44, rel=0.01)
-    assert table.loc["bias-scale", "pitch_rms_mgon"] == pytest.approx(12, rel=0.01)
-    # With the effect in the model only the calibration's own error is left, here of 0.1 mgon.
-    assert table.loc[NINE, ["roll_rms_mgon", "pitch_rms_mgon"]].max() < 0.2
-
-
 def test_tilt_of_a_calibrated_sensor(study, tmp_path):
     """At level σ_φ² = (σ_b/g)² + σ_α²: 11.24 mgon, and as much in pitch."""
     grids = [grid(replicates=3000, approaches="gravity")]
