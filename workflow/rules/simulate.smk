@@ -7,8 +7,6 @@ rule simulate:
         estimates=f"{RESULTS}/estimates/{SET_UP}.parquet",
     log:
         f"{RESULTS}/logs/simulate/{SET_UP}.log",
-    benchmark:
-        f"{RESULTS}/benchmarks/simulate/{SET_UP}.tsv"
     conda:
         "../envs/accelstudy.yaml"
     resources:
