@@ -60,8 +60,9 @@ AROUND = {
     "units in mg": ([ROWS[0], "s,mg,mg,mg", *rows_of(table(forces=FORCES * 1e3 / G))[1:]], "(mg)"),
     "commas behind": ([ROWS[0], *(f"{row}," for row in ROWS[1:])], "at the end of each row"),
     "first row": ([ROWS[0], "0.0,,,", *ROWS[2:]], "line 2, column ax (fx): nothing"),
-    "labels": (["I2C ready", *(f"t: {t}, ax: {x}, ay={y}, az = {z}" for t, x, y, z in
-                               (row.split(",") for row in ROWS[1:]))], "forces from ax, ay, az"),
+    "labels": (["I2C ready", *(f"t: {t}, ax: {x}, ay={y}, az = {z}\ngx: {y}, gy: {z}, gz: {x}"
+                               for t, x, y, z in (row.split(",") for row in ROWS[1:]))],
+               "forces from ax, ay, az"),
     # Neither numbers in notes nor the blanks of a column of words tell the delimiter.
     "notes above": ([*NOTES, "// 50 Hz by 3 axes on 1 board in 26 positions", *SPARSE],
                     "forces from ax, ay, az"),

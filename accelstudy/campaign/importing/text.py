@@ -382,9 +382,10 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
 
 
 def _read(path: Path) -> tuple[bytes, list[str]]:
-    """All of a file in UTF-8, with line ends as in Python, and labels that all its lines had.
+    """All of a file in UTF-8, with line ends as in Python, and the labels that its rows had.
 
-    A line as ``ax: 0.12, ay: -0.03, az: 9.8`` is read as one with three numbers.
+    Of lines as ``ax: 0.12, ay: -0.03, az: 9.8`` the numbers are left; lines with other labels, as
+    those of a gyroscope may alternate with them, become empty.
     """
     try:
         with readable(path):
@@ -403,9 +404,12 @@ def _read(path: Path) -> tuple[bytes, list[str]]:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     first = content[:_PREVIEW].split(b"\n")
     labels, lines = Counter(tuple(_LABEL.findall(line)) for line in first).most_common(1)[0]
-    if len(labels) < 3 or lines < len(first) / 2:
+    if len(labels) < 3 or lines < len(first) / 3:
         return content, []
-    return _LABEL.sub(b"", content), [label.decode() for label in labels]
+    parts = (rb"(.*?)(?<![\w.])%b[ \t]*[:=][ \t]*" % re.escape(label) for label in labels)
+    row = re.compile(rb"^(?:%b(.*)|.*)$" % b"".join(parts), re.MULTILINE)
+    content = row.sub(lambda line: b"".join(part or b"" for part in line.groups()), content)
+    return content, [label.decode() for label in labels]
 
 
 def _encoding_of(start: bytes) -> str:
