@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it is for users
     from accelstudy.api.advice import SessionAdvice as SessionAdvice
     from accelstudy.api.catalogues import catalogue as catalogue
-    from accelstudy.api.diagnoses import Diagnosis as Diagnosis
     from accelstudy.api.logs import Log as Log
     from accelstudy.api.simulations import Simulation as Simulation
     from accelstudy.basics.errors import InputError as InputError
     from accelstudy.campaign.calibration.result import Calibration as Calibration
     from accelstudy.campaign.session import Campaign as Campaign
+    from accelstudy.diagnosis.report.output import Diagnosis as Diagnosis
     from accelstudy.epochs.comparison import Comparison as Comparison
     from accelstudy.epochs.history import History as History
     from accelstudy.lots.output import Lot as Lot
@@ -46,12 +46,12 @@ if TYPE_CHECKING:  # what a type checker and an editor read; `as` says that it i
 _NAMES = {
     "api.advice": "SessionAdvice",
     "api.catalogues": "catalogue",
-    "api.diagnoses": "Diagnosis",
     "api.logs": "Log",
     "api.simulations": "Simulation",
     "basics.errors": "InputError",
     "campaign.calibration.result": "Calibration",
     "campaign.session": "Campaign",
+    "diagnosis.report.output": "Diagnosis",
     "epochs.comparison": "Comparison",
     "epochs.history": "History",
     "lots.output": "Lot",

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp, softmax
 
 from accelstudy.diagnosis.coordinates import ANGLES, coordinate_of
-from accelstudy.diagnosis.decision.learned import weigh_place
+from accelstudy.diagnosis.decision.functions import weigh_place
 from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit

@@ -13,7 +13,7 @@ from scipy.special import softmax
 from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import stage
-from accelstudy.diagnosis.decision.learned import (
+from accelstudy.diagnosis.decision.functions import (
     SIZES,
     fit_of_place,
     most_probable_place,
@@ -25,7 +25,6 @@ from accelstudy.diagnosis.decision.problem import Problem, pose
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN, Cause, Projection
 from accelstudy.diagnosis.evidence.detection import draw_effects, log_ratio, total_odds
-from accelstudy.diagnosis.evidence.size import log_sum
 from accelstudy.diagnosis.prediction import (
     Group,
     HeldOutGap,
@@ -35,7 +34,7 @@ from accelstudy.diagnosis.prediction import (
     split_positions,
 )
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes
+from accelstudy.diagnosis.space.hypotheses import OUTLIER, Shapes, log_sum
 from accelstudy.diagnosis.space.shapes import Place
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from accelstudy.approaches import Approach
 from accelstudy.campaign.calibration.fit import usual_approach
 from accelstudy.campaign.gross_errors.recognition import recognise
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.learned import learn_function
+from accelstudy.diagnosis.decision.functions import learn_function
 from accelstudy.diagnosis.decision.noise import tests_of_noise, worst_of
 from accelstudy.diagnosis.decision.posterior import Case
 from accelstudy.diagnosis.decision.problem import fit_base, is_exact, pose

@@ -20,7 +20,7 @@ from accelstudy.campaign.calibration.fit import JudgedNoise
 from accelstudy.campaign.gross_errors.recognition import Recognition
 from accelstudy.campaign.session import Campaign
 from accelstudy.diagnosis.consequences import TiltErrors, tilt_errors
-from accelstudy.diagnosis.decision.learned import shares_of_places
+from accelstudy.diagnosis.decision.functions import shares_of_places
 from accelstudy.diagnosis.decision.noise import (
     exceeds_stated,
     judged_noise,

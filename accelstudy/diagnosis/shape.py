@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.wording import comma_list
 from accelstudy.diagnosis.coordinates import TARGETS, coordinate_of
-from accelstudy.diagnosis.decision.learned import coordinate_values, space_of
+from accelstudy.diagnosis.decision.functions import coordinate_values, space_of
 from accelstudy.diagnosis.decision.problem import Problem
 from accelstudy.diagnosis.decision.verdict import Finding
 from accelstudy.diagnosis.formulas import Formula, rank_formulas

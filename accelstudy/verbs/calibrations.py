@@ -258,9 +258,9 @@ def diagnose(
     --------
         accelstudy diagnose my-campaign --out diagnosed
     """
-    from accelstudy.api.diagnoses import Diagnosis
     from accelstudy.api.inputs import campaign_path, resolve
     from accelstudy.diagnosis import pipeline
+    from accelstudy.diagnosis.report.output import Diagnosis
 
     # The diagnosis, not the reader, looks for wrong units and axes.
     given = resolve(campaign, model, approach, prior, plausible=False)

@@ -116,8 +116,8 @@ def test_the_level_test_is_the_two_sided_chi_square_test(size):
     tails = chi2.cdf(z @ z), chi2.sf(z @ z)
     assert found.p_value == pytest.approx(2 * min(tails), rel=1e-12)
     assert found.statistic == pytest.approx(z @ z)
-    assert found.estimate[0] == pytest.approx(z @ z / 40)
-    assert ("larger" if found.estimate[0] > 1 else "smaller") in found.remark
+    assert found.values[0] == pytest.approx(z @ z / 40)
+    assert ("larger" if found.values[0] > 1 else "smaller") in found.remark
 
 
 def test_the_test_within_holds_is_the_f_test():
@@ -172,7 +172,7 @@ def test_steps_of_the_readings_are_found_and_measured(lsb):
     found = [resolution_test(forces, 0.01) for forces in drawn.forces]
     assert sum(t.p_value < 0.01 for t in found) >= least(50, 0.99, RARE)
     # Readings of ±g tell a wrong step once it is out by half a step there.
-    steps = np.array([t.estimate[0] for t in found])
+    steps = np.array([t.values[0] for t in found])
     assert np.all(np.abs(steps / lsb - 1) < lsb / (4 * G))
 
 

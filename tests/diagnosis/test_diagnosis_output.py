@@ -28,7 +28,7 @@ from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.statement import statement_of
 from accelstudy.diagnosis.decision.verdict import Finding, Reason
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.report.output import write_diagnosis
+from accelstudy.diagnosis.report.output import Diagnosis
 from accelstudy.diagnosis.report.words import render, verdict_lines, warnings
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import examine
@@ -126,6 +126,14 @@ def test_every_verdict_is_written_and_told(written, case):
         assert "It concerns the noise" not in page
     if case == "gravity":
         assert "mounting rotation" in page.split("What can this campaign not see?")[1]
+
+
+def write_diagnosis(diagnosis, folder):
+    """Write all files of a diagnosis, and return the content of diagnosis.json."""
+    folder.mkdir(exist_ok=True)
+    result = Diagnosis(diagnosis)
+    result.write(folder, folder)
+    return result.content
 
 
 def told(diagnosis, folder):
@@ -249,7 +257,6 @@ def test_positions_say_what_was_held_out(written):
     assert predicted[~held].isna().all().all()
     before, after = np.sqrt((predicted[held] ** 2).mean())
     assert after < before
-    assert positions["test_before"].max() > positions["test_after"].max()
     assert {"residual_x_before_mps2", "residual_z_after_mps2", "temperature_degC"} <= set(positions)
 
 

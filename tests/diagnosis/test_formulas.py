@@ -9,7 +9,7 @@ from usual import NINE, ROBOT, G
 
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.session import Campaign
-from accelstudy.diagnosis.decision.learned import coordinate_values
+from accelstudy.diagnosis.decision.functions import coordinate_values
 from accelstudy.diagnosis.decision.problem import fit_base
 from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.formulas import rank_formulas

@@ -273,7 +273,7 @@ def judge_noise(case: Case, worst: NoiseTest) -> Finding:
     if lack_of_fit(problem) < REFUTATION_LEVEL and name != STEPS:
         verdict, reason = "unknown", Reason.of("lack of fit")
     # Larger residuals may be an effect that the test for a pattern could not see.
-    elif name == LEVEL and worst.estimate[0] >= 1 and noise < RULES.more_probable:
+    elif name == LEVEL and worst.values[0] >= 1 and noise < RULES.more_probable:
         other = next(n for e in posterior.reported for n in e.names if n not in NOISES)
         reason = Reason.of("noise or effect", name=name, remark=worst.remark, p=noise, other=other)
         verdict = "unknown"

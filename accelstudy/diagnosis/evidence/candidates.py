@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.diagnosis.evidence.bounds import within_bounds
-from accelstudy.diagnosis.evidence.size import Evidence, log_sum
+from accelstudy.diagnosis.evidence.size import Evidence
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.examined import ExaminedFit
 from accelstudy.diagnosis.space.hypotheses import (
@@ -20,6 +20,7 @@ from accelstudy.diagnosis.space.hypotheses import (
     Hypotheses,
     Hypothesis,
     Shapes,
+    log_sum,
 )
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.diagnosis.space.shapes import LearnedShapes

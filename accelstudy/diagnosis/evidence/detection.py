@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from accelstudy.basics.progress import track
 from accelstudy.diagnosis.evidence.candidates import Field
-from accelstudy.diagnosis.evidence.size import Evidence, log_mean, log_sum
+from accelstudy.diagnosis.evidence.size import Evidence, log_mean
 from accelstudy.diagnosis.rules import RULES
-from accelstudy.diagnosis.space.hypotheses import Shapes
+from accelstudy.diagnosis.space.hypotheses import Shapes, log_sum
 from accelstudy.diagnosis.space.residuals import Residuals
 
 Array = NDArray[np.float64]

@@ -42,7 +42,7 @@ class NoiseTest:
     name : str, the noise effect that it looks for
     statistic : float
     p_value : float
-    estimate : tuple of float, what the data say of it: variance factor, variance factors of the
+    values : tuple of float, what the data say of it: variance factor, variance factors of the
         axes, correlation of successive holds, kurtosis, resolution in m/s²
     remark : str
     by_holds : bool, whether it is measured by the noise within the holds
@@ -51,7 +51,7 @@ class NoiseTest:
     name: str
     statistic: float
     p_value: float
-    estimate: tuple[float, ...]
+    values: tuple[float, ...]
     remark: str
     by_holds: bool = False
 

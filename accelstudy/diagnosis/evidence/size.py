@@ -232,12 +232,6 @@ def _table(dim: int, nu: float, redundancy: int) -> Array:
     return log_mean(logs.T, SIZE_WEIGHTS)
 
 
-def log_sum(logs: Array) -> Array:
-    """Log of the sum of exp(logs) over the last axis."""
-    top = np.max(logs, axis=-1, keepdims=True)
-    return np.asarray(top[..., 0] + np.log(np.sum(np.exp(logs - top), axis=-1)))
-
-
 def log_mean(logs: Array, weights: ArrayLike | None = None) -> Array:
     """Log of the mean of exp(logs) over the last axis, with weights or without."""
     w = np.ones(logs.shape[-1]) if weights is None else np.asarray(weights, dtype=float)

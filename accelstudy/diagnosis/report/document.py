@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import calibrate
-from accelstudy.adjustment.quality import Solution, position_tests
+from accelstudy.adjustment.quality import Solution
 from accelstudy.basics import plugins
 from accelstudy.basics.names import MAX_NAME_BYTES
 from accelstudy.basics.units import GON, MGON
@@ -230,9 +230,6 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
     residual_*_before_mps2, residual_*_after_mps2 : what the readings lack of the conditions, by the
         base fit and by the final one: the output less that in the robot's attitude, or the norm
         of f_b less gravity
-    test_before, test_after : root of the test statistic of a gross error in the position, over the
-        noise level that the diagnosis takes; signed where the position has one condition
-    p_before, p_after : p-values of these tests, of each position by itself
     predicted_before_mps2, predicted_after_mps2 : of held-out positions, rms of the residuals by
         the fits to the other positions, without and with the effects that were found
     """
@@ -256,11 +253,6 @@ def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
         names = ("norm",) if fitted.misclosures.shape[1] == 1 else ("x", "y", "z")
         for name, values in zip(names, fitted.misclosures.T, strict=True):
             table[f"residual_{name}_{when}_mps2"] = pd.Series(values, rows)
-    for when, fitted, rows in fits:
-        tests = position_tests(fitted)
-        table[f"test_{when}"] = pd.Series(tests.w / np.sqrt(d.noise.variance), rows)
-        p = tests.p_known if d.noise.trusted else tests.p_unknown
-        table[f"p_{when}"] = pd.Series(p, rows)
     for k, when in enumerate(("before", "after")):
         missed = {} if held is None else dict(zip(held.held, held.misses[k], strict=True))
         table[f"predicted_{when}_mps2"] = pd.Series(missed, dtype=float)

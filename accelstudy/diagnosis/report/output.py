@@ -1,32 +1,34 @@
-"""What a diagnosis writes: JSON, YAML, Parquet, figures and a page."""
+"""The result of `accelstudy.diagnose`: what is told, drawn and written of a diagnosis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import pandas as pd
 import yaml
+from matplotlib.axes import Axes
+from numpy.linalg import LinAlgError
 
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
+from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.campaign.calibration.document import write_json
+from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.calibration.sensor_calibration import needs_of, unknown
-from accelstudy.diagnosis.report import words
-from accelstudy.diagnosis.report.document import (
-    diagnosed_calibration,
-    diagnosis_document,
-    positions_table,
-    study_overlay,
-)
-from accelstudy.diagnosis.report.figures import diagnosis_figures
-from accelstudy.diagnosis.result import MISSING, Diagnosis
+from accelstudy.diagnosis import result as found
+from accelstudy.diagnosis.report import document, words
+from accelstudy.diagnosis.report.figures import diagnosis_figures, draw_explanations
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
-from accelstudy.files.outputs import whole_file
+from accelstudy.drawing.style import COLUMN
+from accelstudy.files.outputs import DIAGNOSIS, whole_file
 from accelstudy.files.parquet import write_frame
 from accelstudy.pages import write_page
+from accelstudy.pages.result import Result
+from accelstudy.sensors.frames import FRD, axes_note
 
 MODEL_HEADER = """\
 # The sensor and the noise that were found, as a study of their own:
@@ -34,63 +36,122 @@ MODEL_HEADER = """\
 """
 
 
-def write_diagnosis(
-    diagnosis: Diagnosis,
-    folder: str | Path,
-    source: str | Path = "CAMPAIGN",
-    place: str | Path = "",
-) -> dict[str, Any]:
-    """Write what a diagnosis found; each file is whole or not there, diagnosis.json comes last.
+class Diagnosis(Result):
+    """A diagnosis: which effects, seen in a campaign, a model lacks.
 
-    Parameters
+    Attributes
     ----------
-    diagnosis : Diagnosis
-    folder : path, made if it is not there
-    source, place : paths of the campaign and of the results, for the commands that the page gives
-
-    Returns
-    -------
-    dict
-        The content of diagnosis.json.
+    result : accelstudy.diagnosis.result.Diagnosis, all of it
+    source : path of the campaign, for the commands that are suggested
     """
-    folder = Path(folder)
-    document, calibration = diagnosis_document(diagnosis), None
-    positions = positions_table(diagnosis)
-    write_frame(folder / "positions.parquet", positions)
-    try:
-        calibration = diagnosed_calibration(diagnosis)
-    except (InputError, np.linalg.LinAlgError) as error:
-        document["calibration"] = {"file": None, "reason": str(error)}
-    else:
-        write_json(folder / "calibration.json", calibration)
-        document["calibration"] = {"file": "calibration.json", "mended": calibration["mended"]}
-    with whole_file(folder / "model.yaml") as path:
-        text = yaml.safe_dump(study_overlay(diagnosis), sort_keys=False, allow_unicode=True)
-        path.write_text(MODEL_HEADER + text, encoding="utf-8")
-    lines = words.verdict_lines(diagnosis)
-    write_page(
-        folder / "report.html",
-        "diagnosis/report/report.html.j2",
-        " ".join(lines),
-        d=diagnosis,
-        doc=document,
-        w=words,
-        lines=lines,
-        figures=save_all(diagnosis_figures(diagnosis, positions), folder / "figures"),
-        calibration=calibration,
-        rules=RULES,
-        missing=MISSING,
-        next_steps=next_steps(diagnosis, calibration, source, place),
-    )
-    write_json(folder / "diagnosis.json", document)
-    return document
+
+    kind = DIAGNOSIS
+
+    def __init__(self, result: found.Diagnosis, source: Path | None = None) -> None:
+        self.result, self.name = result, result.campaign.name
+        self.source = Path("CAMPAIGN") if source is None else source
+        self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Content of diagnosis.json."""
+        made = self._calibration
+        file: dict[str, Any] = {"file": None, "reason": made}
+        if not isinstance(made, str):
+            file = {"file": "calibration.json", "mended": made["mended"]}
+        return document.diagnosis_document(self.result) | {"calibration": file}
+
+    @cached_property
+    def _calibration(self) -> dict[str, Any] | str:
+        """Content of calibration.json; why there is none if it cannot be assessed."""
+        try:
+            return document.diagnosed_calibration(self.result)
+        except (InputError, LinAlgError) as error:
+            return str(error)
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration with what was found; raises `InputError` if there can be none."""
+        made = self._calibration
+        if isinstance(made, str):
+            raise InputError(f"the diagnosis gives no calibration: {made}")
+        return Calibration(document.diagnosed_fit(self.result), made)
+
+    @property
+    def state(self) -> str:
+        """One of no_effect, named, narrowed, learned, unknown, noise_model, gross_error."""
+        return self.result.verdict
+
+    @property
+    def verdict(self) -> str:
+        """What was found, in sentences."""
+        return " ".join(words.verdict_lines(self.result))
+
+    @property
+    def explanations(self) -> pd.DataFrame:
+        """What may be missing, and its posterior probability, most probable first."""
+        rows = [(" with ".join(one.names), one.posterior) for one in self.result.credible_set]
+        return pd.DataFrame(rows, columns=["explanation", "posterior"])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the explanations."""
+        return self.explanations
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the posterior probabilities of the explanations."""
+        draw_explanations(ax, self.result.credible_set)
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write what `accelstudy diagnose` does; diagnosis.json comes last."""
+        d, calibration = self.result, self._calibration
+        made = None if isinstance(calibration, str) else calibration
+        with stage("figures and page"):
+            positions = document.positions_table(d)
+            write_frame(folder / "positions.parquet", positions)
+            if made is not None:
+                write_json(folder / "calibration.json", made)
+            with whole_file(folder / "model.yaml") as path:
+                text = yaml.safe_dump(
+                    document.study_overlay(d), sort_keys=False, allow_unicode=True
+                )
+                path.write_text(MODEL_HEADER + text, encoding="utf-8")
+            write_page(
+                folder / "report.html",
+                "diagnosis/report/report.html.j2",
+                self.verdict,
+                d=d,
+                doc=self.content,
+                w=words,
+                lines=words.verdict_lines(d),
+                figures=save_all(diagnosis_figures(d, positions), folder / "figures"),
+                calibration=made,
+                rules=RULES,
+                missing=found.MISSING,
+                next_steps=next_steps(d, made, self.source, place),
+            )
+            write_json(folder / "diagnosis.json", self.content)
+
+    def tell(self, place: Path) -> None:
+        """Print the verdict and what is said with it."""
+        campaign = self.result.campaign
+        for warning in campaign.warnings:
+            warn(warning)
+        if self.result.recognised is not None:
+            warn(f"calibration.json is of mended data: {self.result.recognised.reason}")
+        verdict, *lines = words.verdict_lines(self.result)
+        show(verdict)
+        for line in lines:
+            say(line)
+        if campaign.log is not None and campaign.log.frame != FRD.name:
+            say(axes_note(campaign.log.frame))
+        say(f"report: {place / 'report.html'}")
 
 
 def next_steps(
-    diagnosis: Diagnosis,
+    diagnosis: found.Diagnosis,
     calibration: Mapping[str, Any] | None,
-    campaign: str | Path,
-    place: str | Path,
+    campaign: Path,
+    place: Path,
 ) -> list[tuple[str, str]]:
     """Say what to do next, most urgent first: what for, and the command.
 
@@ -102,7 +163,7 @@ def next_steps(
     """
     d, steps = diagnosis, []
     chosen = (campaign, d.model.name, d.approach.name, d.campaign.prior)
-    result = Path(place) / suggestions.HERE
+    result = place / suggestions.HERE
     if d.recognised is not None:
         command = suggestions.calibrate(*chosen)
         steps.append(("Correct the campaign, and calibrate it then", command))
@@ -121,6 +182,6 @@ def next_steps(
     if not unknown(needs_of(on_device)):
         steps.append(("Take it to a device", suggestions.export("c", result)))
     if d.extended_model is not d.model:
-        command = suggestions.calibrate("CAMPAIGN", Path(place) / "model.yaml", d.approach.name)
+        command = suggestions.calibrate("CAMPAIGN", place / "model.yaml", d.approach.name)
         steps.append(("Calibrate the next campaign with this model", command))
     return steps

@@ -13,15 +13,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.quality import root_of
-from accelstudy.diagnosis.evidence.size import Evidence, log_sum
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals, position_products
 from accelstudy.effects import Effect
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.evidence.size import Evidence
 
 Array = NDArray[np.float64]
 
@@ -377,6 +380,12 @@ def clusters(forces: NDArray[np.float64]) -> NDArray[np.int_]:
 
 
 # --- arithmetic -----------------------------------------------------------------------------------
+
+
+def log_sum(logs: Array) -> Array:
+    """Log of the sum of exp(logs) over the last axis."""
+    top = np.max(logs, axis=-1, keepdims=True)
+    return np.asarray(top[..., 0] + np.log(np.sum(np.exp(logs - top), axis=-1)))
 
 
 def cosines(a: Array, b: Array) -> Array:

@@ -13,16 +13,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
-from accelstudy.diagnosis.evidence.size import Evidence, log_sum
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import HoldColumns, SessionFit
-from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces
+from accelstudy.diagnosis.space.hypotheses import Shapes, Spaces, log_sum
 from accelstudy.effects.learned import TARGETS, added_by
 from accelstudy.effects.smooth import (
     CYCLES,
@@ -34,6 +33,9 @@ from accelstudy.effects.smooth import (
     spectrum,
 )
 from accelstudy.leveling.angles import wrap_angle
+
+if TYPE_CHECKING:
+    from accelstudy.diagnosis.evidence.size import Evidence
 
 Array = NDArray[np.float64]
 
