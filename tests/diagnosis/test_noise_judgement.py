@@ -9,17 +9,12 @@ from diagnosis_helpers import explanation, posed, shuffled
 from scipy import stats
 from usual import GRAVITY, NINE, G
 
-from accelstudy.adjustment import Observations
-from accelstudy.adjustment.quality import solve
 from accelstudy.diagnosis.decision import verdict
 from accelstudy.diagnosis.decision.noise import judged_noise, lack_of_fit, worst_of
 from accelstudy.diagnosis.decision.posterior import Posterior
 from accelstudy.diagnosis.decision.verdict import judge_noise
 from accelstudy.diagnosis.evidence.noise_tests import AXES, COLOUR, LEVEL, STEPS, TAILS, NoiseTest
 from accelstudy.diagnosis.evidence.size import Level
-from accelstudy.diagnosis.space.hypotheses import LackOfFit, clusters
-from accelstudy.diagnosis.space.residuals import Residuals
-from accelstudy.schemes import get_scheme
 from accelstudy.simulation.sessions import Noise, session
 
 OF_LEVEL, OF_ALL_OTHERS = 0.01, 0.01
@@ -142,34 +137,6 @@ def test_lack_of_fit_is_the_analysis_of_variance(missed):
     pure = np.sum((e[:18] - e[18:]) ** 2) / 2
     f = (np.sum(e**2) - pure) / 9 / (pure / 18)
     assert lack_of_fit(problem) == pytest.approx(stats.f.sf(f, 9, 18), rel=0.02)
-
-
-def near(directions, degrees, rng):
-    """Directions turned by up to so many degrees each, evenly over the cap."""
-    across = rng.standard_normal(directions.shape)
-    across -= np.sum(across * directions, axis=1, keepdims=True) * directions
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    angle = np.radians(degrees) * np.sqrt(rng.random((len(directions), 1)))
-    return directions * np.cos(angle) + across * np.sin(angle)
-
-
-def test_repeats_by_hand_count_and_the_lack_of_fit_keeps_its_level():
-    """A person turns back to within two degrees."""
-    rng, values = np.random.default_rng(17), []
-    for _ in range(150):
-        first = near(get_scheme("faces-edges-18").directions, 5, rng)
-        taken = np.concatenate([first, near(first, 2, rng)])
-        forces = -G * taken * [1.004, 0.997, 1.006] + [0.12, -0.08, 0.2]
-        forces += 0.002 * rng.standard_normal(forces.shape)
-        left = Residuals.of(solve(NINE, GRAVITY, Observations(forces[None], 0.002)))
-        labels = clusters(forces)
-        assert len(np.unique(labels)) == 18
-        same = LackOfFit.of(left, labels)
-        r, in_common, freedom = left.redundancy, float(same.parts(left.z)[0]), int(same.dims[0])
-        of_repeats = float(left.z @ left.z) - in_common
-        ratio = in_common / freedom / (of_repeats / (r - freedom))
-        values.append(stats.f.sf(ratio, freedom, r - freedom))
-    assert stats.kstest(values, "uniform").pvalue > 0.001
 
 
 @pytest.mark.parametrize(("level", "scatter", "holds"), [

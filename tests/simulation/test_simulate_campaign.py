@@ -1,20 +1,15 @@
 """Simulated campaigns: the truth is told, estimated again, and drawn from separate streams."""
 
-import math
-
 import numpy as np
 import pytest
 import yaml
 from calling import refusal, succeed
 from scipy import stats
-from usual import ROBOT
 
 from accelstudy.basics.units import MGON
-from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.effects import get_effect
-from accelstudy.sensors.sensor import SensorModel
 
 
 def simulate(**settings):
@@ -26,21 +21,6 @@ def values(entries):
 
 
 # --- what is simulated ---------------------------------------------------------------------------
-
-
-def test_hidden_effects_are_found_where_they_were_put():
-    effects = ("thermal_bias: 0.004, -0.002, 0.001", "warm_up(tau=400)")
-    campaign, truth = simulate(effects=effects, temperature=(20, 40), temperature_order="random")
-    assert values(truth["effects"]) == {
-        "b_T_x": 0.004, "b_T_y": -0.002, "b_T_z": 0.001,
-        **{name: pytest.approx(math.copysign(0.05, value))
-           for name, value in values(truth["effects"]).items() if name.startswith("w_")},
-    }  # fmt: skip
-    full = SensorModel.of("full", [*NINE_EFFECTS, "thermal_bias", "warm_up(tau=400)"])
-    fit = fit_campaign(campaign, full, ROBOT)
-    known = full.vector({**values(truth["sensor"]), **values(truth["effects"])})
-    assert np.abs((fit.parameters - known) / fit.adjustment.sigma_priori[0]).max() < 4.5
-    assert truth["effects"][1]["settings"] == {"tau": {"value": 400.0, "unit": "s"}}
 
 
 NINE_EFFECTS = ("bias", "scale", "nonorthogonality")

@@ -2,13 +2,10 @@
 
 import json
 import math
-import pickle
 
 import pytest
 import yaml
 from calling import call, refusal, refused
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from places import ROOT
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import validate
@@ -17,7 +14,6 @@ from study_helpers import NINE, content, grid, make_study
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON, MGON
-from accelstudy.effects import effect_names
 from accelstudy.files.reading import config_hash, overlay, read_layer
 from accelstudy.noise_effects import get_noise_effect
 from accelstudy.schemes import get_scheme, scheme_names
@@ -288,51 +284,3 @@ def test_a_value_that_is_spoilt_is_named(path):
         key = message.removeprefix("config: ").partition(": ")[0].split(".")
         place = [*map(str, path)]
         assert key[: len(place)] == place[: len(key)], message
-
-
-def some(values, most=2):
-    return st.lists(values, min_size=1, max_size=most)
-
-
-POSITIVE = st.floats(1e-6, 1.0)
-GRIDS = st.fixed_dictionaries(
-    {
-        "models": st.just("all") | some(st.sampled_from([*MODELS, "mine"])),
-        "schemes": some(st.sampled_from([*scheme_names(), "random-7-3"]), 4),
-        "replicates": st.integers(1, 5000),
-    },
-    optional={
-        "approaches": st.sampled_from(["all", "robot", ["gravity"], ["robot", "gravity"]]),
-        "sensor_sigma_mps2": some(POSITIVE | st.just(0.002)),
-        "robot_sigma_mgon": some(st.just(0) | POSITIVE),
-        "gravity_sigma_mps2": some(st.just(0) | POSITIVE),
-        "gravity_error_mps2": some(st.floats(-1, 1)),
-    },
-)
-VALID = st.fixed_dictionaries(
-    {"grids": some(GRIDS, 3)},
-    optional={
-        "presets": st.none() | st.fixed_dictionaries({"replicates": st.integers(1, 5000)}),
-        "simulated_effects": st.just("model")
-        | st.lists(st.sampled_from(effect_names()), min_size=1, unique=True),
-    },
-)
-HOLDS = {"interval_s": 30, "temperature_degC": [10, 30], "vibration_mps2": [0, 1]}
-"""What some effects need."""
-
-
-@settings(max_examples=10)
-@given(keys=VALID)
-def test_cells_of_any_valid_study(keys):
-    study = make_study(models={"mine": ["bias", "cubic_scale"]}, holds=HOLDS, **keys)
-    assert parse_study(json.loads(json.dumps(study.model_dump(mode="json")))) == study
-
-    cells = study.cells
-    assert cells
-    assert len({cell.name for cell in cells}) == len(cells)
-    for cell in cells:
-        assert pickle.loads(pickle.dumps(cell)) == cell
-        assert set(cell.truth) >= set(cell.simulated_model.parameter_names)
-    # One cell, one set-up.
-    setups = {(c.effects, c.scheme, c.approach, c.noise, c.model) for c in cells}
-    assert len(setups) == len(cells)
