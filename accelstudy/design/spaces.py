@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError
-from accelstudy.basics.units import ANGLE_UNITS, attitude_unit, to_attitude, to_si
+from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.units import ANGLE_UNITS, GON, attitude_unit, to_attitude, to_si
 from accelstudy.basics.wording import short_list
 from accelstudy.files.reading import read_text
 from accelstudy.leveling.angles import angles_of, specific_force
@@ -112,6 +113,30 @@ def attitudes_by_eye(step: float) -> Attitudes:
         f"a block held by hand: roll and pitch in steps of {np.degrees(np.pi / 2 / turns):g}°",
         _unit(np.array([*points, [1.0, 0, 0], [-1.0, 0, 0]])),
     )
+
+
+NAMED: dict[str, Callable[[], Attitudes]] = {
+    "all": Attitudes,
+    "cube": cube,
+    "hand": partial(attitudes_by_eye, np.pi / 6),
+    "grid": partial(attitudes_by_eye, 25 * GON),
+}
+"""Sets of attitudes; steps of 30° are judged by eye, those of 25 gon are for a robot."""
+
+
+def find_attitudes(name: str, names: Collection[str]) -> Attitudes:
+    """Attitudes by their name, one of some of `NAMED`, or the path of a CSV file.
+
+    Raises
+    ------
+    InputError
+        If there is no such set, or the file cannot be read.
+    """
+    if name in names:
+        return NAMED[name]()
+    if name.endswith(".csv") or "/" in name:
+        return read_attitudes(Path(name))
+    raise UnknownNameError("set of attitudes", name, (*names, "FILE.csv"))
 
 
 def read_attitudes(path: Path) -> Attitudes:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-
-import numpy as np
 
 from accelstudy.approaches import get_approach
 from accelstudy.basics.bounds import Range
@@ -14,7 +11,7 @@ from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.units import GON, STANDARD_GRAVITY, parse_quantity
 from accelstudy.design.criteria import CRITERIA, DISCRIMINATE, ROBUST, Criterion, get_criterion
 from accelstudy.design.search import STARTS, Search
-from accelstudy.design.spaces import Attitudes, attitudes_by_eye, cube, read_attitudes
+from accelstudy.design.spaces import Attitudes, find_attitudes
 from accelstudy.design.task import Task
 from accelstudy.effects import get_effect
 from accelstudy.leveling.error import MAX_TILT_GON
@@ -23,8 +20,6 @@ from accelstudy.sensors.models import get_model
 from accelstudy.simulation.sessions import Noise
 
 SPACES = ("all", "cube", "hand")
-HAND_STEP = np.pi / 6
-"""rad, step in which a person judges roll and pitch by eye."""
 MOST_POSITIONS = Range(1, 300)
 
 
@@ -133,18 +128,8 @@ class Request:
     @cached_property
     def allowed(self) -> Attitudes:
         """The attitudes to choose from, and what constrains the positions."""
-        if self.attitudes == "all":
-            chosen = Attitudes()
-        elif self.attitudes == "cube":
-            chosen = cube()
-        elif self.attitudes == "hand":
-            chosen = attitudes_by_eye(HAND_STEP)
-        elif self.attitudes.endswith(".csv") or "/" in self.attitudes:
-            chosen = read_attitudes(Path(self.attitudes))
-        else:
-            raise UnknownNameError("attitudes", self.attitudes, (*SPACES, "a path ending in .csv"))
         return replace(
-            chosen,
+            find_attitudes(self.attitudes, SPACES),
             roll=self.roll,
             pitch=self.pitch,
             pole_distance=self.pole_distance,

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from accelstudy.basics.errors import InputError, UnknownNameError
+from accelstudy.basics.errors import InputError
 from accelstudy.basics.units import GON
 from accelstudy.design.information import Information
-from accelstudy.design.spaces import attitudes_by_eye, cube, read_attitudes
+from accelstudy.design.spaces import find_attitudes
 from accelstudy.leveling.error import TiltError
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.sequential.promise import Promise
@@ -29,8 +28,6 @@ EQUAL_GAIN = 0.99
 taken. So neither rounding nor noise decides, and simple attitudes can come first."""
 MAX_FORECAST = 500
 """Largest number of further positions that is forecast."""
-GRID_STEP = 25 * GON
-"""Step of roll and pitch in the grid."""
 SETS = {"cube": "faces, edges and corners of a cube", "grid": "roll and pitch in steps of 25 gon"}
 DEFAULTS = {"gravity": "cube", "robot": "grid"}
 """Default set of attitudes of an approach: a block on a table, a grid for a robot."""
@@ -59,15 +56,8 @@ def candidate_positions(
     InputError
         If there is no such set, the file cannot be read, or nothing is left.
     """
-    if name == "cube":
-        chosen = cube()
-    elif name == "grid":
-        chosen = attitudes_by_eye(GRID_STEP)
-    elif name.endswith(".csv"):
-        chosen = read_attitudes(Path(name))
-    else:
-        raise UnknownNameError("set of attitudes", name, (*SETS, "FILE.csv"))
     roll, pitch = (None if most is None else (-most, most) for most in (max_roll, max_pitch))
+    chosen = find_attitudes(name, SETS)
     left = replace(chosen, roll=roll, pitch=pitch, pole_distance=pole_distance).sample(0)
     if not len(left):
         raise InputError(f"attitudes: none of {name} is within the limits that are given")
