@@ -70,7 +70,7 @@ class Optimum:
 class Search:
     """The search for the n positions that are best by a criterion.
 
-    The same search finds the same positions, on every processor.
+    The same search finds the same positions on every processor, but for their last digit.
 
     Attributes
     ----------
