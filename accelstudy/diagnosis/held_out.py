@@ -77,7 +77,7 @@ def gap_of(case: Case, finding: Finding, seeds: Sequence[np.random.SeedSequence]
     ----------
     case : Case
     finding : Finding
-    seeds : of the split, the resampling, and the simulated threshold
+    seeds : of the split and of the simulated threshold
     """
     base, final = case.problem.base.solution, finding.frame.solution
     before = base.omega / base.redundancy
@@ -115,14 +115,14 @@ def _predict(case: Case, finding: Finding, gap: Gap, rngs: Sequence[np.random.Ge
         return replace(gap, reason=refit)
     known = problem.evidence.level.known
     variance = judged_noise(problem, finding.frame).variance if known else None
-    test = held_out_gap(base, refit, first.observed.take(held), held, variance, rngs[1])
+    test = held_out_gap(base, refit, first.observed.take(held), held, variance)
     if others:
         another = "effect" if place is None else "coordinate or target"
         reason = f"the fitted positions alone would have chosen another {another}"
         return replace(gap, held_out=test, reason=reason)
     split = LinearSplit(problem.frame, fitted, held)
     beyond = case.detection.threshold(RULES.level(known))
-    test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[2]))
+    test = replace(test, needed=threshold(case, place, beyond, part.problem, split, rngs[1]))
     gap = replace(gap, held_out=test, confirmed=test.significant)
     alone = finding.verdict == "named" and len(finding.chosen) == 1
     # Of what leaves more than the noise the name may be that of something that is not listed.

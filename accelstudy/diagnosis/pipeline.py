@@ -65,14 +65,11 @@ def diagnose(
     recognised = recognise(campaign, approach.uses_angles)
     if recognised is not None:
         campaign = recognised.corrected
-    null, split, resampling, threshold = (
-        # A stream for each, so that none changes what another one draws.
-        np.random.SeedSequence(seed, spawn_key=(key,))
-        for key in (0, 1, 2, 4)
-    )
+    # A stream for each, so that none changes what another one draws.
+    null, *others = (np.random.SeedSequence(seed, spawn_key=(key,)) for key in (0, 1, 4))
     base = fit_base(campaign, model, approach)
     case = Case(pose(base), campaign, Chance(null, len(base.solution.design)))
-    finding, gap = confirm(case, decide(case), [split, resampling, threshold])
+    finding, gap = confirm(case, decide(case), others)
     return Diagnosis(case, finding, gap, recognised)
 
 
@@ -115,7 +112,7 @@ def confirm(
     ----------
     case : Case
     finding : Finding
-    seeds : of the split, the resampling and the simulated threshold
+    seeds : of the split and of the simulated threshold
 
     Returns
     -------

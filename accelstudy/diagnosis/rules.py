@@ -101,7 +101,7 @@ class Rules:
     # --- what can be seen, and what is the same --------------------------------------------------
 
     rival: float = 0.5
-    """Canonical cosine from which on an effect is listed as a rival."""
+    """Canonical cosine from which on an effect may stand in the place of another."""
     imitates: float = 0.9995
     """Canonical cosine from which on two signatures are the same in what is confirmed."""
     alike: float = 0.9999

@@ -75,8 +75,7 @@ def predicted(campaign):
     held = np.arange(0, n, 3)
     base = solve(first.model, GRAVITY, first.observed.take(np.setdiff1d(np.arange(n), held)))
     extended = refit(base, [examine(base).hypothesis(get_effect("quadratic_scale"))])
-    rng = np.random.default_rng(1)
-    return held_out_gap(base, extended, first.observed.take(held), held, 1.0, rng)
+    return held_out_gap(base, extended, first.observed.take(held), held, 1.0)
 
 
 def test_the_held_out_positions_refute_an_effect_that_is_not_there():

@@ -35,7 +35,7 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
         base, more = (solve(model, approach, part) for model in (NINE, extended))
-        z.append(prediction.held_out_gap(base, more, rest, held, 1.0, rng).z)
+        z.append(prediction.held_out_gap(base, more, rest, held, 1.0).z)
     assert abs(np.mean(z)) < 4 / math.sqrt(len(z))
     assert abs(np.std(z) - 1) < 4 / math.sqrt(2 * len(z))
 

@@ -77,7 +77,7 @@ def test_prediction_to_first_order_is_that_of_refits(parts):
     first, base = problem.base.solution, part.base.solution
     fit = refit(part.frame.solution, [weighed(part).best["quadratic_scale"]])
     rest = first.observed.take(split.held)
-    gap = held_out_gap(base, fit, rest, split.held, 1.0, np.random.default_rng(1))
+    gap = held_out_gap(base, fit, rest, split.held, 1.0)
     errors = problem.residuals.errors[None]
     missed = split.base_residuals(errors)[1]
     (columns,) = problem.frame.columns([weighed(problem).best["quadratic_scale"]])

@@ -8,7 +8,7 @@ import pytest
 from diagnosis_helpers import campaign, design, shuffled, some_holds
 from usual import GRAVITY, NINE, G
 
-from accelstudy.diagnosis.space.frame import signature
+from accelstudy.diagnosis.space.frame import HoldColumns, signatures
 from accelstudy.diagnosis.space.hypotheses import OUTLIER
 from accelstudy.diagnosis.visibility import (
     examine_campaign,
@@ -40,7 +40,7 @@ def test_a_signature_is_the_derivative_of_what_is_observed(name):
     first = sum(len(e.parameters) for e in others)
     k = len(effect.parameters)
     # Effects act on the force along the sensitive axes, at an ideal sensor that of the body.
-    shown = signature(effect, FULL.f_b, FULL.angles, G, FULL.hold)
+    shown = signatures((effect,), FULL.f_b, FULL.angles, G, HoldColumns(FULL.hold, 2))
     assert shown.force.shape == (len(FULL.f_b), 3, k)
     step = 1e-6 * effect.typical[0]
     for j in range(k):

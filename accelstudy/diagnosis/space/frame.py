@@ -188,13 +188,6 @@ class HoldColumns:
         return self._computed[tau]
 
 
-def signature(
-    effect: Effect, forces: Array, angles: Array, g: float, hold: HoldConditions
-) -> Signature:
-    """Signature of one effect; see `signatures`."""
-    return signatures((effect,), forces, angles, g, HoldColumns(hold, 2))
-
-
 def signatures(
     shapes: Sequence[Effect], forces: Array, angles: Array, g: float, hold: HoldColumns
 ) -> Signature:
