@@ -365,18 +365,6 @@ def test_every_effect_can_be_estimated(name):
     assert np.abs(z.std(axis=0) - 1).max() < 4.5 / math.sqrt(2 * replicates)
 
 
-def test_the_norm_of_gravity_is_blind_to_rotations_and_to_the_robot():
-    rotations = ("cross_axis_misalignment", "mounting_rotation", *RIG)
-    for name in rotations:
-        assert design(name, approach=GRAVITY).rank == 9, name
-    for name in OTHERS:
-        if name not in rotations:
-            spec = SHAPES.get(name, name)
-            number = len(get_effect(name).parameters)
-            seen = design(spec, approach=GRAVITY, scheme=get_scheme("fibonacci-60"))
-            assert seen.rank == 9 + number, name
-
-
 @pytest.mark.parametrize(("effects", "approach", "columns", "rank"), [
     # Mounting rotation and cross-axis misalignment span the same three dimensions.
     (("mounting_rotation", "cross_axis_misalignment"), ROBOT, {}, 12),

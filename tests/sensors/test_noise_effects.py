@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from study_helpers import grid, make_cells, simulated
+from study_helpers import grid, make_cells
 from usual import NINE
 
 from accelstudy.effects import HoldConditions
@@ -118,22 +118,6 @@ def test_quantisation_is_the_last_thing_that_happens():
 
 
 # --- in a study ----------------------------------------------------------------------------------
-
-
-def test_cells_have_the_noise_effects_of_the_study():
-    plain = make_cells(grid())
-    cells = make_cells(grid(), noise={"effects": ["noise_level(kappa=4)", "quantisation"]})
-    for name, cell in cells.items():
-        assert cell.noise.effects[0] == "noise_level(kappa=4)"
-        assert tuple(cell.seed(1, 0).generate_state(4)) != tuple(
-            plain[name].seed(1, 0).generate_state(4)
-        )
-    cell = make_cells(grid(replicates=2000), noise={"effects": ["noise_level(kappa=4)"]})
-    result = simulated(cell["bias-scale-nonorthogonality/mclaren-24/gravity"])
-    # Ω is 4 χ²_r.
-    assert result.omega.mean() / result.redundancy == pytest.approx(
-        4, rel=4.5 * math.sqrt(2 / result.redundancy / 2000)
-    )
 
 
 def test_seeds_of_cells_without_noise_effects_are_those_of_old():
