@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 
 from accelstudy.approaches import get_approach
-from accelstudy.campaign.calibration.document import to_gauge
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.calibration.sensor_calibration import affine_form
 from accelstudy.campaign.importing.logs import import_log
@@ -158,7 +157,8 @@ def authors(folder):
         campaign, _ = import_log(public_file(name, folder), import_settings(name))
         fit = ours(campaign, "bias-scale-nonorthogonality")()
         k, b = affine(fit)
-        k = to_gauge(k, "upper") * G / campaign.gravity  # they took 9.81 m/s²
+        # Theirs is a triangle, and they took 9.81 m/s².
+        k = np.linalg.cholesky(k.T @ k).T * G / campaign.gravity
         # Theirs are errors of the readings, of which K takes away those of the scales.
         scale, offset = 100 * (1 / np.diag(k) - 1), b
         sigma = fit.sigma[:6]
