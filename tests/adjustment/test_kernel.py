@@ -21,7 +21,7 @@ from accelstudy.study.compiling import POSITIONS_PER_PARAMETER
 
 pytest.importorskip("llvmlite")
 
-from accelstudy.kernel import calibrate, compiled
+from accelstudy.kernel import calibrate
 from accelstudy.kernel.formulas import Formulas
 from accelstudy.kernel.lanes import LANES, Code
 
@@ -142,20 +142,20 @@ def test_the_formulas_of_every_effect(approach):
         for k, value in enumerate(formulas.write(code, table)):
             code.store(value, "y", str(k * LANES))
         result = np.empty((len(traced.expressions), LANES))
-        compiled.Compiled(str(code), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
+        calibrate.Compiled(str(code), "f", 0, 2).call(values.ctypes.data, result.ctypes.data)
         expected = traced((LANES,), *values).reshape(result.shape)
         assert result == pytest.approx(expected, rel=1e-11, abs=1e-11)
 
 
 def test_what_is_compiled_is_compiled_once(monkeypatch):
-    made, make = [], compiled._compiled
-    monkeypatch.setattr(compiled, "_compiled", lambda *a: made.append(1) or make(*a))
+    made, make = [], calibrate._compiled
+    monkeypatch.setattr(calibrate, "_compiled", lambda *a: made.append(1) or make(*a))
     for _ in range(2):
         code = Code("f", (), ("x",))
         x = code.load("x", "0")
         code.store(x + x, "x", "0")
         values = np.arange(float(LANES))
-        compiled.Compiled(str(code), "f", 0, 1).call(values.ctypes.data)
+        calibrate.Compiled(str(code), "f", 0, 1).call(values.ctypes.data)
         assert np.array_equal(values, 2 * np.arange(LANES))
     assert len(made) == 1
 
