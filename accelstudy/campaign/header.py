@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from datetime import date as calendar_date
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,16 +116,6 @@ Place = Annotated[StrictInt, Field(ge=0)] | StrictStr
 """A column by its name in the header, or by its place, counted from 0."""
 
 
-def _delimiter(value: Any) -> Any:
-    """Delimiter by any usual name."""
-    names = {"\t": "tab", "\\t": "tab", " ": "blank", "blanks": "blank", "space": "blank"}
-    names |= {"comma": ",", "semicolon": ";"}
-    value = names.get(value, value) if isinstance(value, str) else value
-    if not isinstance(value, str) or not (value in ("tab", "blank") or _IS_DELIMITER(value)):
-        raise ValueError("must be one mark, as ; or |, or tab or blank")
-    return value
-
-
 def _usual_spelling(*units: str) -> Callable[[Any], Any]:
     """Make a validator that takes a unit in any usual spelling: m/s2, µs."""
 
@@ -137,14 +126,13 @@ def _usual_spelling(*units: str) -> Callable[[Any], Any]:
     return read
 
 
-_IS_DELIMITER = re.compile(r"[^\w\s.+\-\"'#%\x00-\x1f\x7f-\uffff]").fullmatch
-
-
 class LogLayout(ConfigSection):
     """Layout of a log: how `import` read its numbers, and `apply` reads them again.
 
     Scale and offset are in the order of the log's own axes, whatever its frame.
     """
+
+    retired: ClassVar = {"delimiter": "it is told from the rows"}
 
     columns: dict[str, Place] = Field(
         {},
@@ -158,11 +146,6 @@ class LogLayout(ConfigSection):
     rate_hz: Rate | None = Field(None, description="samples per second, without time")
     variable: str | None = Field(
         None, description="which array of a MATLAB file, topic of a bag, or instance of a ULog"
-    )
-    delimiter: Annotated[str, BeforeValidator(_delimiter)] | None = Field(
-        None,
-        description="between the columns of a text, as ; or tab or blank; told from its rows if "
-        "absent",
     )
     unit: Annotated[
         Literal["m/s^2", "g", "mg", "counts"],

@@ -94,7 +94,7 @@ IMPORT = Command(
         click.Option(["--figure/--no-figure"], default=True, help="Draw the log with its holds."),
     ),
     sections={
-        "The log": "columns sensors time time_unit rate delimiter variable",
+        "The log": "columns sensors time time_unit rate variable",
         "Its numbers": "unit scale offset range frame",
         "The holds": "threshold window trim shortest exclude figure",
         "A log of blocks instead": "block",

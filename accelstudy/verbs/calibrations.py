@@ -126,7 +126,6 @@ def apply(
     time: kinds.Time = None,
     time_unit: kinds.TimeUnit = None,
     rate: kinds.Rate = None,
-    delimiter: kinds.Delimiter = None,
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
     start: Annotated[Quantity | None, si("s", 0.0, TIME.most)] = None,
@@ -153,8 +152,6 @@ def apply(
         Any log that `accelstudy import` reads.
     time_unit : str
         Unit of the time: s, ms, us or ns.
-    delimiter : str
-        Between columns of text: ; or tab or blank.
     unit : str
         Unit of the readings: m/s^2, g, mg or counts.
     start : float in s, or str with a unit

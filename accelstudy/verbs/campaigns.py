@@ -34,7 +34,6 @@ def read_log(
     time: kinds.Time = None,
     time_unit: kinds.TimeUnit = None,
     rate: kinds.Rate = None,
-    delimiter: kinds.Delimiter = None,
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
     scale: kinds.Scale = None,
@@ -59,7 +58,7 @@ def read_log(
     from accelstudy.campaign.importing.formats import open_source
 
     read = log_of(log, given)
-    open_source(read.file, read.layout.get("variable"), read.layout.get("delimiter"))
+    open_source(read.file, read.layout.get("variable"))
     return read
 
 
@@ -71,7 +70,6 @@ def find_holds(
     time: kinds.Time = None,
     time_unit: kinds.TimeUnit = None,
     rate: kinds.Rate = None,
-    delimiter: kinds.Delimiter = None,
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
     scale: kinds.Scale = None,

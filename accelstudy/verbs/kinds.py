@@ -265,9 +265,6 @@ Rate = Annotated[
     si("Hz", bounds.RATE.least, bounds.RATE.most),
     "Samples per second, where there is no time.",
 ]
-Delimiter = Annotated[
-    str | None, TEXT, "Between columns of text: ; or tab or blank. [default: from its rows]"
-]
 Variable = Annotated[
     str | None, TEXT, "Array of a MATLAB file, topic of a bag or instance of a ULog."
 ]

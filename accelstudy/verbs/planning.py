@@ -302,7 +302,6 @@ def data_sheet(
     time: kinds.Time = None,
     time_unit: kinds.TimeUnit = None,
     rate: kinds.Rate = None,
-    delimiter: kinds.Delimiter = None,
     variable: kinds.Variable = None,
     unit: kinds.Unit = None,
     scale: kinds.Scale = None,

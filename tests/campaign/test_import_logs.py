@@ -35,7 +35,6 @@ HEADS = {
     "comment": (("# time", "ax", "ay", "az"), {}),
 }
 """Names of columns in the first row, and what a reader needs besides."""
-GIVEN = {"\t": "tab", "   ": "blank", " , ": "comma"}
 CALIBRATED = [f"f{axis}_calibrated_mps2" for axis in "xyz"]
 
 
@@ -48,8 +47,6 @@ def layouts(draw):
 
     delimiter = one(",", ";", "\t", "|", "   ", " , ")
     names, options = HEADS[one("", "names", "comment", *(["units"] if delimiter.strip() else []))]
-    if one(delimiter == "|", True):
-        options = {**options, "delimiter": GIVEN.get(delimiter, delimiter)}
     decimal = one(".", "." if "," in delimiter else ",")
     mark = one("", '"' if delimiter in ",;\t" else "")
     behind = one("", delimiter, f"{delimiter}x_a") if delimiter.strip() == "," else ""

@@ -116,7 +116,6 @@ REFUSED = [
     (ABAC, f"{BY_PLACE} --unit counts", "0.00059855 where 1 g is 16384 counts"),
     (ABAC, "--frame fru", "is left-handed"),
     (ABAC, "--range '8 feet'", "--range: '8 feet': the unit must be one of mm/s^2, m/s^2, mg"),
-    (ABAC, "--delimiter ab", "--delimiter: must be one mark, as ; or |, or tab or blank"),
     (ABAC, "--settings none.yaml", "none.yaml: no such file"),
     (HELD / G, "--rate 100", "look like g, not m/s^2; give --unit g"),
     (HELD, "--rate 100 --unit g", "look like m/s^2, not g; give --unit m/s^2"),

@@ -66,6 +66,7 @@ AROUND = {
     # Neither numbers in notes nor the blanks of a column of words tell the delimiter.
     "notes above": ([*NOTES, "// 50 Hz by 3 axes on 1 board in 26 positions", *SPARSE],
                     "forces from ax, ay, az"),
+    "bars": (rows_of(table(), sep="|"), "forces from ax, ay, az"),
     "words": (rows_of(table(note=["say, 0"] * N), sep="\t"), "forces from ax, ay, az"),
 }  # fmt: skip
 
@@ -80,15 +81,6 @@ def test_what_stands_around_the_rows(tmp_path, case):
     if case in ("first row", "header again", "labels", "units"):
         leveled = acs.calibrate(campaign).apply(path)
         assert leveled["roll_gon"].notna().sum() == N - (case == "first row")
-
-
-def test_a_delimiter_can_be_given(tmp_path):
-    path = written(tmp_path, rows_of(table(), sep="|"))
-    succeed("import", path, "--delimiter", "|", "--no-figure", "--out", tmp_path / "out")
-    acs.calibrate(acs.read_campaign(tmp_path / "out")).save(tmp_path / "calibrated")
-    document = tmp_path / "calibrated/calibration.json"
-    options = ("--delimiter", "|", "--out", tmp_path / "level.csv")
-    assert f"{N} of {N} rows leveled" in succeed("apply", document, path, *options).stdout
 
 
 def test_a_large_reading_costs_no_digits():

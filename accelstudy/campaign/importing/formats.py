@@ -19,7 +19,7 @@ _NO_TABLE = re.compile(rb"BZh|%PDF|(\xef\xbb\xbf)?\s*[\[{]\s*[\[{\"}]")
 """What files begin with that look like text: an archive, a document, JSON."""
 
 
-def open_source(path: LogFile, variable: str | None = None, delimiter: str | None = None) -> Source:
+def open_source(path: LogFile, variable: str | None = None) -> Source:
     """Open a file of numbers, by its ending and its first bytes.
 
     Parameters
@@ -27,7 +27,6 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
     path : file, or a table in memory, which is a source already; a pipe is none, since a log is
         read more than once
     variable : str, which array of a MATLAB file, topic of a bag or sensor of a flight log
-    delimiter : str, between the columns of a text, see `LogLayout`
     """
     if isinstance(path, Source):
         return path
@@ -46,7 +45,7 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
     if path.suffix.lower() in (".parquet", ".pq"):
         return open_parquet(path)
     if start.startswith(GZIP):
-        return TextSource(path, delimiter)
+        return TextSource(path)
     # An ASCII .mat has no zero bytes; every binary one has some in its header.
     if path.suffix.lower() == ".mat" and 0 in start:
         return open_matlab(path, variable)
@@ -59,4 +58,4 @@ def open_source(path: LogFile, variable: str | None = None, delimiter: str | Non
             f"{path}: no text, MATLAB file up to version 7, Parquet, bag or ULog; unpack an "
             "archive, and save a workbook or JSON as CSV, with a row for each sample"
         )
-    return TextSource(path, delimiter)
+    return TextSource(path)

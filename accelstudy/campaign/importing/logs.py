@@ -86,7 +86,7 @@ def import_sensors(
     """
     _check_kinds(len(paths), settings, reference)
     settings = named_after(settings, paths)
-    files = [open_source(path, settings.variable, settings.delimiter) for path in paths]
+    files = [open_source(path, settings.variable) for path in paths]
     if settings.means:
         told, forces, columns = read_means(files[0], settings)
         return {"": (_campaign(paths[0], told, forces, **columns), None)}

@@ -86,7 +86,7 @@ def read_log(
         raise InputError(f"{path}: give the rate or the column of time, not both")
     kind = LogLayout if layout is None else type(layout)
     chosen = _laid_over(like, given, kind)
-    source = open_source(path, chosen.variable, chosen.delimiter)
+    source = open_source(path, chosen.variable)
     told: dict[str, Any] = {}
     if another := like is None or like.columns.get("fx") not in source.names:
         told = {k: v for k, v in source.layout.items() if k != "time" or "rate_hz" not in given}

@@ -49,7 +49,10 @@ class RobotSettings(ConfigSection):
 class ImportSettings(LogLayout):
     """How a log is read, and what the campaign gets from it; the keys of a settings file."""
 
-    retired: ClassVar = {"join": "holds in one attitude are positions each"}
+    retired: ClassVar = {
+        **LogLayout.retired,
+        "join": "holds in one attitude are positions each",
+    }
 
     means: bool = Field(False, description="the file is a table of means already")
     block: int | None = Field(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from io import BytesIO
-from itertools import islice, takewhile
+from itertools import islice, product, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +35,8 @@ _PREVIEW = 65536  # characters of a text from which the layout of its rows is to
 _BLOCK = 2**20  # bytes that hold any line
 _COMMENTS = ("#", "%", "//", ";")
 _NO_READING = frozenset({"", "-", "--", "nan", "na", "n/a", "null", "none"})
-_SEPARATORS = {"tab": "\t", "blank": None}
-_LAYOUTS = ((",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (None, "."), (None, ","))
+_LAYOUTS = ((",", "."), *product((";", "\t", "|", None), ".,"))
+"""Delimiters, None for blanks, with decimal marks."""
 _LABEL = re.compile(rb"(?<![\w.])([A-Za-z_]\w*)[ \t]*[:=][ \t]*(?=[-+.\d])")
 """Name of the number that follows, as in ``ax: 0.12`` or ``ax=0.12``."""
 _DECIMAL_COMMA = r"^([+-]?[0-9]*),([0-9]+([eE][+-]?[0-9]+)?)$"
@@ -53,11 +53,11 @@ class TextSource(Source):
     path, dates, layout, notes, warnings : see `Source`
     """
 
-    def __init__(self, path: Path, delimiter: str | None = None) -> None:
+    def __init__(self, path: Path) -> None:
         self.path, self._repeated = path, 0
         self._content: bytes | None
         self._content, labels = _read(path)
-        self._rows = _Rows.told_from(self._content, path, delimiter)
+        self._rows = _Rows.told_from(self._content, path)
         names = labels if len(labels) == self._rows.width else self._rows.names
         self.named = names is not None
         self.names = names or [str(i) for i in range(self._rows.width)]
@@ -253,25 +253,20 @@ class _Rows:
         self._quoted = re.compile(f'(^|{mark}) *"([^"{mark}]*)"')
 
     @classmethod
-    def told_from(cls, content: bytes, path: Path, delimiter: str | None) -> _Rows:
-        """Tell the delimiter, unless it is given, and the decimal mark of a text."""
+    def told_from(cls, content: bytes, path: Path) -> _Rows:
+        """Tell the delimiter and the decimal mark of a text."""
         lines = content[:_PREVIEW].decode(errors="replace").split("\n")
         if len(content) > _PREVIEW:
             if len(lines) == 1:
                 raise InputError(f"{path}: no end of a line in {_PREVIEW} characters; is it text?")
             lines.pop()  # it may be cut
-        layouts = _LAYOUTS
-        if delimiter is not None:
-            given = _SEPARATORS.get(delimiter, delimiter)
-            layouts = ((given, "."), *(() if given == "," else ((given, ","),)))
-        tables = [cls(lines, *layout) for layout in layouts]
+        tables = [cls(lines, *layout) for layout in _LAYOUTS]
         if any(table.delimiter == "\t" and table.many >= 3 for table in tables):
             # Tabs make a log of the rows already, so blanks are those of a note.
             tables = [table for table in tables if table.delimiter is not None]
         best = max(tables, key=lambda table: table.score)
         if not best.score:
-            advice = "" if delimiter is None else f" with `delimiter` {delimiter!r}"
-            raise InputError(f"{path}: no line of numbers at the beginning{advice}")
+            raise InputError(f"{path}: no line of numbers at the beginning")
         return best
 
     def split(self, line: str) -> list[str]:
