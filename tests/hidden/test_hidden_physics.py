@@ -10,7 +10,7 @@ from usual import NINE
 
 from accelstudy.approaches import get_approach
 from accelstudy.campaign.calibration.fit import fit_campaign
-from accelstudy.diagnosis.space.frame import signature
+from accelstudy.diagnosis.space.frame import HoldColumns, signatures
 from accelstudy.effects import effect_names, get_effect
 from studies.hidden import physics
 from studies.hidden.physics.designs import APPROACHES, Course, session
@@ -104,7 +104,7 @@ def test_effects_leave_what_those_of_the_catalogue_leave(name, approach):
     forces, angles = (part[0] for part in observe(own.session, Sensor(), ()))
     hold = replace(campaign, forces=forces, angles=angles).hold
     other = type(get_effect(name))(**settings)
-    found = signature(other, forces, angles, GRAVITY, hold)
+    found = signatures((other,), forces, angles, GRAVITY, HoldColumns(hold, 2))
     step = 1e-4 / max(np.abs(found.force).max(), np.abs(found.angles).max())
     left = [
         own.conditions.seen(
