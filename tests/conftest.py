@@ -4,11 +4,17 @@ import os
 
 import pytest
 import stand_ins
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from accelstudy.drawing import saving
 
-settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
+settings.register_profile(
+    "repeatable",
+    deadline=None,
+    derandomize=True,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],  # no test fails by a clock
+)
 settings.load_profile("repeatable")
 os.environ.pop("ACCELSTUDY_ANGLE_UNIT", None)
 saving._element = stand_ins.element  # unless a test asks for `composed` or `drawn`

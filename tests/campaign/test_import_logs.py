@@ -181,7 +181,10 @@ cells = st.one_of(
 )
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=80,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
 @given(
     st.lists(st.lists(cells, max_size=6), max_size=40),
     st.sampled_from([",", ";", " ", "\t", ", "]),

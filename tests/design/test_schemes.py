@@ -217,7 +217,7 @@ def test_orders_keep_a_drift_apart_from_the_parameters(name):
 
 
 @given(n=st.integers(1, 300))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_fibonacci(n):
     found = get_scheme(f"fibonacci-{n}")
     assert found.n_positions == n
@@ -229,7 +229,7 @@ def test_fibonacci(n):
 
 
 @given(n=st.integers(2, 300))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_antipodal_free(n):
     directions = get_scheme(f"antipodal-free-{n}").directions
     between_axes = np.minimum(angles(directions), np.pi - angles(directions))
@@ -238,7 +238,6 @@ def test_antipodal_free(n):
 
 @example(n=38, seed=0)
 @given(n=st.integers(1, 200), seed=st.integers(0, 10**18 - 1))
-@settings(deadline=None, max_examples=50)
 def test_random(n, seed):
     found = get_scheme(f"random-{n}-{seed}")
     assert found.n_positions == n

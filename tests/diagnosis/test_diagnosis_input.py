@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from calling import refusal, succeed
 from diagnosis_helpers import SCHEMA, campaign
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from usual import GRAVITY, NINE, ROBOT
 
@@ -192,9 +192,7 @@ SETTINGS = st.fixed_dictionaries(
     "temperature": (10.0, 40.0), "vibration": (0.0, 2.0), "sigma_known": False,
 })  # fmt: skip
 @given(SETTINGS)
-@settings(
-    max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
+@settings(max_examples=8)
 def test_every_campaign_has_a_verdict_or_a_reason(keys):
     """Nothing but `InputError`; a sentence, and a document that JSON takes and the schema fits."""
     try:
