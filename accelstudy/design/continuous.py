@@ -86,8 +86,7 @@ def continuous_optimum(task: Task, criterion: Criterion, allowed: Attitudes, n: 
         value = float(criterion.value(normal))
         slope = criterion.gradient(normal).ravel()
         lowest = fine[np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]]
-        if allowed.points is None:
-            lowest = settle(task, _Slope(slope.reshape(u, u)), allowed, lowest)
+        lowest = settle(task, _Slope(slope.reshape(u, u)), allowed, lowest)
         here, there = flat @ slope, _flat(task, lowest) @ slope
         least = min(float(here.min()), float(there.min()))
         bound = max(best.bound, value + n * (least - float(shares @ here)))

@@ -56,7 +56,12 @@ class Objective(Protocol):
 
 
 def settle(task: Task, objective: Objective, allowed: Attitudes, start: Array) -> Array:
-    """Positions (n, 3) near given ones of which no small move makes an objective smaller."""
+    """Positions (n, 3) near given ones of which no small move makes an objective smaller.
+
+    Those of a finite set stay where they are.
+    """
+    if allowed.points is not None:
+        return start
     low, high = allowed.limits
     n, u, pairs = len(start), len(task.names), np.triu_indices(len(start), 1)
     closest = None if allowed.least_angle is None else np.cos(allowed.least_angle)

@@ -147,8 +147,6 @@ class Search:
 
     def _settle(self, directions: Array) -> Array:
         """Positions that have moved to where no small move gains, if they can move."""
-        if self.allowed.points is not None:
-            return directions
         return settle(self.task, self.criterion, self.allowed, directions)
 
     def _join(self, directions: Array) -> Array:

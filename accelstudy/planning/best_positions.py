@@ -22,7 +22,6 @@ from accelstudy.planning.candidates import (
 )
 from accelstudy.planning.question import Equipment, Question
 from accelstudy.proposal.request import Request
-from accelstudy.schemes import Scheme
 from accelstudy.schemes.files import remember
 from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise
@@ -93,7 +92,9 @@ class CalibrationKind:
         request = self.request(n)
         content = {"title": "minimax", "source": "accelstudy design"}
         content["directions"] = _positions(request).tolist()
-        return self._in_positions(remember(content, f"{MINIMAX}-{n}"), request)
+        scheme = remember(content, f"{MINIMAX}-{n}")
+        alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
+        return next(in_scheme(alone, scheme, [self.model], request), None)
 
     def fewest(self, needed: float) -> Candidate | None:
         """Calibration in the fewest positions that reach the target, by linear theory.
@@ -104,13 +105,11 @@ class CalibrationKind:
         low, high = self.least - 1, self.most + 1
         while high - low > 1:
             n = min(max(math.ceil(needed), low + 1), high - 1)
-            best = self.best(n)
-            share = (
-                math.inf
-                if best is None
-                else self.question.accuracy(best.tilt) / self.question.target
-            )
-            needed = n * share**2 if share < math.inf else needed
+            if (best := self.best(n)) is None:
+                low = n
+                continue
+            share = self.question.accuracy(best.tilt) / self.question.target
+            needed = n * share**2
             if share > 1:
                 low = n
                 continue
@@ -118,10 +117,6 @@ class CalibrationKind:
             if share * _of_one_less(n) > 1:
                 break
         return self.best(high)
-
-    def _in_positions(self, scheme: Scheme, request: Request | None = None) -> Candidate | None:
-        alone = replace(self.question, holds=(self.hold,), equipment=(self.equipment,))
-        return next(in_scheme(alone, scheme, [self.model], request), None)
 
 
 def _of_one_less(n: int) -> float:

@@ -20,10 +20,10 @@ from accelstudy.drawing.style import FULL
 from accelstudy.files.outputs import PLAN
 from accelstudy.leveling.distribution import NOISE
 from accelstudy.pages.result import Result
-from accelstudy.planning import question, wording
+from accelstudy.planning import wording
 from accelstudy.planning.answer import Answer, answer
 from accelstudy.planning.candidates import Candidate
-from accelstudy.planning.question import Equipment, Question
+from accelstudy.planning.question import Equipment, Question, get_sensor
 from accelstudy.planning.reasons import limits
 from accelstudy.proposal.order import field_order
 
@@ -65,7 +65,7 @@ class Plan(Result):
         if (sensor is None) == (sigma is None):
             both = ", not both" if sensor else ""
             raise InputError(f"plan: give the sensor by `sensor`, or its noise by `sigma`{both}")
-        sheet = question.get_sensor(sensor) if sigma is None else sheet_of_sigma(sigma)
+        sheet = get_sensor(sensor) if sigma is None else sheet_of_sigma(sigma)
         if given["history"] is not None:
             from accelstudy.data_sheets.measured import with_history  # slow to import
 

@@ -38,7 +38,7 @@ ax = calibration.plot()
 # %% [markdown]
 # ## The diagnosis
 #
-# `diagnose` weighs every effect of the catalogue, and every pair of them, against noise, gross
+# `diagnose` weighs the effects of the catalogue, up to three together, against noise, gross
 # errors and each other. It takes some seconds.
 
 # %%

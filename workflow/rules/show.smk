@@ -26,7 +26,7 @@ rule figure:
 
 rule page:
     input:
-        **{name: f"{RESULTS}/{name}.parquet" for name in TABLES},
+        **{name: f"{RESULTS}/{name}.parquet" for name in TABLES if name != "correlations"},
     output:
         report(
             f"{RESULTS}/explorer.html",

@@ -1,7 +1,7 @@
 """What an explorer shows of a study, from its tables: set-ups, and their parameters.
 
 A set-up is a cell of the study. Each function returns a table with numbers in the units that people
-see; `records` and `packed` make them texts that the page reads again.
+see; `records` and `compress` make them texts that the page reads again.
 """
 
 from __future__ import annotations

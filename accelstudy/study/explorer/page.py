@@ -53,7 +53,7 @@ def write_explorer(study: Study, tables: Mapping[str, pd.DataFrame], output: str
     Parameters
     ----------
     study : Study
-    tables : mapping of name to DataFrame, those of `TABLES`
+    tables : mapping of name to DataFrame: cells, summary, leveling and quantiles
     output : path of the page
     """
     with angles_in(study.angle_unit):
