@@ -1,1 +1,1 @@
-"""The classes of results that the public functions return, and how their arguments are read."""
+"""Arguments of the public functions, and their results in which several rooms have a part."""

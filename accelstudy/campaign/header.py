@@ -200,7 +200,7 @@ class _SensorNoise(ConfigSection):
 
 
 class _Robot(ConfigSection):
-    """The robot, whose section stands in the header exactly if the table has angles."""
+    """The robot, whose section stands in the header exactly if the table has its angles."""
 
     angle_sigma_mgon: SigmaAngle = Field(description="standard deviation of roll and of pitch")
 

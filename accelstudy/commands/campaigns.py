@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from accelstudy.campaign.importing.detection import Holds
     from accelstudy.campaign.session import Campaign
 
+NO_DELIMITER = {"--delimiter": "it is told from the rows"}
+"""The option of earlier versions, and what takes its place."""
 POLL = 1.0
 """Seconds between two looks at a growing table."""
 
@@ -104,7 +106,7 @@ IMPORT = Command(
         ),
         "The campaign": "out name gravity settings",
     },
-    retired={"--join": "holds in one attitude are positions each"},
+    retired={"--join": "holds in one attitude are positions each", **NO_DELIMITER},
 )
 
 
@@ -168,11 +170,16 @@ APPLY = Command(
     make=calibrations.leveled,
     writes=new_table,
     out="CSV or Parquet file to write.",
+    retired=NO_DELIMITER,
 )
 
 
 DATA_SHEET = Command(
-    planning.data_sheet, writes=new_file, out="YAML file to write.", shared=[QUIET]
+    planning.data_sheet,
+    writes=new_file,
+    out="YAML file to write.",
+    retired=NO_DELIMITER,
+    shared=[QUIET],
 )
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -79,7 +80,7 @@ class _Fit:
     design: Array
     observed: Array
 
-    @property
+    @cached_property
     def inverse(self) -> Array:
         """What turns observations into estimates, (p, m)."""
         return np.asarray(np.linalg.pinv(self.design, rcond=1e-10))

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from accelstudy.adjustment.quality import noncentrality, solve
+from accelstudy.adjustment.quality import POWER, noncentrality, solve
 from accelstudy.approaches import Approach
 from accelstudy.basics.shares import sigmas_95
 from accelstudy.basics.units import display_unit
@@ -27,9 +27,6 @@ from accelstudy.simulation.hold_plan import check_needs_no_plan
 from accelstudy.simulation.sessions import Noise, session
 
 Array = NDArray[np.float64]
-
-
-POWER = 0.8
 
 
 @dataclass(frozen=True)

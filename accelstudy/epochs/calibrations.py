@@ -21,6 +21,7 @@ from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import FULL, INK, new_figure, symbol
 from accelstudy.effects import Parameter
+from accelstudy.leveling.error import ATTITUDES, TiltError, cap_forces, tilt_error
 from accelstudy.pages import write_page
 from accelstudy.pages.result import Result
 
@@ -69,6 +70,13 @@ class Calibrations(Result):
     def sigmas(self) -> Array:
         """Sigmas of `estimates`."""
         return np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
+
+    def tilt_error(self, first: Array, second: Array, tilt_range: float) -> TiltError:
+        """Tilt error by one set of parameters for another, in conditions of the last session."""
+        last = self.calibrations[-1]
+        forces = cap_forces(tilt_range, ATTITUDES, last.gravity)
+        forces, hold = last.with_conditions(forces, self.model.hold_columns)
+        return tilt_error(self.model, first, self.model, second, forces, last.gravity, hold)
 
     @property
     @abstractmethod

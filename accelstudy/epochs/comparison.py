@@ -26,7 +26,6 @@ from accelstudy.epochs.calibrations import (
 )
 from accelstudy.epochs.congruence import LEVEL, Differences
 from accelstudy.files.outputs import COMPARISON
-from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 from accelstudy.pages import render_lines
 
 MIN_DIFFERENCE = 1e-12
@@ -77,10 +76,8 @@ class Comparison(Calibrations):
         Readings are those of the sensor as it was at first; they are leveled as if it had not
         changed, and as it is at last.
         """
-        last, (first, second) = self.calibrations[1], self.estimates
-        forces = cap_forces(self.tilt_range, ATTITUDES, last.gravity)
-        at = last.with_conditions(forces, self.model.hold_columns)
-        error = tilt_error(self.model, first, self.model, second, at[0], last.gravity, at[1])
+        first, second = self.estimates
+        error = self.tilt_error(first, second, self.tilt_range)
         by_chance = np.einsum("auw,uw->a", error.quadratic, self.change.covariance)
         plain = np.where(error.constant > MIN_DIFFERENCE**2, error.constant, 0.0)
         return np.sqrt([plain, by_chance])

@@ -22,7 +22,6 @@ from scipy import optimize
 from accelstudy.basics.units import shown_unit, to_display
 from accelstudy.drawing.style import COLUMN, INK, new_figure
 from accelstudy.epochs.course import YEAR
-from accelstudy.leveling.error import ATTITUDES, cap_forces, tilt_error
 
 if TYPE_CHECKING:
     from accelstudy.epochs.history import History
@@ -86,11 +85,8 @@ class Interval:
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
         """Squared errors of roll and pitch of the draws, (DRAWS, 2), as a + b t + c t², rad²."""
-        last, model = self.history.calibrations[-1], self.history.model
-        g, values = last.gravity, self.history.estimates[-1]
-        forces = cap_forces(self.tilt_range, ATTITUDES, g)
-        at = last.with_conditions(forces, model.hold_columns)
-        form = tilt_error(model, values, model, values, at[0], g, at[1]).quadratic
+        values = self.history.estimates[-1]
+        form = self.history.tilt_error(values, values, self.tilt_range).quadratic
         at_once, per_year = self._draw(np.einsum("auu->u", form))
         first, second = (np.einsum("ku,auw->kaw", each, form) for each in (at_once, per_year))
         return (

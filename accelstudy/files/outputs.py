@@ -54,6 +54,7 @@ BATCH_JOB = OutputKind(
 DIAGNOSIS = OutputKind(
     "diagnosis",
     "diagnosis.json",
+    # loop.parquet is of folders of 0.3.
     ("calibration.json", "loop.parquet", "model.yaml", "positions.parquet", "report.html"),
     ("figures",),
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special, stats
+from scipy import special
 
 from accelstudy.adjustment.quality.solution import Solution
 from accelstudy.basics.units import GON
@@ -78,6 +78,8 @@ def noncentrality(
     """
     if np.isinf(noise_dof):
         return float(special.chndtrinc(special.chdtri(dof, alpha), dof, 1 - power))
+    from scipy import optimize, stats  # slow to import, and seldom needed
+
     # A mean over χ²(ν), as the noncentral F of SciPy has no numbers for some ν.
     evenly = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
     ratios = stats.chi2.ppf(evenly, noise_dof) / noise_dof

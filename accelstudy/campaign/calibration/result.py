@@ -67,7 +67,7 @@ class Calibration(Result):
         self.fit, self.source = fit, Path("CAMPAIGN") if source is None else source
         if content is None:
             quality = quality_document(self._assessment)
-            content = {**calibration_document(self._fitted("content")), "quality": quality}
+            content = {**calibration_document(self._assessment.fit), "quality": quality}
         self._content = content
         self.name = str(content["campaign"])
 
@@ -250,6 +250,6 @@ class Calibration(Result):
         say(wording.approach_words(fit))
         say(axes_note(None if fit.campaign.log is None else fit.campaign.log.frame))
         show(f"{self.state.upper()}: {self.verdict}")
-        steps = wording.next_steps(fit, self.state, self.source, place / "calibration.json")
+        steps = wording.next_steps(fit, self.state, self.source, place / HERE)
         say(": ".join(steps[0]))
         say(f"report: {place / 'report.html'}")

@@ -105,7 +105,6 @@ class Detection:
     p_value : float, probability of a larger one by noise alone
     densities : dict of candidate to log density of the residuals
     noise : (c,) array, log density of the residuals in noise alone, by the components of the level
-    p_candidate : dict of candidate to its p-value alone, over its shapes
     p_family : dict of candidate to its p-value as the strongest of all
     by_chance, weights : (s,) arrays, S of simulated residuals, and their weights as noise alone
     """
@@ -114,7 +113,6 @@ class Detection:
     p_value: float
     densities: Mapping[str, float]
     noise: Array
-    p_candidate: Mapping[str, float]
     p_family: Mapping[str, float]
     by_chance: Array
     weights: Array
@@ -139,7 +137,7 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
     """
     if not field.names:
         noise = evidence.noise_density(residuals.z @ residuals.z)
-        return Detection(0.0, 1.0, {}, noise, {}, {}, np.zeros(0), np.zeros(0))
+        return Detection(0.0, 1.0, {}, noise, {}, np.zeros(0), np.zeros(0))
     seen, k = field.project(residuals.z), len(field.names)
     densities, noise = field.densities(evidence, seen), evidence.noise_density(seen.squares)
     nothing = np.logaddexp.reduce(noise)
@@ -160,9 +158,6 @@ def detect(field: Field, evidence: Evidence, residuals: Residuals, chance: Chanc
         p_value=tail_probability(total, w, statistic),
         densities=dict(zip(field.names, densities.tolist(), strict=True)),
         noise=noise,
-        p_candidate={
-            n: tail_probability(each[:, i], w, observed[i]) for i, n in enumerate(field.names)
-        },
         p_family={
             n: tail_probability(strongest, w, observed[i], k) for i, n in enumerate(field.names)
         },

@@ -116,10 +116,12 @@ def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[s
             panels[label] = _abreast(np.repeat(values[:, None], count, axis=1))
     # What is missing shows over the coordinate that has it.
     coordinate = diagnosis.like[0].coordinate if diagnosis.like else "force"
-    if coordinate in ("force", "time", "temperature"):
+    # Without times that of the time is the order.
+    shown = "order" if coordinate == "time" and diagnosis.frame.hold.time is None else coordinate
+    if shown in ("force", "time", "temperature"):
         return panels
-    of, values = coordinate_of(coordinate), coordinate_in_holds(coordinate, diagnosis.frame)
-    words, values = _axis(place_text(coordinate)), values / of.size
+    of, values = coordinate_of(shown), coordinate_in_holds(coordinate, diagnosis.frame)
+    words, values = _axis(place_text(shown)), values / of.size
     if values.shape[1] == count:
         return panels | {_per_unit(words, of.unit): _abreast(values)}
     parts = {1: [words], 2: ["roll", "pitch"], 3: [f"{words}, {axis}" for axis in "xyz"]}

@@ -47,7 +47,7 @@ NOT_AN_EFFECT = {"unknown": "something that is not in the catalogue"}
 """Words for names that stand for no effect."""
 
 MIN_SAID = 0.1
-"""Posterior from which on something open is worth a word; the figure has all of it."""
+"""Posterior from which on something open is worth a word; the page has all of it."""
 MIN_PLACE_SAID = 0.5
 """Posterior from which on it is worth a word where that which has a name lives."""
 
