@@ -31,7 +31,7 @@ def test_held_out_z_is_standard_normal_if_nothing_is_missing(name, scheme, count
     directions = get_scheme(scheme).directions
     ideal = session(NINE, np.zeros(NINE.n_parameters), directions, G)
     fitted, held = prediction.split_positions(-directions, HoldConditions(), count, rng)
-    for _ in range(60):
+    for _ in range(200):
         observed = ideal.draw(Noise(), 1, rng)
         part, rest = observed.take(fitted), observed.take(held)
         base, more = (solve(model, approach, part) for model in (NINE, extended))
