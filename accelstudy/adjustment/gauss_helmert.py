@@ -26,9 +26,9 @@ Array = NDArray[np.float64]
 
 MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-6
-"""Fraction of a standard deviation below which the last step of a converged replicate is."""
+"""Largest last step of a converged replicate, in standard deviations."""
 ROUNDING = 64
-"""Roundings of the largest observation below which the last step need not be."""
+"""Roundings of the largest observation; a smaller last step is asked of no replicate."""
 PIVOT_TOLERANCE = 1e-12
 """Cholesky pivot of a normal matrix, scaled to unit diagonal, below which it is singular."""
 

@@ -9,8 +9,8 @@
 4. The effect is chosen and fitted again on a part of the positions, and the others confirm it, or
    do not, or refute it (`confirm`).
 
-Where the disagreement lives, what it is worth, and where to measure next, a `Diagnosis` computes
-when it is asked.
+Where the disagreement lives, what it is worth, and where to measure next, a `CampaignDiagnosis`
+computes when it is asked.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from accelstudy.diagnosis.decision.verdict import (
 )
 from accelstudy.diagnosis.evidence.detection import Chance
 from accelstudy.diagnosis.held_out import Gap, gap_of
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.sensors.sensor import SensorModel
 
@@ -46,7 +46,7 @@ def diagnose(
     model: SensorModel,
     approach: Approach | None = None,
     seed: int = 1,
-) -> Diagnosis:
+) -> CampaignDiagnosis:
     """Find whether, where and why a campaign disagrees with a sensor model.
 
     Parameters
@@ -70,7 +70,7 @@ def diagnose(
     base = fit_base(campaign, model, approach)
     case = Case(pose(base), campaign, Chance(null, len(base.solution.design)))
     finding, gap = confirm(case, decide(case), others)
-    return Diagnosis(case, finding, gap, recognised)
+    return CampaignDiagnosis(case, finding, gap, recognised)
 
 
 def decide(case: Case) -> Finding:

@@ -216,7 +216,7 @@ class LinearSplit:
 
     @cached_property
     def cofactors(self) -> Array:
-        """Of the parameters by the fitted part, (u, u)."""
+        """Cofactors of the parameters by the fitted part, (u, u)."""
         a = self.designs[0]
         return np.asarray(np.linalg.inv(a.T @ a), dtype=float)
 

@@ -112,7 +112,7 @@ class FitSize(NamedTuple):
 
 
 class LikeShape(NamedTuple):
-    """Where what is missing may live: a target that is a function of a coordinate.
+    """Possible place of what is missing: a target that is a function of a coordinate.
 
     Attributes
     ----------
@@ -126,8 +126,8 @@ class LikeShape(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """What is found in a campaign, and how sure that is; what follows is found when it is asked.
+class CampaignDiagnosis:
+    """A diagnosis of a campaign: what was found, and how sure that is; consequences on demand.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class Diagnosis:
 
     @property
     def campaign(self) -> Campaign:
-        """With a recognised gross error mended."""
+        """Campaign with a recognised gross error mended."""
         return self.case.campaign
 
     @property
@@ -154,7 +154,7 @@ class Diagnosis:
 
     @property
     def detection(self) -> Detection:
-        """Whether anything is missing, all candidates together."""
+        """Test whether anything is missing, of all candidates together."""
         return self.case.detection
 
     @property
@@ -164,27 +164,27 @@ class Diagnosis:
 
     @property
     def frame(self) -> SessionFit:
-        """Of the base fit with unequal axes weighted."""
+        """Session of the base fit, with unequal axes weighted."""
         return self.problem.frame
 
     @property
     def final(self) -> SessionFit:
-        """Of the fit with what was found, or of the base fit."""
+        """Session of the fit with what was found, or of the base fit."""
         return self.finding.frame
 
     @property
     def approach(self) -> Approach:
-        """Of the calibration."""
+        """Approach of the calibration."""
         return self.base.approach
 
     @property
     def model(self) -> SensorModel:
-        """Without what was found."""
+        """Model that was diagnosed, without what was found."""
         return self.base.model
 
     @property
     def extended_model(self) -> SensorModel:
-        """With the effects that were found; the model itself if there are none."""
+        """Model with the effects that were found; the model itself if there are none."""
         return self.final.solution.model
 
     @property
@@ -201,7 +201,7 @@ class Diagnosis:
 
     @cached_property
     def reason(self) -> Reason | None:
-        """Why the verdict is what it is."""
+        """Reason of the verdict; None where it needs none."""
         if self.recognised is not None:
             return Reason.of("recognised", reason=self.recognised.reason)
         return reason_of_unrecorded(self.case, self.finding) or self.finding.reason
@@ -213,7 +213,7 @@ class Diagnosis:
 
     @property
     def code(self) -> str:
-        """Of the reason; empty if there is none."""
+        """Code of the reason; empty if there is none."""
         return "" if self.reason is None else self.reason.code
 
     @cached_property
@@ -381,7 +381,7 @@ class Diagnosis:
 
     @cached_property
     def like(self) -> tuple[LikeShape, ...]:
-        """Where what is missing may live, most probable first; nothing if nothing is missing.
+        """Possible places of what is missing, most probable first; empty if nothing is missing.
 
         The places are those of all that is missing or, where the most probable explanation with
         something unknown has effects with names, of what is beside these.

@@ -254,7 +254,7 @@ class TiltDistribution:
 
 
 def _solved(scores: Callable[[Array], Array], start: Array, wanted: Array) -> tuple[Array, Array]:
-    """Where normal scores are as wanted, and their slope there.
+    """Solve for arguments of wanted normal scores; return these, and the slopes there.
 
     By the secant method. A step that leaves the bounds seen so far ends half way between them.
     """

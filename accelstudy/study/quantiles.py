@@ -27,7 +27,7 @@ DIFFERENCE_REPLICATES = 100_000
 
 
 def usual_levels(count: int) -> Array:
-    """Those of `PROBABILITIES` that so many replicates have quantiles at."""
+    """Select the `PROBABILITIES` whose quantiles so many replicates have."""
     tail = np.minimum(PROBABILITIES, 1 - PROBABILITIES)
     return PROBABILITIES[(tail >= 0.0249) | (count * tail >= 0.999)]
 

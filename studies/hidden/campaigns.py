@@ -14,7 +14,7 @@ import numpy as np
 from accelstudy.adjustment.quality import Solution, column_basis
 from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.pipeline import diagnose
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.effects import effects_without
 from accelstudy.files.outputs import whole_file
 from accelstudy.files.validation import validate
@@ -101,7 +101,7 @@ def tried(work: Callable[[], Any], what: str, failed: str = "") -> tuple[Any, st
         return None, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
-def outcome(d: Diagnosis) -> Row:
+def outcome(d: CampaignDiagnosis) -> Row:
     """What a diagnosis says."""
     test, held = d.global_test, d.gap.held_out
     fits = (d.base, d.final.solution) if d.verdict == "learned" else ()

@@ -19,7 +19,7 @@ from accelstudy.diagnosis.evidence.size import Level
 from accelstudy.diagnosis.held_out import Gap
 from accelstudy.diagnosis.pipeline import decide, diagnose
 from accelstudy.diagnosis.report.words import TEMPLATE, badge, verdict_lines
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.residuals import Residuals
 from accelstudy.pages import render_lines
@@ -88,7 +88,7 @@ def test_a_diagnosis_decides_at_the_levels(known, level):
         (REFUTATION_LEVEL - 1e-6, "unknown", False),
     ):
         vars(case)["detection"] = replace(case.detection, p_value=p)
-        found = Diagnosis(case, decide(case), Gap(1.0))
+        found = CampaignDiagnosis(case, decide(case), Gap(1.0))
         assert (found.verdict, found.code == "weak") == (verdict, weak)
         assert badge(found) == ("accepted" if weak else verdict)
         if weak:

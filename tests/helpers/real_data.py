@@ -16,7 +16,7 @@ from accelstudy.campaign.importing.logs import import_log
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.diagnosis.pipeline import diagnose
 from accelstudy.diagnosis.report.words import verdict_lines
-from accelstudy.diagnosis.result import Diagnosis
+from accelstudy.diagnosis.result import CampaignDiagnosis
 from accelstudy.effects import get_effect
 
 WHITE, UNKNOWN = "white", "not given"
@@ -64,7 +64,7 @@ def imported(name):
 
 
 @cache
-def diagnosed(name: str, sigma: str = "") -> Diagnosis:
+def diagnosed(name: str, sigma: str = "") -> CampaignDiagnosis:
     campaign, _ = imported(name)
     if sigma == WHITE:
         campaign = replace(campaign, sigma_force=0.000296, sigma_dof=None)

@@ -286,7 +286,7 @@ class SensorLog:
 
     @property
     def start(self) -> float:
-        """Where the times of `rows` begin in the file, s; NaN without a column of time."""
+        """First time of `rows` in the file, s; NaN without a column of time."""
         return self._numbers[2]
 
     @cached_property

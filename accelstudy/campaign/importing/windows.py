@@ -125,7 +125,7 @@ class Windows:
 
     @cached_property
     def extremes(self) -> Array:
-        """Of the lowest and of the highest readings the outermost and the next, (2, 2, 3)."""
+        """Two lowest and two highest readings, the outermost first, (2, 2, 3)."""
         ends = np.array([[[np.inf] * 3] * 2, [[-np.inf] * 3] * 2])
         for axis, force in enumerate(self.log.forces.T):
             for end, pick, rest in ((0, np.min, np.greater), (1, np.max, np.less)):

@@ -1,1 +1,1 @@
-"""From evidence to a verdict."""
+"""The decision: posterior probabilities of explanations, and the verdict."""

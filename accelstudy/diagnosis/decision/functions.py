@@ -77,7 +77,7 @@ def learn_function(case: Case, posterior: Posterior, finding: Finding) -> Findin
 
 
 class PlaceFound(NamedTuple):
-    """Where something without a name lives."""
+    """Place of something without a name."""
 
     place: Place
     probability: float

@@ -37,7 +37,7 @@ SPECIFIC = (STEPS, COLOUR, AXES, TAILS, LEVEL)
 
 
 class Misfit(NamedTuple):
-    """By how much the residuals of a fit are larger than the noise."""
+    """Ratio of the residuals of a fit to the noise."""
 
     ratio: float
     of_repeats: bool

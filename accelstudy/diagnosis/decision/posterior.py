@@ -138,7 +138,7 @@ class Posterior:
 
     @cached_property
     def reported(self) -> tuple[Explanation, ...]:
-        """Those that are reported, most probable first."""
+        """Explanations that are reported, most probable first."""
         noise = next((i for i, one in enumerate(self.all) if one.is_noise), None)
         size, parts = self._size, dict[tuple[tuple[str, ...], ...], int]()
         for i, one in enumerate(self.all):

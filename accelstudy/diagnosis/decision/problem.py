@@ -115,7 +115,7 @@ class Problem:
 
     @property
     def residuals(self) -> Residuals:
-        """Those of the fit."""
+        """Residuals of the fit."""
         return self.examined.frame.residuals
 
     @cached_property

@@ -77,7 +77,7 @@ class Finding:
 
     @property
     def code(self) -> str:
-        """Of the reason; empty if there is none."""
+        """Code of the reason; empty if there is none."""
         return "" if self.reason is None else self.reason.code
 
     @property

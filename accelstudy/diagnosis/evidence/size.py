@@ -58,19 +58,19 @@ class Level:
 
     @classmethod
     def of_stated_sigma(cls, dof: float = RULES.freedom_given) -> Level:
-        """Of a sigma that is given, which has so many degrees of freedom if it is right."""
+        """Level of a stated sigma, which has so many degrees of freedom if it is right."""
         wrong, freedom = RULES.prior_sigma_wrong, min(dof, RULES.freedom_given)
         return cls((1 - wrong, wrong), (freedom, RULES.freedom_doubted), known=True)
 
     @classmethod
     def of_holds(cls) -> Level:
-        """Of a sigma that is not given, where the noise within the holds may be all there is."""
+        """Level without a stated sigma, where the noise within the holds may be all there is."""
         more = RULES.prior_more_than_within
         return cls((1 - more, more), (RULES.freedom_given, RULES.freedom_doubted), known=False)
 
     @classmethod
     def of_nothing_stated(cls) -> Level:
-        """Of a sigma of which nothing is known."""
+        """Level of a sigma of which nothing is known."""
         return cls((1.0,), (RULES.freedom_not_given,), known=False)
 
 

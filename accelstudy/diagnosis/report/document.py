@@ -27,7 +27,7 @@ from accelstudy.diagnosis.consequences import TiltErrors
 from accelstudy.diagnosis.coordinates import TARGETS
 from accelstudy.diagnosis.decision.statement import Part
 from accelstudy.diagnosis.report.words import clauses, warnings
-from accelstudy.diagnosis.result import Diagnosis, NamedCause
+from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.sensors.frames import FRD
@@ -37,7 +37,7 @@ from accelstudy.sensors.sensor import SensorModel
 Array = NDArray[np.float64]
 
 
-def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
     """Describe a diagnosis; numbers are in SI unless their key names another unit."""
     d, screening = diagnosis, diagnosis.detection
     test = d.global_test
@@ -122,7 +122,7 @@ def shape_document(shape: LearnedShape) -> dict[str, Any]:
     }
 
 
-def _certain(part: Part, d: Diagnosis) -> dict[str, Any]:
+def _certain(part: Part, d: CampaignDiagnosis) -> dict[str, Any]:
     """Describe what is certain, with what stands for it in the extended model, if anything does."""
     names = [name.name for name in part.names]
     added = next((one for one in d.found if one.name in names and one.parameters), None)
@@ -142,7 +142,7 @@ def effect_document(named: NamedCause) -> dict[str, Any]:
     return {k: v for k, v in content.items() if k not in optional or v not in (None, [])}
 
 
-def _gap(d: Diagnosis) -> dict[str, Any]:
+def _gap(d: CampaignDiagnosis) -> dict[str, Any]:
     gap, held, tilt = d.gap, d.gap.held_out, d.leveling
     return {
         "sigma0_squared": {"before": gap.before, "after": gap.after},
@@ -161,7 +161,7 @@ def _gap(d: Diagnosis) -> dict[str, Any]:
     }
 
 
-def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
+def diagnosed_fit(diagnosis: CampaignDiagnosis) -> CampaignFit:
     """Return the final fit of a diagnosis as a calibration.
 
     It is that of the extended model, without positions that were found to be bumped, of data in
@@ -187,7 +187,7 @@ def diagnosed_fit(diagnosis: Diagnosis) -> CampaignFit:
     )
 
 
-def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosed_calibration(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
     """Describe the final fit of a diagnosis, as `calibrate` describes its own.
 
     What was mended stands in `mended`; its matrix turns forces as they are read into those that
@@ -220,7 +220,7 @@ def diagnosed_calibration(diagnosis: Diagnosis) -> dict[str, Any]:
     return {**content, "warnings": [*fit.campaign.warnings, *warnings(diagnosis, axes)]}
 
 
-def positions_table(diagnosis: Diagnosis) -> pd.DataFrame:
+def positions_table(diagnosis: CampaignDiagnosis) -> pd.DataFrame:
     """One row per position, in SI unless the name of a column says otherwise.
 
     Columns
@@ -268,7 +268,7 @@ def condition_sigma(solution: Solution, variance: float) -> float:
 REPLICATES = 1000
 
 
-def study_overlay(diagnosis: Diagnosis) -> dict[str, Any]:
+def study_overlay(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
     """Return a configuration that overlays `config/config.yaml`.
 
     The simulated sensor has the effects that were found, with the estimates as true values, and the

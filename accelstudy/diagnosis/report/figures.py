@@ -19,7 +19,7 @@ from accelstudy.diagnosis.decision.posterior import Explanation
 from accelstudy.diagnosis.evidence.candidates import UNKNOWN
 from accelstudy.diagnosis.report.document import condition_sigma
 from accelstudy.diagnosis.report.words import place_text
-from accelstudy.diagnosis.result import Diagnosis, LikeShape
+from accelstudy.diagnosis.result import CampaignDiagnosis, LikeShape
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.diagnosis.space.shapes import coordinate_in_holds
@@ -36,13 +36,13 @@ Array = NDArray[np.float64]
 
 
 def diagnosis_figures(
-    diagnosis: Diagnosis, positions: pd.DataFrame
+    diagnosis: CampaignDiagnosis, positions: pd.DataFrame
 ) -> dict[str, Callable[[], Figure]]:
     """Return a function that draws each figure; figures that would show nothing are left out.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    diagnosis : CampaignDiagnosis
     positions : DataFrame, of `positions_table`
     """
     d = diagnosis
@@ -70,7 +70,7 @@ ABREAST = 0.03
 """Distance of the components there, as a part of the range."""
 
 
-def residual_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+def residual_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals before and after against direction, time and temperature."""
     d, names = diagnosis, _components(positions)
     panels = _panels(d, positions, len(names))
@@ -101,7 +101,7 @@ def _components(positions: pd.DataFrame) -> list[str]:
     return [name for name in AXES if f"residual_{name}_before_mps2" in positions]
 
 
-def _panels(diagnosis: Diagnosis, positions: pd.DataFrame, count: int) -> dict[str, Array]:
+def _panels(diagnosis: CampaignDiagnosis, positions: pd.DataFrame, count: int) -> dict[str, Array]:
     """Abscissas (n, count) of the components in each panel, by its label."""
     unit = diagnosis.frame.forces / diagnosis.frame.solution.gravity
     panels = {"$f/g$ of the same axis": unit}
@@ -157,7 +157,7 @@ MAX_CANDIDATES = 12
 SMALLEST_P = 1e-12
 
 
-def evidence_figure(diagnosis: Diagnosis) -> Figure:
+def evidence_figure(diagnosis: CampaignDiagnosis) -> Figure:
     """Family-wise p-value and posterior probability of each candidate."""
     p_values = diagnosis.detection.p_family
     # A class of equal effects has its probability under one name, the rest has none.
@@ -295,7 +295,7 @@ LOG_SCALE_RATIO = 20
 """Ratio of mean squares from which on bars are drawn on a logarithmic scale."""
 
 
-def gap_figure(diagnosis: Diagnosis, positions: pd.DataFrame) -> Figure:
+def gap_figure(diagnosis: CampaignDiagnosis, positions: pd.DataFrame) -> Figure:
     """Residuals of the held-out positions before and after, and their mean squares."""
     gap = diagnosis.gap.held_out
     assert gap is not None

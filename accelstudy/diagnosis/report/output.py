@@ -18,9 +18,9 @@ from accelstudy.basics.progress import say, show, stage, warn
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.result import Calibration
 from accelstudy.campaign.calibration.sensor_calibration import needs_of, unknown
-from accelstudy.diagnosis import result as found
 from accelstudy.diagnosis.report import document, words
 from accelstudy.diagnosis.report.figures import diagnosis_figures, draw_explanations
+from accelstudy.diagnosis.result import MISSING, CampaignDiagnosis
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.drawing.saving import save_all
 from accelstudy.drawing.style import COLUMN
@@ -41,13 +41,13 @@ class Diagnosis(Result):
 
     Attributes
     ----------
-    result : accelstudy.diagnosis.result.Diagnosis, all of it
+    result : accelstudy.diagnosis.result.CampaignDiagnosis, all of it
     source : path of the campaign, for the commands that are suggested
     """
 
     kind = DIAGNOSIS
 
-    def __init__(self, result: found.Diagnosis, source: Path | None = None) -> None:
+    def __init__(self, result: CampaignDiagnosis, source: Path | None = None) -> None:
         self.result, self.name = result, result.campaign.name
         self.source = Path("CAMPAIGN") if source is None else source
         self.size = COLUMN, 25.0 + 8 * len(result.credible_set)
@@ -126,7 +126,7 @@ class Diagnosis(Result):
                 figures=save_all(diagnosis_figures(d, positions), folder / "figures"),
                 calibration=made,
                 rules=RULES,
-                missing=found.MISSING,
+                missing=MISSING,
                 next_steps=next_steps(d, made, self.source, place),
             )
             write_json(folder / "diagnosis.json", self.content)
@@ -148,7 +148,7 @@ class Diagnosis(Result):
 
 
 def next_steps(
-    diagnosis: found.Diagnosis,
+    diagnosis: CampaignDiagnosis,
     calibration: Mapping[str, Any] | None,
     campaign: Path,
     place: Path,
@@ -157,7 +157,7 @@ def next_steps(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    diagnosis : CampaignDiagnosis
     calibration : mapping, of `diagnosed_calibration`; None if there is none
     campaign, place : paths of the folders of the campaign and of the results
     """

@@ -20,7 +20,7 @@ from accelstudy.diagnosis.decision.statement import (
     statement_of,
 )
 from accelstudy.diagnosis.decision.verdict import Reason
-from accelstudy.diagnosis.result import Diagnosis, NamedCause
+from accelstudy.diagnosis.result import CampaignDiagnosis, NamedCause
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.effects import Effect, get_effect
@@ -59,12 +59,12 @@ def render(part: str, *content: object) -> list[str]:
     return render_lines(TEMPLATE, part, *content, w=HERE)
 
 
-def verdict_lines(diagnosis: Diagnosis) -> list[str]:
+def verdict_lines(diagnosis: CampaignDiagnosis) -> list[str]:
     """Say in a few sentences what was found; the first is the verdict."""
     return render("verdict", diagnosis)
 
 
-def warnings(diagnosis: Diagnosis, axes: Sequence[float]) -> list[str]:
+def warnings(diagnosis: CampaignDiagnosis, axes: Sequence[float]) -> list[str]:
     """Say what a user of the calibration has to know; `axes` are their sigmas where they differ."""
     return render("warnings", diagnosis, axes)
 
@@ -79,24 +79,24 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
 
 
-def badge(diagnosis: Diagnosis) -> str:
+def badge(diagnosis: CampaignDiagnosis) -> str:
     """Name the badge of a page: the verdict or, where there is none, the state of a calibration."""
     if diagnosis.code == "weak":
         return ACCEPTED
     return UNCHECKED if too_few(diagnosis) else diagnosis.verdict
 
 
-def too_few(diagnosis: Diagnosis) -> bool:
+def too_few(diagnosis: CampaignDiagnosis) -> bool:
     """Whether nothing was found since nothing could be tested."""
     return diagnosis.verdict == "no_effect" and not diagnosis.detection.p_family
 
 
-def noise_only(diagnosis: Diagnosis) -> float:
+def noise_only(diagnosis: CampaignDiagnosis) -> float:
     """Probability that only the noise is wrong, and that nothing unrecorded makes it so."""
     return (diagnosis.found[0].posterior or 0.0) - diagnosis.p_coloured
 
 
-def may_be_an_effect(diagnosis: Diagnosis) -> bool:
+def may_be_an_effect(diagnosis: CampaignDiagnosis) -> bool:
     """Whether a test of the noise fails, and yet it is not sure that only the noise is wrong."""
     return diagnosis.verdict == "noise_model" and noise_only(diagnosis) < RULES.sure
 
@@ -123,14 +123,14 @@ def title(named: NamedCause, titled: set[str] | None = None) -> str:
     return " or ".join([name_text(named), *same])
 
 
-def titles(diagnosis: Diagnosis) -> str:
+def titles(diagnosis: CampaignDiagnosis) -> str:
     """Name all that the verdict is about: effects beside a gross error are not its names."""
     gross = diagnosis.verdict == "gross_error"
     found = [named for named in diagnosis.found if not (gross and named.parameters)]
     return comma_list([title(named, {each.name for each in found}) for named in found])
 
 
-def change_text(diagnosis: Diagnosis) -> str:
+def change_text(diagnosis: CampaignDiagnosis) -> str:
     """Say how the final fit differs: with what was added, and without what was left out."""
     added = [name_text(named) for named in diagnosis.found if named.parameters]
     out = [str(named.position) for named in diagnosis.found if named.position is not None]
@@ -141,7 +141,7 @@ def change_text(diagnosis: Diagnosis) -> str:
 # --- a function without a name ------------------------------------------------------------------
 
 
-def like_text(diagnosis: Diagnosis) -> str:
+def like_text(diagnosis: CampaignDiagnosis) -> str:
     """Say of what that which is missing may be a function; nothing where that is open."""
     worth = [one for one in diagnosis.like if one.posterior >= MIN_SAID]
     if diagnosis.shape is not None and len(worth) == 1:
@@ -175,7 +175,7 @@ def formulas(shape: LearnedShape) -> str:
     return f"It varies {_with_probabilities(worth, 'or')}."
 
 
-def range_text(diagnosis: Diagnosis) -> str:
+def range_text(diagnosis: CampaignDiagnosis) -> str:
     """Say where a learned function is known; nothing if that is everywhere, or none was learned."""
     shape = diagnosis.shape
     if shape is None or not {"low", "high"} <= shape.effect.settings.keys():

@@ -118,7 +118,7 @@ class Shapes:
 
     @cached_property
     def ends(self) -> NDArray[np.int_]:
-        """Where those of each shape begin and those of the last one end, (s + 1,)."""
+        """First vector of each shape, and the end of the last one, (s + 1,)."""
         return np.concatenate([[0], np.cumsum(self.dims)])
 
     def split(self, along: Array) -> list[Array]:
@@ -316,7 +316,7 @@ class LackOfFit(Spaces):
 
     @classmethod
     def of(cls, residuals: Residuals, labels: NDArray[np.int_]) -> LackOfFit:
-        """Of residuals whose positions have labels (n,), the same for the same attitude."""
+        """Lack of fit of residuals whose positions have labels (n,), equal for equal attitudes."""
         order = np.argsort(labels, kind="stable")
         starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
         whitening = residuals.whitening[order]

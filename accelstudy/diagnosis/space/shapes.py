@@ -141,7 +141,7 @@ class LearnedShapes(Shapes):
         return self._of(places, weights / weights.sum(), [roots[i] for i in seen], len(basis))
 
     def at(self, places: Collection[Place]) -> LearnedShapes:
-        """Those of some places, whose weights sum to 1."""
+        """Shapes of some places, whose weights sum to 1."""
         some = [i for i in range(len(self.shares)) if self.places[i] in places]
         vectors, weights = self.split(self.vectors), self.prior[some]
         return LearnedShapes(
