@@ -87,13 +87,14 @@ def continuous_optimum(task: Task, criterion: Criterion, allowed: Attitudes, n: 
         slope = criterion.gradient(normal).ravel()
         lowest = fine[np.argsort(fine_flat @ slope, kind="stable")[:LOWEST]]
         lowest = settle(task, _Slope(slope.reshape(u, u)), allowed, lowest)
-        here, there = flat @ slope, _flat(task, lowest) @ slope
+        flat_lowest = _flat(task, lowest)
+        here, there = flat @ slope, flat_lowest @ slope
         least = min(float(here.min()), float(there.min()))
         bound = max(best.bound, value + n * (least - float(shares @ here)))
         best = Continuous(points, shares, value, bound)
         if value - bound < MAX_GAP:
             break
-        points, flat = np.concatenate([points, lowest]), np.concatenate([flat, _flat(task, lowest)])
+        points, flat = np.concatenate([points, lowest]), np.concatenate([flat, flat_lowest])
         shares = np.concatenate([0.9 * shares, np.full(len(lowest), 0.1 / len(lowest))])
     return best
 

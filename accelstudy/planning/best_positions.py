@@ -103,6 +103,7 @@ class CalibrationKind:
         information.
         """
         low, high = self.least - 1, self.most + 1
+        found: Candidate | None = None
         while high - low > 1:
             n = min(max(math.ceil(needed), low + 1), high - 1)
             if (best := self.best(n)) is None:
@@ -113,10 +114,10 @@ class CalibrationKind:
             if share > 1:
                 low = n
                 continue
-            high = n
+            high, found = n, best
             if share * _of_one_less(n) > 1:
                 break
-        return self.best(high)
+        return found
 
 
 def _of_one_less(n: int) -> float:

@@ -41,8 +41,10 @@ def field_order(task: Task, directions: Array) -> Order:
     lengths = np.array([_length(angles, trip) for trip in trips])
     near = np.flatnonzero(lengths <= MAX_TOUR_RATIO * lengths.min() + 1e-9)
     turns = range(len(directions))
-    orders = np.array([np.roll(trips[i], turn) for i in near for turn in turns])
-    return orders[first_best(-_drift_shown(task, directions[orders]))]
+    orders = [np.array([np.roll(trips[i], turn) for turn in turns]) for i in near]
+    # Tour by tour, so that memory does not follow their number.
+    shown = np.concatenate([_drift_shown(task, directions[of_tour]) for of_tour in orders])
+    return np.concatenate(orders)[first_best(-shown)]
 
 
 def _length(angles: Array, tour: Order) -> float:

@@ -116,7 +116,7 @@ def _cell(statistics: CellStatistics) -> dict[str, Any]:
     theory, positions = statistics.cell.estimability, statistics.cell.positions
     return {
         **statistics.cell.labels,
-        "n_positions": [positions.n_positions],
+        "n_positions": positions.n_positions,
         "n_parameters": len(theory.parameter_names),
         "rank": theory.rank,
         "condition": theory.condition,
