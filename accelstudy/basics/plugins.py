@@ -66,7 +66,7 @@ def load_files(paths: Iterable[str | Path]) -> None:
         _load_file(Path(path))
 
 
-def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
+def load_plugins(content: Mapping[str, Any]) -> None:
     """Load the plug-ins that a configuration names; raises errors like `load_files`.
 
     What is no list of texts, the schema of the configuration refuses.
@@ -74,8 +74,8 @@ def load_plugins(content: Mapping[str, Any], source: str = "") -> None:
     try:
         load_files(_named_plugins(content))
     except InputError as error:
-        raise InputError(f"{source}: plugins: {error}".removeprefix(": ")) from None
-    _missing(content, source)
+        raise InputError(f"plugins: {error}") from None
+    _missing(content, "the configuration")
 
 
 @contextmanager

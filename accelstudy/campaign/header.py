@@ -7,7 +7,6 @@ from datetime import date as calendar_date
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -38,8 +37,6 @@ from accelstudy.files.validation import (
 )
 from accelstudy.sensors.conversion import Conversion, conversion_of
 from accelstudy.sensors.frames import Frame, parse_frame
-
-Array = NDArray[np.float64]
 
 HEADER = "campaign.yaml"
 TABLE = "positions.csv"

@@ -40,8 +40,9 @@ def test_an_error_is_one_line_with_source_and_key(content, key, said):
 
 def models():
     """All models of what is read from files."""
+    declared = re.compile(r"^class \w+\((ConfigSection|\w*Model|\w+Layout)\)", re.M)
     for path in (ROOT / "accelstudy").rglob("*.py"):
-        if re.search(r"^class \w+\((Block|\w*Model|\w+Layout)\)", path.read_text("utf-8"), re.M):
+        if declared.search(path.read_text("utf-8")):
             importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
     found = [BaseModel]
     for model in found:

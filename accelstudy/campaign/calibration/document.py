@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from accelstudy.basics.units import MGON, recorded_unit, to_recorded
 from accelstudy.campaign.calibration.assessment import Assessment
@@ -19,8 +18,6 @@ from accelstudy.campaign.calibration.wording import verdict_lines
 from accelstudy.files.outputs import whole_file
 from accelstudy.leveling.error import MAX_TILT_GON
 from accelstudy.sensors.frames import FRD
-
-Array = NDArray[np.float64]
 
 
 def calibration_document(fit: CampaignFit) -> dict[str, Any]:

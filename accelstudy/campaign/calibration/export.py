@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.wording import comma_list
@@ -11,8 +10,6 @@ from accelstudy.campaign.calibration.c_code import c_header
 from accelstudy.campaign.calibration.px4 import px4_losses, px4_parameters
 from accelstudy.campaign.calibration.sensor_calibration import SensorCalibration, affine_form
 from accelstudy.sensors.sensor import not_affine
-
-Array = NDArray[np.float64]
 
 _WITHOUT_FORMULAS = (
     "calibration.json has the parameters with their sigmas, `--form c` the formulas; "

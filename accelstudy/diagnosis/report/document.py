@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from accelstudy.adjustment import calibrate
 from accelstudy.adjustment.quality import Solution
@@ -33,8 +32,6 @@ from accelstudy.diagnosis.shape import LearnedShape
 from accelstudy.sensors.frames import FRD
 from accelstudy.sensors.models import MODELS, composition_name
 from accelstudy.sensors.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 def diagnosis_document(diagnosis: CampaignDiagnosis) -> dict[str, Any]:
