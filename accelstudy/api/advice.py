@@ -11,11 +11,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from accelstudy.api.inputs import as_campaign, campaign_path
-from accelstudy.approaches import get_approach
+from accelstudy.approaches import Approach, get_approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
-from accelstudy.basics.progress import show
+from accelstudy.basics.progress import show, warn
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.campaign.calibration.document import write_json
 from accelstudy.campaign.calibration.fit import usual_approach
@@ -45,20 +45,48 @@ class SessionAdvice(Result):
     ----------
     advice : accelstudy.sequential.advisor.Advice, all of it
     session : Campaign, so far
+    model, approach, promise : by which it is judged
+    command : str, that calibrates the session if it is enough; else empty
     """
 
     kind = ADVICE
 
-    def __init__(self, advice: Advice, session: Campaign, adviser: Adviser) -> None:
-        self.advice, self.session, self._adviser = advice, session, adviser
-        self.name = session.name
+    def __init__(
+        self,
+        advice: Advice,
+        session: Campaign,
+        model: SensorModel,
+        approach: Approach,
+        promise: Promise,
+        command: str,
+    ) -> None:
+        self.advice, self.session, self.model = advice, session, model
+        self.approach, self.promise, self.name = approach, promise, session.name
+        self.command = command if advice.enough else ""
 
     @classmethod
-    def of(cls, campaign: Any, **given: Any) -> SessionAdvice:
+    def of(
+        cls,
+        campaign: Any,
+        *,
+        tilt_accuracy: float,
+        tilt_range: float,
+        model: str,
+        approach: str | None,
+        prior: Path | None,
+        attitudes: str | None,
+        **limits: float | None,
+    ) -> SessionAdvice:
         """Advise by the keywords of `accelstudy.advise`, checked."""
         place = campaign_path(campaign)
-        now = as_campaign(campaign) if place is None else read_running(place)
-        return Adviser(now, place, **given)(now)
+        session = as_campaign(campaign) if place is None else read_running(place)
+        by = get_approach(approach) if approach else usual_approach(session)
+        known, promise = get_model(model), Promise(tilt_accuracy, tilt_range)
+        directions = candidate_positions(attitudes or DEFAULTS.get(by.name, "grid"), **limits)
+        advice = advise(session, known, by, promise, directions, _prior(prior, known))
+        of_type = prior if prior is not None and prior.suffix in TYPES else None
+        command = suggestions.calibrate(place or "CAMPAIGN", model, by.name, of_type)
+        return cls(advice, session, known, by, promise, command)
 
     @property
     def enough(self) -> bool:
@@ -79,16 +107,7 @@ class SessionAdvice(Result):
     @cached_property
     def lines(self) -> list[str]:
         """The advice, most important last."""
-        return wording.advice_lines(
-            self.advice, self.session, self._adviser.model, self._adviser.promise
-        )
-
-    @property
-    def command(self) -> str:
-        """Command that calibrates the session if it is enough; else empty."""
-        asked = self._adviser
-        known = asked.place, asked.called, asked.approach.name, asked.type
-        return suggestions.calibrate(*known) if self.enough else ""
+        return wording.advice_lines(self.advice, self.session, self.model, self.promise)
 
     @property
     def content(self) -> dict[str, Any]:
@@ -113,7 +132,7 @@ class SessionAdvice(Result):
         rows = {
             "next_rad": angles_of(-self.advice.next),
             "rms_rad": np.nan if self.advice.rms is None else self.advice.rms,
-            "wanted_rad": self._adviser.promise.accuracy,
+            "wanted_rad": self.promise.accuracy,
         }
         return pd.DataFrame(rows, index=pd.Index(["roll", "pitch"], name="angle"))
 
@@ -132,52 +151,16 @@ class SessionAdvice(Result):
         write_json(folder / ADVICE.marker, self.content)
 
     def tell(self, place: Path | None) -> None:
-        """Print the advice."""
+        """Print the advice, and what was odd in the table so far."""
+        for warning in self.session.warnings:
+            warn(warning)
         show(self.summary())
 
     def summary(self) -> str:
         """Return the advice as text."""
         more = [f"calibrate: {self.command}"] if self.command else []
-        model, approach = self._adviser.model, self._adviser.approach.name
-        heading = wording.heading(self.advice, self.session, model, approach)
+        heading = wording.heading(self.advice, self.session, self.model, self.approach.name)
         return "\n".join([heading, *(f"  {line}" for line in (*self.lines, *more))])
-
-
-class Adviser:
-    """Advises on a session, whatever its positions are so far.
-
-    Parameters
-    ----------
-    session : Campaign, as it is now
-    place : Path, optional, of its folder
-    model, approach, prior, attitudes, limits : keywords of `advise`, checked
-    """
-
-    def __init__(
-        self,
-        session: Campaign,
-        place: Path | None,
-        *,
-        tilt_accuracy: float,
-        tilt_range: float,
-        model: str,
-        approach: str | None,
-        prior: Path | None,
-        attitudes: str | None,
-        **limits: float | None,
-    ) -> None:
-        self.place, self.promise = place or Path("CAMPAIGN"), Promise(tilt_accuracy, tilt_range)
-        self.approach = get_approach(approach) if approach else usual_approach(session)
-        self.model, self.called = get_model(model), model
-        chosen = attitudes or DEFAULTS.get(self.approach.name, "grid")
-        self.directions = candidate_positions(chosen, **limits)
-        self.prior = _prior(prior, self.model)
-        self.type = prior if prior is not None and prior.suffix in TYPES else None
-
-    def __call__(self, session: Campaign) -> SessionAdvice:
-        """Advise on the session as it is now."""
-        known = self.model, self.approach, self.promise, self.directions, self.prior
-        return SessionAdvice(advise(session, *known), session, self)
 
 
 def _prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:

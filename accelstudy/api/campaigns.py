@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -15,68 +15,82 @@ from accelstudy.api.logs import Log, keys_of, log_of
 from accelstudy.basics.arguments import as_sequence, path_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import matches, natural
+from accelstudy.basics.progress import say, show, warn
+from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
-from accelstudy.campaign.importing.logs import import_log
+from accelstudy.campaign.importing.logs import import_log, write_imported
+from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
-from accelstudy.campaign.importing.sources import LogFile
 from accelstudy.campaign.reference_log import ReferenceLog, open_reference
 from accelstudy.campaign.session import Campaign
 from accelstudy.campaign.simulated import CampaignSettings
 from accelstudy.campaign.simulated import simulate_campaign as simulate
+
+if TYPE_CHECKING:
+    from accelstudy.campaign.importing.detection import Holds
 
 OTHERS = ("reference_log", "reference", "reference_columns", "reference_offset", "settings")
 """Keywords of an import that no file of settings has."""
 
 
 @dataclass(frozen=True)
-class Import:
-    """Log files, and the settings by which campaigns are made of them.
+class Imported:
+    """A campaign, and the holds that it was made of, which a figure shows.
 
     Attributes
     ----------
-    files : list of path, or the columns of a table in memory
-    settings : ImportSettings
-    reference : ReferenceLog, optional, of a calibrated sensor on the same plate
+    campaign : Campaign
+    holds : Holds of the log; None of a table of means
+    figure : bool, whether it is drawn
     """
 
-    files: list[LogFile]
-    settings: ImportSettings
-    reference: ReferenceLog | None
+    campaign: Campaign
+    holds: Holds | None
+    figure: bool = True
 
     @classmethod
-    def of(
-        cls, log: Any, given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
-    ) -> Import:
-        """Read the settings and look for the files.
+    def of(cls, log: Any, figure: bool = True, **given: Any) -> Imported:
+        """Import a log by the keywords of `find_holds`, checked."""
+        settings = settings_of(given)
+        reference = _reference(given)
+        if isinstance(log, Log | pd.DataFrame):
+            log = log_of(log, given)
+            layout = settings.model_dump(exclude_unset=True) | log.layout
+            files, settings = [log.file], parse_settings(layout)
+        else:
+            files = [*files_of(as_sequence(log))]
+        return cls(*import_log(files, settings, reference), figure)
 
-        Parameters
-        ----------
-        log : Log or path or DataFrame, or several paths
-        given : mapping, keywords of `find_holds`, checked
-        sensors : mapping of a name to three columns, of several sensors in one log
-        """
-        settings = settings_of(given, sensors or {})
-        reference = _reference(*(given[name] for name in OTHERS[:-1]))
-        if not isinstance(log, Log | pd.DataFrame):
-            return cls([*files_of(as_sequence(log))], settings, reference)
-        log = log_of(log, given)
-        layout = settings.model_dump(exclude_unset=True) | log.layout
-        return cls([log.file], parse_settings(layout), reference)
+    @classmethod
+    def of_public(cls, name: str | None, folder: Path) -> Imported | pd.DataFrame:
+        """Import public data, or list what there is."""
+        if name is not None:
+            settings = import_settings(name)
+            return cls(*import_log(public_file(name, folder), settings))
+        rows = ((k, one.description, one.licence, one.url) for k, one in public_data().items())
+        columns = ["name", "description", "licence", "url"]
+        return pd.DataFrame(rows, columns=columns).set_index("name")
 
-    def campaign(self) -> Campaign:
-        """Campaign of the one sensor."""
-        return import_log(self.files, self.settings, self.reference)[0]
+    def write(self, folder: Path, place: Path) -> None:
+        """Write the folder of the campaign, with its figure."""
+        write_imported(self.campaign, self.holds, folder, self.figure)
+
+    def tell(self, place: Path | None) -> None:
+        """Print what was imported, with its warnings, and where to."""
+        for line in self.campaign.notes:
+            say(line)
+        for warning in self.campaign.warnings:
+            warn(warning)
+        if place is not None and self.figure and self.holds is not None:
+            say(f"figure: {place / 'segmentation.png'}")
+        positions = plural(self.campaign.n_positions, "position")
+        show(f"campaign: {place or '--out FOLDER keeps it'} ({positions})")
 
 
-def settings_of(
-    given: Mapping[str, Any], sensors: Mapping[str, list[str]] | None = None
-) -> ImportSettings:
+def settings_of(given: Mapping[str, Any]) -> ImportSettings:
     """Settings of a file, overlaid with those that were given as keywords."""
-    own = {
-        name: value for name, value in given.items() if name not in OTHERS and value is not False
-    }
-    content, names = keys_of({**own, "sensors": sensors or None})
-    return read_settings(given["settings"], content, names)
+    own = {k: value for k, value in given.items() if k not in OTHERS and value is not False}
+    return read_settings(given["settings"], *keys_of(own))
 
 
 def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
@@ -109,24 +123,19 @@ def files_of(given: Iterable[str | PathLike[str]]) -> list[Path]:
     return files
 
 
-def _reference(
-    log: Path | None,
-    calibration: Path | None,
-    columns: dict[str, str] | None,
-    offset: float | None,
-) -> ReferenceLog | None:
+def _reference(given: Mapping[str, Any]) -> ReferenceLog | None:
     """Return the calibrated sensor on the same plate, if there is one."""
+    log, calibration, columns, offset = (given[name] for name in OTHERS[:-1])
     of_log, of_calibration = key("reference_log"), key("reference")
-    if log is None and calibration is None:
-        more = {"reference_columns": columns, "reference_offset": offset}
-        for name in (name for name, value in more.items() if value is not None):
-            raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
-        return None
-    if calibration is None:
+    if log is not None and calibration is not None:
+        return open_reference(log, calibration, columns, offset)
+    if log is not None:
         raise InputError(f"{of_log}: give the calibration.json of that sensor by {of_calibration}")
-    if log is None:
+    if calibration is not None:
         raise InputError(f"{of_calibration}: give the raw log of that sensor by {of_log}")
-    return open_reference(log, calibration, columns, offset)
+    for name in (name for name in OTHERS[2:-1] if given[name] is not None):
+        raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
+    return None
 
 
 # --- simulated ----------------------------------------------------------------------------------
@@ -143,9 +152,9 @@ class SimulatedCampaign(Campaign):
 
     truth: Mapping[str, Any] = field(default_factory=dict)
 
-
-def simulate_from(settings: Mapping[str, Any]) -> SimulatedCampaign:
-    """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
-    campaign, truth = simulate(CampaignSettings(**settings))
-    values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
-    return SimulatedCampaign(**values, truth=truth)
+    @classmethod
+    def of(cls, *, name: str | None, **settings: Any) -> SimulatedCampaign:
+        """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
+        campaign, truth = simulate(CampaignSettings(name=name or "simulated", **settings))
+        values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
+        return cls(**values, truth=truth)

@@ -1,25 +1,37 @@
-"""The catalogues of effects, models, schemes and so on, as tables."""
+"""Tables of what there is to choose from, and of what it can determine."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from accelstudy.approaches import approach_names
-from accelstudy.basics.errors import UnknownNameError
+from accelstudy.api.inputs import resolve
+from accelstudy.approaches import approach_names, get_approach
+from accelstudy.basics.arguments import as_sequence
+from accelstudy.basics.errors import InputError, UnknownNameError
 from accelstudy.basics.plugins import source_of
+from accelstudy.basics.progress import stage, track
 from accelstudy.basics.registry import WithSettings
+from accelstudy.basics.units import angle_note, attitude_unit, to_attitude
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
 from accelstudy.data_sheets.reading import data_sheet_names, get_data_sheet
 from accelstudy.data_sheets.sheet import QUANTITIES
+from accelstudy.design.estimability import estimability
+from accelstudy.diagnosis import visibility
 from accelstudy.effects import Effect, effect_names, get_effect
+from accelstudy.leveling.angles import angles_of
 from accelstudy.noise_effects import NoiseEffect, get_noise_effect, noise_effect_names
-from accelstudy.schemes import get_scheme, scheme_names
+from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, compose, get_model
-from accelstudy.simulation.hold_plan import PROVIDES
+from accelstudy.simulation.hold_plan import PROVIDES, check_needs_no_plan
+from accelstudy.simulation.sessions import Noise
+from accelstudy.study.config import read_study
 
 Row = dict[str, object]
 
@@ -106,3 +118,84 @@ KINDS: dict[str, Callable[[], list[Row]]] = {
     ],
 }
 """Rows of each catalogue."""
+
+
+# --- what it can determine ----------------------------------------------------------------------
+
+
+def visible_effects(
+    campaign: Any, scheme: str | None, model: str, approach: str | None
+) -> pd.DataFrame:
+    """Return what a campaign or a scheme can show of the effects that a model leaves out."""
+    if campaign is not None and scheme is not None:
+        raise InputError("effects: `campaign` and `scheme` exclude each other; give one of them")
+    with stage("what can be shown"):
+        if scheme is None:
+            examined = visibility.examine_campaign(*resolve(campaign, model, approach))
+        else:
+            by = get_approach(approach or "robot")
+            examined = visibility.examine_scheme(get_scheme(scheme), get_model(model), by)
+        table = visibility.visibility_table(examined)
+    table.attrs["legend"] = (
+        "MDB: size of one parameter that a test at 0.1 % detects with a probability of 80 %;"
+        "\nMIB: size at which the effect can also be told from the one it is most like;"
+        "\nwith: setting in which the effect shows best, of those that a diagnosis tries;"
+        "\nconfused with: the nearest effects and the cosine of their signatures, 1 for the same."
+        f"\n{angle_note()}."
+    )
+    return table
+
+
+def scheme_table(names: Sequence[str], model: str, approach: str) -> pd.DataFrame:
+    """Return what schemes, by default all, determine of the ideal sensor."""
+    chosen_model, chosen_approach = get_model(model), get_approach(approach)
+    check_needs_no_plan(chosen_model)
+    rows, pole = [], f"pole/{attitude_unit()}"
+    for scheme in map(get_scheme, track(as_sequence(names) or scheme_names(), "schemes")):
+        found = estimability(scheme, chosen_model, chosen_approach, blur=Noise().sigma_force)
+        rows.append(
+            {
+                "scheme": scheme.name,
+                "n": scheme.n_positions,
+                "status": scheme.status,
+                "rank": f"{found.rank}/{len(found.parameter_names)}",
+                "condition": found.condition if found.estimable else math.nan,
+                "r": found.redundancy,
+                "m": scheme.fourth_moment,
+                pole: float(to_attitude(scheme.pole_distance)),
+                "not estimable": ", ".join(found.not_estimable),
+            }
+        )
+    table = pd.DataFrame(rows)
+    table.attrs["decimals"] = {"condition": 1, "m": 4, pole: 1}
+    table.attrs["title"] = f"model {chosen_model.name}, approach {approach}"
+    table.attrs["legend"] = (
+        "rank and condition: of the scaled design matrix at the ideal sensor;"
+        "\nr: conditions - unknowns; m: mean of x²y²;"
+        "\npole: distance to the x axis, where roll is undefined;"
+        f"\n{angle_note()}."
+        f"\nFamilies: {', '.join(scheme_families())}."
+    )
+    return table
+
+
+def directions(name: str) -> pd.DataFrame:
+    """Return the directions of a scheme, with roll and pitch in the unit of angles."""
+    scheme = get_scheme(name)
+    attitudes = to_attitude(angles_of(-scheme.directions))
+    columns = ["x", "y", "z", *(f"{angle}_{attitude_unit()}" for angle in ("roll", "pitch"))]
+    table = pd.DataFrame(np.hstack([scheme.directions, attitudes]), columns=columns)
+    table.attrs["title"] = f"{scheme.title} ({scheme.status}): {scheme.source}"
+    return table.rename_axis("position")
+
+
+def cell_table(configurations: Sequence[str | PathLike[str]]) -> pd.DataFrame:
+    """Return the cells of a study: redundancy, replicates, and why one cannot be estimated."""
+    rows = []
+    for cell in read_study(*map(Path, as_sequence(configurations))).cells:
+        found = estimability(
+            cell.positions, cell.estimated_model, cell.conditions, cell.noise, hold=cell.hold
+        )
+        rows.append((cell.name, found.redundancy, cell.replicates, found.reason or ""))
+    columns = ["cell", "redundancy", "replicates", "reason"]
+    return pd.DataFrame(rows, columns=columns).set_index("cell")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from numbers import Integral, Real
@@ -29,7 +30,9 @@ def path_of(name: str, value: Any, expected: str = "a path") -> Path:
 
 
 def whole_number(name: str, value: Any, allowed: Range) -> int:
-    """Whole number within a range."""
+    """Whole number within a range, also as text, as on the command line."""
+    if isinstance(value, str) and re.fullmatch(r"\s*[+-]?\d{1,30}\s*", value):
+        value = int(value)
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise InputError(f"{name}: expected a whole number, not {brief(value)}")
     allowed.check_key(name, int(value))

@@ -8,18 +8,22 @@ and what is printed. cyclopts reads signatures and docstrings, too, but takes 0.
 from __future__ import annotations
 
 import inspect
+import os
 import re
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
-from functools import cached_property, partial
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import click
 
-from accelstudy.basics.errors import OPTIONS, InputError
+from accelstudy.basics.arguments import as_sequence
+from accelstudy.basics.errors import OPTIONS
+from accelstudy.basics.names import matches
 from accelstudy.basics.progress import feedback, stage
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
+from accelstudy.commands.listings import tell_value
 from accelstudy.files.outputs import OutputKind, result_folder
 from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import PATH, Names
@@ -64,44 +68,37 @@ class Command(click.Command):
     Parameters
     ----------
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
-    run : function that does all of it, with the verb's parameters, which are checked, and with
-        those of further options; by default `make`, whose result is written to --out if it has
-        files
-    make : function that returns what is written, with the verb's parameters; by default the verb
     name : str, of the command; that of the verb if omitted
+    run : function that does all of it, with the checked parameters of the verb, and all options
+    make : function that does the work in place of the verb, with its checked parameters, and with
+        further options
     writes : Kind of the folder that --out names; of a result that is a file, a context manager as
         `accelstudy.files.outputs.new_file`
     out : str, help of --out
     optional : bool, whether nothing is written without --out
+    tell : function that prints what the verb returns, if that does not tell itself
     more : str, what its help says of `options` and of files, beside the docstring
-    sections : mapping of a title of the help to names of options, in the order of the help
-    reads : function, what else is read of a path that is given, such as those of a pattern
     options : further options, which come after that of --out
-    retired : mapping of an option of earlier versions to what to do instead
-    shared : options of many commands, which come last
+    sections : mapping of a title of the help to names of options, in the order of the help
     """
 
     def __init__(
         self,
         verb: Callable[..., Any],
-        run: Callable[..., None] | None = None,
-        *,
-        make: Callable[..., Any] | None = None,
         name: str = "",
+        *,
+        run: Callable[..., None] | None = None,
+        make: Callable[..., Any] | None = None,
         writes: OutputKind | Place | None = None,
         out: str = "Folder to write to.",
         optional: bool = False,
+        tell: Callable[[Any], None] = tell_value,
         more: str = "",
-        sections: Mapping[str, str] | None = None,
-        reads: Callable[[Any], Iterable[Any]] = lambda given: (),
         options: Iterable[click.Option] = (),
-        retired: Mapping[str, str] | None = None,
-        shared: Iterable[click.Option] = (ANGLE_UNIT, QUIET),
+        sections: Mapping[str, str] | None = None,
     ) -> None:
-        self.verb, self.writes, self.reads = verb, writes, reads
-        place = partial(result_folder, kind=writes) if isinstance(writes, OutputKind) else writes
-        self.make = make or inspect.unwrap(verb)
-        self.run = run or (partial(self._save, place) if place else self.make)
+        self.verb, self.writes, self.tell = verb, writes, tell
+        self.run, self.make = run or self._save, make or inspect.unwrap(verb)
         self.sections = {title: names.split() for title, names in (sections or {}).items()}
         signature = inspect.signature(verb).parameters.values()
         self.arguments = [p for p in signature if p.kind is p.POSITIONAL_OR_KEYWORD]
@@ -112,20 +109,20 @@ class Command(click.Command):
             epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in kinds.examples(verb))]),
         )
         del self.params  # the list of all commands does without them
-        self._options = optional, out, [*options], [*shared]
-        self._retired = dict(retired or {})
+        self._options = optional, out, [*options]
 
     @cached_property
     def params(self) -> list[click.Parameter]:  # type: ignore[override]
         """Options and arguments."""
-        optional, out, options, shared = self._options
+        optional, out, options = self._options
+        keywords = kinds.keywords(self.verb)
         place = click.Option(["--out"], type=PATH, required=not optional, help=out)
         first, last = ([], []) if self.writes is None else ([place], [FORCE])
         # It stands in the help of all commands together.
         plugin = click.Option(["--plugin"], hidden=True, **PLUGIN)
-        keywords = map(self._option, kinds.keywords(self.verb).values())
         arguments = map(self._argument, self.arguments)
-        return [*arguments, *first, *options, *keywords, *last, *shared, plugin]
+        of_verb = map(self._option, keywords.values())
+        return [*arguments, *first, *options, *of_verb, *last, ANGLE_UNIT, QUIET, plugin]
 
     def _argument(self, parameter: inspect.Parameter) -> click.Argument:
         """Argument of a positional parameter: a path or a name."""
@@ -171,36 +168,49 @@ class Command(click.Command):
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            keywords = kinds.keywords(self.verb)
-            retired = self._retired | {
-                f"--{old.replace('_', '-')}": f"{keywords[new].option} takes it"
-                for old, new in kinds.RENAMED.items()
-                if new in keywords
-            }
-            if error.option_name not in retired:
-                raise
-            instead = retired[error.option_name]
-            raise InputError(f"{error.option_name}: no longer an option; {instead}") from None
+            kinds.refuse_retired(self.verb, [error.option_name[2:].replace("-", "_")])
+            raise
 
     def _act(self, *, quiet: bool = False, angle_unit: str | None = None, **given: Any) -> None:
         with feedback(quiet), angles_in(angle_unit):
             self.run(**kinds.check(self.verb, given))
 
-    def _save(self, place: Place, *, out: Path | None, force: bool, **given: Any) -> None:
+    def _save(self, *, out: Path | None = None, **given: Any) -> None:
         """Write the result to --out, and print what it says."""
-        named = [path for one in self.arguments for path in _paths(given[one.name])]
-        read = [one for path in named for one in self.reads(path)]
-        inputs = [*inputs_of(self.verb, given), *read]
-        opened = nullcontext() if out is None else place(out, inputs=inputs, force=force)
-        work = stage(self.writes.name) if isinstance(self.writes, OutputKind) else nullcontext()
-        with opened as part, work:
+        force = self.writes is not None and given.pop("force")
+        with self._place(out, force, given) as part:
             result = self.make(**given)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)
             if part is not None:
                 result.write(part, out)
-        result.tell(out)
+        tell = getattr(result, "tell", None)
+        tell(out) if tell else self.tell(result)
+
+    @contextmanager
+    def _place(
+        self, out: Path | None, force: bool, given: Mapping[str, Any]
+    ) -> Iterator[Path | None]:
+        """Where the result is written, apart from what is read; None if nothing is."""
+        writes, inputs = self.writes, self._inputs(given)
+        if writes is None or out is None:
+            yield None
+        elif isinstance(writes, OutputKind):
+            with result_folder(out, writes, inputs, force) as part, stage(writes.name):
+                yield part
+        else:
+            with writes(out, inputs, force) as part:
+                yield part
+
+    def _inputs(self, given: Mapping[str, Any]) -> list[Path]:
+        """Files and folders that are read, of patterns, too."""
+        files = {name for name, one in kinds.keywords(self.verb).items() if one.kind.files}
+        files |= {one.name for one in self.arguments}
+        values = (one for name in files for one in as_sequence(given[name]) if one is not None)
+        paths = [Path(value) for value in values if isinstance(value, str | Path)]
+        found = (matches(path, os.path.exists) or [] for path in paths)
+        return [*paths, *(Path(one) for several in found for one in several)]
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the arguments, the sections, and at the end what is in none of them."""
@@ -214,20 +224,6 @@ class Command(click.Command):
             if records:
                 with formatter.section(title):
                     formatter.write_dl(records)
-
-
-def inputs_of(verb: Callable[..., Any], given: Mapping[str, Any]) -> list[Path]:
-    """Files and folders that a verb reads."""
-    files = {name for name, one in kinds.keywords(verb).items() if getattr(one.kind, "files", 0)}
-    inputs = [path for value in given.values() for path in _paths(value)]
-    return inputs + [Path(given[name]) for name in files if isinstance(given.get(name), str)]
-
-
-def _paths(value: Any) -> list[Path]:
-    """Paths among the arguments of a command."""
-    if isinstance(value, tuple):
-        return [path for one in value for path in _paths(one)]
-    return [value] if isinstance(value, Path) else []
 
 
 def _metavar(parameter: inspect.Parameter) -> str:

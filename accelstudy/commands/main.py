@@ -1,37 +1,198 @@
-"""The command line: all commands, in sections.
+"""The command line: all commands, in sections, and what is of the terminal alone.
 
 The study itself is run by Snakemake.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import Any
 
 import click
 
 from accelstudy.basics.errors import OPTIONS, InputError
+from accelstudy.basics.progress import stage, warn
 from accelstudy.basics.units import ANGLE_UNIT_VARIABLE, angles_in
-from accelstudy.commands import campaigns, choices, studies, verbs
-from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN
+from accelstudy.commands import listings
+from accelstudy.commands.bridge import ANGLE_UNITS, PLUGIN, Command
 from accelstudy.commands.ending import bad_input_as_one_line, interruptible
+from accelstudy.files import outputs
+from accelstudy.files.outputs import new_file, result_folder
+from accelstudy.verbs import calibrations, campaigns, planning, retired, sensors, studies
+from accelstudy.verbs.kinds import PATH
+
+
+def imported(**given: Any) -> Any:
+    """Campaign of a log, with the holds that its figure shows."""
+    from accelstudy.api.campaigns import Imported
+
+    return Imported.of(**given)
+
+
+def public_data(**given: Any) -> Any:
+    """Campaign of public data, or a table of them."""
+    from accelstudy.api.campaigns import Imported
+
+    return Imported.of_public(given["name"], Path(given["folder"]))
+
+
+def simulate_campaign(
+    out: Path, truth: Path | None, force: bool, name: str | None, **given: Any
+) -> None:
+    """Write a simulated campaign and, apart from it, the truth."""
+    from accelstudy.campaign.format import write_campaign
+    from accelstudy.campaign.simulated import write_truth
+
+    # The truth enters first and is moved last: it may be meant for a folder that is made here.
+    with (
+        nullcontext() if truth is None else new_file(truth, force=force) as truth_file,
+        result_folder(out, outputs.CAMPAIGN, force=force) as folder,
+        stage("simulation"),
+    ):
+        campaign = campaigns.simulate_campaign(name=name or out.resolve().name, **given)
+        write_campaign(campaign, folder, plausible=not given["gross_errors"])
+        if truth_file is not None:
+            write_truth(dict(campaign.truth), truth_file)
+    click.echo(f"campaign: {out} ({campaign.n_positions} positions)")
+
+
+def exported(calibration: Path, form: str) -> str:
+    """Calibration in a form that a device takes, with a warning of what the form cannot hold."""
+    from accelstudy.campaign.calibration.export import export, losses
+    from accelstudy.campaign.calibration.sensor_calibration import sensor_of
+
+    sensor = sensor_of(calibration)
+    text = export(sensor, form)
+    if mended := sensor.content.get("mended"):
+        warn(f"the calibration is of mended data: {mended['reason']}")
+    for loss in losses(sensor, form):
+        warn(loss)
+    return text
+
+
+def new_table(
+    path: Path, inputs: Iterable[str | Path] = (), force: bool = False
+) -> AbstractContextManager[Path]:
+    """Return the place of a table, which is no spreadsheet; see `new_file`."""
+    if path.suffix.lower() in (".xlsx", ".xls", ".ods"):
+        raise InputError(f"{path}: a spreadsheet is not written; let it end in .csv or .parquet")
+    return new_file(path, inputs, force)
+
+
+def new_scheme(*place: Any, **how: Any) -> AbstractContextManager[Path]:
+    """Return the place of a scheme."""
+    from accelstudy.proposal.design import new_scheme
+
+    return new_scheme(*place, **how)
+
 
 SECTIONS = {
     "Campaigns, measured or simulated": [
-        *(campaigns.IMPORT, campaigns.PUBLIC, campaigns.SIMULATE_CAMPAIGN, campaigns.ADVISE),
-        *(verbs.CALIBRATE, verbs.DIAGNOSE, verbs.LOT, verbs.CHECK_SIGMAS, campaigns.APPLY),
-        *(verbs.EXPORT, verbs.COMPARE, verbs.HISTORY),
+        Command(
+            campaigns.find_holds,
+            "import",
+            make=imported,
+            writes=outputs.CAMPAIGN,
+            out="Folder of the campaign.",
+            more="segmentation.png in the folder shows the holds with their numbers.",
+            options=[
+                click.Option(
+                    ["--figure/--no-figure"], default=True, help="Draw the log with its holds."
+                )
+            ],
+            sections={
+                "The log": "columns time time_unit rate variable",
+                "Its numbers": "unit scale offset range frame",
+                "The holds": "threshold window trim shortest exclude figure",
+                "A log of blocks instead": "block",
+                "A table of means instead": "means robot_sigma robot_unit",
+                "A calibrated sensor beside it": "reference_log reference reference_columns "
+                "reference_offset",
+                "The campaign": "out name gravity settings",
+            },
+        ),
+        Command(
+            campaigns.public,
+            make=public_data,
+            writes=outputs.CAMPAIGN,
+            out="Folder of the campaign.",
+            optional=True,
+            tell=listings.tell_public,
+        ),
+        Command(
+            campaigns.simulate_campaign,
+            run=simulate_campaign,
+            writes=outputs.CAMPAIGN,
+            out="Folder of the campaign.",
+            more="The truth goes to --truth and nowhere else.",
+            options=[click.Option(["--truth"], type=PATH, help="YAML file for the truth.")],
+            sections={
+                "What is written": "out truth name seed",
+                "The sensor": "model effects size noise_effects gross_errors",
+                "Its noise": "sigma sigma_known robot_sigma n_samples",
+                "The holds": "scheme repeats repeat_first order approach yaw gravity",
+                "Their conditions": "interval temperature temperature_order vibration",
+            },
+        ),
+        Command(planning.advise),
+        Command(calibrations.calibrate, writes=outputs.CALIBRATION),
+        Command(calibrations.diagnose, writes=outputs.DIAGNOSIS),
+        Command(sensors.lot, writes=outputs.LOT),
+        Command(calibrations.check_sigmas, tell=listings.tell_sigmas),
+        Command(
+            calibrations.apply,
+            make=calibrations.leveled,
+            writes=new_table,
+            out="CSV or Parquet file to write.",
+        ),
+        Command(calibrations.export, make=exported),
+        Command(sensors.compare, writes=outputs.COMPARISON),
+        Command(sensors.history, writes=outputs.HISTORY),
     ],
-    "Before a calibration, and what it is worth": [verbs.PLAN, campaigns.DATA_SHEET],
+    "Before a calibration, and what it is worth": [
+        Command(
+            planning.plan,
+            writes=outputs.PLAN,
+            out="Folder for the table, the figure and a study.",
+            optional=True,
+            sections={
+                "What is asked": "tilt_accuracy tilt_range sensor sigma history equipment "
+                "confidence",
+                "What is tried": "holds schemes max_time max_positions replicates seed",
+                "What the equipment takes": "moving_time robot_moving_time robot_setup_time "
+                "robot_sigma",
+            },
+        ),
+        Command(planning.data_sheet, writes=new_file, out="YAML file to write."),
+    ],
     "What there is to choose from": [
-        *(choices.MODELS, choices.EFFECTS, choices.SCHEMES, choices.SCHEME, campaigns.DESIGN),
+        Command(studies.models, tell=listings.tell_models),
+        Command(studies.list_effects, "effects", tell=listings.tell_effects),
+        Command(studies.list_schemes, "schemes"),
+        Command(studies.scheme, tell=listings.tell_directions),
+        Command(
+            planning.find_positions,
+            "design",
+            writes=new_scheme,
+            out="YAML file for the positions.",
+            sections={
+                "The calibration": "model approach positions sigma robot_sigma gravity_sigma",
+                "What the positions are to be good for": "criterion tilt_range neglect "
+                "discriminate prior after",
+                "What the positions must keep to": "attitudes roll pitch pole_distance least_angle",
+            },
+        ),
     ],
-    "Studies": [studies.INIT, studies.CELLS, studies.CLAIMS, studies.CONFIG_SCHEMA],
+    "Studies": [
+        Command(studies.init),
+        Command(studies.cells, tell=listings.tell_cells),
+        Command(studies.claims),
+        Command(studies.config_schema),
+    ],
 }
 """Commands in the order of use."""
-RETIRED = {
-    "pole": "the tutorial 'The foot of a pole' (examples/pole) works it out with a calibration"
-}
-"""Commands of earlier versions, and what takes their place."""
 
 
 class Commands(click.Group):
@@ -62,8 +223,8 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command that is called; one of an earlier version says what to do instead."""
-        if args[0] in RETIRED:
-            raise InputError(f"{args[0]}: no longer a command; {RETIRED[args[0]]}")
+        if args[0] in retired.COMMANDS:
+            raise InputError(f"{args[0]}: no longer a command; {retired.COMMANDS[args[0]]}")
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:

@@ -1,4 +1,4 @@
-"""A campaign that is being measured: read as it is, and followed while its table grows."""
+"""A campaign that is being measured, read as it is."""
 
 from __future__ import annotations
 
@@ -18,9 +18,6 @@ from accelstudy.campaign.format import (
 from accelstudy.campaign.header import HEADER, TABLE, Header
 from accelstudy.campaign.session import Campaign
 from accelstudy.files.reading import read_text
-
-MIN_LOOKS = 3
-"""Number of looks after which a last line without an end is taken, as editors may leave it out."""
 
 
 def read_running(folder: str | Path) -> Campaign:
@@ -74,41 +71,3 @@ def _without_positions(header: Header) -> Campaign:
     if (header.robot or header.reference) is not None:
         values["angles"] = np.zeros((0, 2))
     return campaign_of(header, values)
-
-
-class Watch:
-    """Looks at a campaign folder again and again.
-
-    Parameters
-    ----------
-    folder : Path
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._files: list[str] = []
-        self._used: list[str] = []
-        self._looks = 0
-
-    def look(self) -> Campaign | None:
-        """The session if it has changed since the last look, else None.
-
-        Raises
-        ------
-        InputError
-            If it has changed and cannot be read; its table is probably just being written.
-        """
-        files = [path.read_bytes().decode(errors="replace") for path in _files(self.folder)]
-        self._looks = self._looks + 1 if files == self._files else 0
-        self._files = files
-        resting = self._looks >= MIN_LOOKS
-        used = files if resting else [*files[:1], *map(_whole_lines, files[1:])]
-        if used == self._used and self._used:
-            return None
-        self._used = used
-        return _read(self.folder, whole_lines=not resting)[0]
-
-
-def _files(folder: Path) -> list[Path]:
-    """Header and table of a campaign, as far as they exist."""
-    return [path for path in (folder / HEADER, folder / TABLE) if path.is_file()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from accelstudy.basics import bounds
@@ -159,9 +160,40 @@ def find_holds(
             calibrated/calibration.json
     """
     given = {**locals()}
-    from accelstudy.api.campaigns import Import
+    from accelstudy.api.campaigns import Imported
 
-    return Import.of(given.pop("log"), given).campaign()
+    return Imported.of(**given).campaign
+
+
+@verb
+def public(
+    name: str | None = None, *, folder: kinds.File = "resources/public"
+) -> Campaign | pd.DataFrame:
+    """Make a campaign of public data, or list what there is.
+
+    A download is checked by its sha256.
+
+    Parameters
+    ----------
+    name : str
+        Name of the data; without it they are listed.
+    folder : path
+        Where the file is, in any subfolder, or is downloaded to.
+
+    Returns
+    -------
+    Campaign or DataFrame
+        The campaign or, without a name, a row per name: description, licence and url.
+
+    Examples
+    --------
+        accelstudy public
+        accelstudy public xsens-mti --out xsens
+    """
+    from accelstudy.api.campaigns import Imported
+
+    found = Imported.of_public(name, Path(folder))
+    return found.campaign if isinstance(found, Imported) else found
 
 
 @verb
@@ -295,7 +327,7 @@ def simulate_campaign(
     --------
         accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
-    settings = {**locals()}
-    from accelstudy.api.campaigns import simulate_from
+    given = {**locals()}
+    from accelstudy.api.campaigns import SimulatedCampaign
 
-    return simulate_from({**settings, "name": name or "simulated"})
+    return SimulatedCampaign.of(**given)

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import cache, wraps
 from importlib import import_module
 from os import PathLike
-from pathlib import Path
 from textwrap import fill
-from typing import Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
@@ -24,9 +23,12 @@ from click.shell_completion import CompletionItem
 from accelstudy.basics import bounds
 from accelstudy.basics.arguments import as_sequence, check_type, path_of, quantity, whole_number
 from accelstudy.basics.bounds import Range
-from accelstudy.basics.errors import InputError, brief, key
-from accelstudy.basics.names import check_file_name
+from accelstudy.basics.errors import OPTIONS, InputError, brief, key
 from accelstudy.basics.units import InputQuantity, unit_label
+from accelstudy.verbs.retired import KEYWORDS as RETIRED
+
+if TYPE_CHECKING:
+    from accelstudy import Campaign
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
@@ -41,12 +43,23 @@ class Kind(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
         works with, and raises `InputError` if it is wrong
     doc_type : str, its type in a docstring
     name : str, in the help of a command
+    files : bool, whether it is a file, or may be one
     """
 
     def __init__(
-        self, read: Callable[[str, Any], Any], doc_type: str = "str", name: str = "text"
+        self,
+        read: Callable[[str, Any], Any],
+        doc_type: str = "str",
+        name: str = "text",
+        files: bool = False,
     ) -> None:
-        self.read, self.doc_type, self.name = read, doc_type, name
+        self.read, self.doc_type, self.name, self.files = read, doc_type, name, files
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Files, where it may be one."""
+        return [CompletionItem(incomplete, type="file")] if self.files else []
 
 
 class Names(Kind):
@@ -63,8 +76,8 @@ class Names(Kind):
     def __init__(
         self, name: str, module: str, names: str, files: bool = False, parts: Names | None = None
     ) -> None:
-        super().__init__(self._read, name=name)
-        self.place, self.files, self.parts = (module, names), files, parts
+        super().__init__(self._read, name=name, files=files)
+        self.place, self.parts = (module, names), parts
 
     def _read(self, name: str, value: Any) -> str:
         """Name, or path of a file as text."""
@@ -86,54 +99,30 @@ class Names(Kind):
         before, plus, last = incomplete.rpartition("+" if self.parts else "\0")
         known = [*self.known_names(), *(self.parts.known_names() if plus and self.parts else ())]
         items = [CompletionItem(f"{before}{plus}{one}") for one in known if one.startswith(last)]
-        return items or ([CompletionItem(incomplete, type="file")] if self.files else [])
+        return items or super().shell_complete(ctx, param, incomplete)
 
 
-class Whole(click.IntRange):
-    """A whole number, whose range stands in the help of a command; the verb checks it."""
-
-    doc_type = "int"
-
-    def __init__(self, allowed: Range) -> None:
-        super().__init__(int(allowed.least), int(allowed.most) if allowed.most <= 1e6 else None)
-        self.allowed = allowed
-
-    def read(self, name: str, value: Any) -> int:
-        """Whole number within the range."""
-        return whole_number(name, value, self.allowed)
+class FilePath(Kind):
+    """A path that a file can have; a command makes one of any text."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number, or what is none."""
-        try:
-            return int(value)
-        except ValueError:
-            return value
+        """Return the path."""
+        return path_of("path", value)
 
 
-class FilePath(click.Path):
-    """A path that a file can have."""
-
-    doc_type = "path"
-    read = staticmethod(path_of)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Check the name."""
-        check_file_name(value)
-        return super().convert(value, param, ctx)
-
-
-def kind_of_annotation(said: Any) -> Any:
+def kind_of_annotation(said: Any) -> Kind:
     """Kind that an annotation names; a `Range` is one of whole numbers."""
     if isinstance(said, Range):
-        return Whole(said)
-    if not isinstance(said, InputQuantity):
-        return said
-    unit = unit_label(said.unit)
-    words = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
-    return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
+        return Kind(lambda name, value: whole_number(name, value, said), "int", "integer")
+    if isinstance(said, InputQuantity):
+        unit = unit_label(said.unit)
+        words = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
+        return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
+    assert isinstance(said, Kind)
+    return said
 
 
-def kind_of_types(expected: str, *types: type, **of: str) -> Kind:
+def kind_of_types(expected: str, *types: type, **of: Any) -> Kind:
     """Return the kind of values of some types."""
 
     def read(name: str, value: Any) -> Any:
@@ -199,15 +188,12 @@ def angle(least: float, most: float) -> InputQuantity:
 
 Quantity = float | str
 """A number in SI, or a text with a unit."""
-RENAMED = {"sigma_angle": "robot_sigma", "robot_accuracy": "robot_sigma"}
-"""Keywords of earlier versions, and what takes their place."""
-
 TEXT = kind_of_types("a text", str)
 FLAG = kind_of_types("True or False", bool, doc_type="bool")
 COLUMN = kind_of_types(
     "the name of a column or its number", str, int, doc_type="str or int", name="column"
 )
-PATH = FilePath(path_type=Path)
+PATH = FilePath(path_of, "path", "path", files=True)
 SHARE_OR_RMS = Kind(_share, "float or str", "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
 File = Annotated[str | PathLike[str], PATH]
@@ -240,6 +226,10 @@ TypeFile = Annotated[
     str | PathLike[str] | None,
     PATH,
     "The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
+]
+GivenCampaign = Annotated[
+    "Campaign | str | PathLike[str]",
+    Kind(lambda name, value: value, "Campaign or path", "path", True),
 ]
 Force = Annotated[bool, FLAG, "Overwrite files of the same names, but never an input."]
 Seed = Annotated[int, bounds.SEED, "Seed of all random numbers."]
@@ -294,7 +284,7 @@ class Keyword:
     Attributes
     ----------
     name : str
-    kind : Kind, or a type of click with the same attributes
+    kind : Kind
     many : bool, whether it takes several
     ends : bool, whether it takes two values of its kind
     default : of the signature; `inspect.Parameter.empty` if it must be given
@@ -303,7 +293,7 @@ class Keyword:
     """
 
     name: str
-    kind: Kind | Whole | FilePath
+    kind: Kind
     many: bool
     ends: bool
     default: Any
@@ -320,8 +310,8 @@ class Keyword:
         kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
         many, ends = "Sequence" in said, said.startswith("tuple")
         optional = default is None or "None" in said
-        kind = kind_of_annotation(kind)
-        return cls(parameter.name, kind, many, ends, default, optional, "".join(meaning))
+        found = kind_of_annotation(kind)
+        return cls(parameter.name, found, many, ends, default, optional, "".join(meaning))
 
     @property
     def option(self) -> str:
@@ -417,13 +407,20 @@ def check(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, A
     }
 
 
+def refuse_retired(function: Callable[..., Any], given: Iterable[str]) -> None:
+    """Say what takes the place of a keyword of earlier versions that is among those given."""
+    what = "a keyword" if OPTIONS.get() is None else "an option"
+    instead = RETIRED.get(function.__name__, {})
+    for old in instead.keys() & {*given}:
+        raise InputError(f"{key(old)}: no longer {what}; {instead[old]}")
+
+
 def verb(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
     """Check the keywords of a function by their kinds, and name what is wrong as its user does."""
 
     @wraps(function)
     def within(*args: Arguments.args, **given: Arguments.kwargs) -> Returned:
-        for old in given.keys() & RENAMED.keys():
-            raise InputError(f"{old}: no longer a keyword; {RENAMED[old]} takes it")
+        refuse_retired(function, given)
         return function(*args, **check(function, given))
 
     within.__doc__ = _documented(function)

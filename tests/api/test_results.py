@@ -308,7 +308,7 @@ def test_the_front_door_is_light_and_complete():
     line = "import sys, accelstudy as a; print(len(a.__all__), 'numpy' in sys.modules)"
     found = run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout
     assert found.split() == [str(len(acs.__all__)), "False"]
-    source = (ROOT / "accelstudy/__init__.py").read_text(encoding="utf-8")
+    source = (ROOT / "accelstudy/__init__.pyi").read_text(encoding="utf-8")
     for name in acs.__all__:
         assert getattr(acs, name).__doc__
         assert f" import {name} as {name}\n" in source

@@ -1,13 +1,19 @@
 """Commands are made of functions: the same words, the same defaults, the same errors."""
 
 import inspect
+import json
 import pickle
+import re
 from dataclasses import fields
+from io import StringIO
 from typing import Any
 
 import click
+import pandas as pd
 import pytest
-from calling import refusal
+import yaml
+from calling import refusal, succeed
+from study_helpers import content, grid
 
 import accelstudy
 from accelstudy.basics.errors import OPTIONS
@@ -16,48 +22,51 @@ from accelstudy.campaign.simulated import CampaignSettings, simulate_campaign
 from accelstudy.commands.main import main
 from accelstudy.verbs import kinds
 
-TERMINAL = {"out", "force", "quiet", "angle_unit", "plugin"}
-"""What only a terminal asks."""
-OF_THE_TERMINAL = {
-    "import": {"sensors", "figure"}, "simulate-campaign": {"truth"}, "advise": {"watch"},
+TERMINAL = {"out", "force", "quiet", "angle_unit", "plugin", "figure", "truth"}
+"""What only a terminal asks: where to write, and what to show."""
+VERBS = [*main.commands]
+NAMES = {
+    "import": "find_holds", "design": "find_positions",
+    "effects": "list_effects", "schemes": "list_schemes",
 }  # fmt: skip
-"""What only the terminal asks of a command: several outputs, and a session that goes on."""
-VERBS = [
-    *("import", "simulate-campaign", "advise", "calibrate", "diagnose", "lot", "check-sigmas"),
-    *("apply", "export", "compare", "history", "plan", "data-sheet", "design"),
-]
-NUMBERS = {"quantity", "integer range", "share", "numbers", "columns"}
+"""Functions that cannot be called as their commands: these are a word of Python and packages."""
+NUMBERS = {"quantity", "integer", "share", "numbers", "columns"}
 """Kinds of which "5 parsec" is none."""
 NEEDED = {
     "plan": {"tilt_accuracy": "10mgon"}, "advise": {"tilt_accuracy": "10mgon"},
 }  # fmt: skip
 
 
-def options(verb: str) -> dict[str, click.Parameter]:
-    params = main.commands[verb].params
-    more = TERMINAL | OF_THE_TERMINAL.get(verb, set())
-    return {p.name: p for p in params if p.expose_value and p.name and p.name not in more}
-
-
 def function(verb: str) -> Any:
-    names = {"import": "find_holds", "design": "find_positions"}
-    return getattr(accelstudy, names.get(verb, verb.replace("-", "_")))
+    return getattr(accelstudy, NAMES.get(verb, verb.replace("-", "_")))
+
+
+def options(verb: str) -> dict[str, click.Parameter]:
+    of_terminal = TERMINAL - {*inspect.signature(function(verb)).parameters}
+    params = main.commands[verb].params
+    return {p.name: p for p in params if p.expose_value and p.name and p.name not in of_terminal}
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_options_are_keywords_and_arguments_are_positional(verb: str) -> None:
+    """They have the same names, the same defaults, and are needed alike."""
     signature = inspect.signature(function(verb)).parameters
-    assert set(options(verb)) == set(signature)
+    assert [*options(verb)] == [*signature]
     for name, option in options(verb).items():
-        by_position = signature[name].kind is not inspect.Parameter.KEYWORD_ONLY
+        said = signature[name]
+        by_position = said.kind is not inspect.Parameter.KEYWORD_ONLY
         assert by_position == isinstance(option, click.Argument), name
+        assert option.required == (said.default is said.empty), name
+        if not option.required and not by_position:
+            assert option.default == said.default, name
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
     """It names the option to one user, and the keyword to the other."""
     paths = [name for name, one in options(verb).items() if isinstance(one, click.Argument)]
-    out = [] if verb in ("check-sigmas", "export", "advise") else ["--out", tmp_path / "out.yaml"]
+    writes = any(option.name == "out" for option in main.commands[verb].params)
+    out = ["--out", tmp_path / "out.yaml"] if writes else []
     needed = NEEDED.get(verb, {})
     keywords = kinds.keywords(function(verb))
     for keyword in keywords.values():
@@ -76,6 +85,38 @@ def test_a_wrong_value_ends_in_the_same_line(verb: str, tmp_path: Any) -> None:
         assert line.startswith(f"{keyword.option}: ")
 
 
+def test_what_is_printed_is_what_the_function_returns(tmp_path: Any) -> None:
+    config = tmp_path / "config.yaml"
+    config.write_text(yaml.safe_dump(content(grids=[grid(schemes=["faces-6", "mclaren-24"])])))
+    campaign = tmp_path / "campaign"
+    accelstudy.write_campaign(accelstudy.simulate_campaign(scheme="faces-edges-18"), campaign)
+
+    def said(*words: Any) -> str:
+        return str(succeed(*words).stdout)
+
+    assert json.loads(said("config-schema")) == accelstudy.config_schema()
+    table = pd.read_csv(StringIO(said("scheme", "faces-6").partition("\n")[2]), index_col=0)
+    pd.testing.assert_frame_equal(table, accelstudy.scheme("faces-6"), atol=1e-6)
+    for name, row in accelstudy.models().iterrows():
+        assert f"{name} ({row['n_parameters']}): {row['parameters']}\n" in said("models")
+    for name, row in accelstudy.cells(config).iterrows():
+        assert f"{name}: {row['reason'] or f'r = {row.redundancy}, '}" in said("cells", config)
+    for words, table in (
+        (("schemes", "faces-6", "mclaren-24"), accelstudy.list_schemes(["faces-6", "mclaren-24"])),
+        (("effects", "--scheme", "mclaren-24"), accelstudy.list_effects(scheme="mclaren-24")),
+        (("effects", "--campaign", campaign), accelstudy.list_effects(campaign=campaign)),
+    ):
+        lines = said(*words, "--quiet").splitlines()
+        assert lines[0].split() == " ".join(table.columns).split()
+        assert [line.split()[0] for line in lines[1:]] == table.iloc[:, 0].tolist()
+        assert table.attrs["legend"] in said(*words)
+    pd.testing.assert_frame_equal(accelstudy.list_effects(), accelstudy.catalogue("effects"))
+    with pytest.raises(accelstudy.InputError, match="`campaign` and `scheme` exclude each other"):
+        accelstudy.list_effects(campaign=campaign, scheme="mclaren-24")
+    assert accelstudy.init(tmp_path / "mine") in said("init", tmp_path / "mine", "--force")
+    assert [*accelstudy.public().index] == re.findall(r"^([\w-]+):", said("public"), re.MULTILINE)
+
+
 def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() -> None:
     one = accelstudy.simulate_campaign(seed=3)
     other, _ = simulate_campaign(CampaignSettings(seed=3))
@@ -91,7 +132,7 @@ def test_a_simulated_campaign_has_the_keywords_and_defaults_of_its_settings() ->
 ])  # fmt: skip
 def test_the_noise_of_the_robot_has_one_name(verb: str, old: str) -> None:
     assert "robot_sigma" in inspect.signature(function(verb)).parameters
-    with pytest.raises(accelstudy.InputError, match=f"^{old}: no longer a keyword; robot_sigma "):
+    with pytest.raises(accelstudy.InputError, match=f"^{old}: no longer a keyword; `robot_sigma` "):
         function(verb)(**{old: "3mgon"})
     if verb in VERBS:
         option = f"--{old.replace('_', '-')}"

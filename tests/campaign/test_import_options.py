@@ -1,7 +1,6 @@
 """What logs look like elsewhere: clocks, axes, several sensors or files, holds mended by hand."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from calling import refused, succeed
 from log_helpers import RATE, G, open_log, session, table, write
@@ -169,27 +168,7 @@ def test_holds_are_left_out_by_number(tmp_path, turned):
     assert "2 left out" in (tmp_path / "out" / "segmentation.svg").read_text()
 
 
-# --- Several sensors, several files --------------------------------------------------------------
-
-
-def test_sensors_of_one_log_share_their_holds(tmp_path, turned):
-    forces, edges = turned
-    other = 1.01 * forces[:, [1, 0, 2]] * [1, 1, -1]
-    a, b = edges[2]
-    other[a + 150 : b - 150] += 3 * np.random.default_rng(1).standard_normal((b - a - 300, 3))
-    table = pd.DataFrame(np.column_stack([forces, other]), columns=["a", "b", "c", "d", "e", "f"])
-    table.to_csv(tmp_path / "log.csv", index=False)
-    succeed(
-        "import",
-        *(tmp_path / "log.csv", "--out", tmp_path / "out", "--rate", 100, "--no-figure"),
-        *("--sensor", "imu0=a,b,c", "--sensor", "imu1=d,e,f"),
-    )
-    one, two = (read_campaign(tmp_path / "out" / name) for name in ("imu0", "imu1"))
-    assert one.positions.tolist() == two.positions.tolist() == list(range(1, 8))
-    np.testing.assert_array_equal(one.time, two.time)
-    np.testing.assert_allclose(two.forces, 1.01 * one.forces[:, [1, 0, 2]] * [1, 1, -1], atol=0.02)
-    assert two.log.columns == {"fx": "d", "fy": "e", "fz": "f"}
-    assert (one.sensor, one.name) == ("imu0", "log-imu0")
+# --- Several files -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("clock", ["one", "each", "rate"])

@@ -106,18 +106,6 @@ def test_a_gap_keeps_the_clock_and_the_blocks(tmp_path):
     found(written(tmp_path, [lines[0], *np.array(lines[1:])[still], "end of log,,"]), block=150)
 
 
-def test_sensors_of_one_log_lose_the_same_rows(tmp_path):
-    more = dict(zip(("bx", "by", "bz"), FORCES.T, strict=True))
-    lines = rows_of(table(**more))
-    lines[300] = lines[300].rsplit(",", 1)[0] + ",x"
-    path = written(tmp_path, lines)
-    sensors = ("--sensor", "a=ax,ay,az", "--sensor", "b=bx,by,bz")
-    text = succeed("import", path, *sensors, "--no-figure", "--out", tmp_path / "out").stderr
-    assert text.count("line 301, column bz") == 2
-    one, two = (acs.read_campaign(tmp_path / "out" / name) for name in "ab")
-    np.testing.assert_array_equal(one.forces, two.forces)
-
-
 # --- names, units and dates ----------------------------------------------------------------------
 
 

@@ -17,7 +17,6 @@ from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.assessment import assess
 from accelstudy.campaign.calibration.fit import fit_campaign
 from accelstudy.campaign.format import read_campaign
-from accelstudy.commands import campaigns as command
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 from accelstudy.sensors.models import get_model
@@ -261,67 +260,6 @@ def test_a_last_line_without_an_end(begun):
     assert "the last line of the table is not whole; it is not counted" in text
 
 
-# --- a table that grows --------------------------------------------------------------------------
-
-
-def watched(folder, monkeypatch, *steps):
-    """Output of --watch while steps are done, one before each look; Ctrl-C at the end."""
-    left = list(steps)
-
-    def sleep(_):
-        if not left:
-            raise KeyboardInterrupt
-        left.pop(0)()
-
-    monkeypatch.setattr(command.time, "sleep", sleep)
-    result = succeed("advise", folder, *WANTED, "--watch")
-    assert result.stdout.endswith("\nended\n")
-    return result.output
-
-
-def nothing():
-    pass
-
-
-def test_each_new_position_gets_its_block(begun, sessions, monkeypatch):
-    folder = begun(3)
-    rows = (sessions / "gravity/positions.csv").read_text(encoding="utf-8").splitlines()
-    table = folder / "positions.csv"
-
-    def add(text):
-        def write():
-            with table.open("a", encoding="utf-8") as file:
-                file.write(text)
-
-        return write
-
-    text = watched(
-        folder, monkeypatch, nothing, add(f"{rows[4]}\n"), add(rows[5][:15]), nothing,
-        add(f"{rows[5][15:]}\n{rows[6]}\n"), nothing, add(rows[7]), *4 * [nothing],
-    )  # fmt: skip
-    assert re.findall(r"(\d+) positions? so far", text) == ["3", "4", "6", "7"]
-    assert "warning" not in text
-
-
-def test_a_changed_table_is_advised_on_anew(begun, monkeypatch):
-    folder = begun(12)
-    table = folder / "positions.csv"
-    rows = table.read_text(encoding="utf-8").splitlines()
-
-    def write(lines):
-        return lambda: table.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-    *cells, last = rows[3].split(",")
-    changed = [*rows[:3], ",".join([*cells, str(float(last) + 0.001)]), *rows[4:]]
-    text = watched(
-        folder, monkeypatch, write(rows[:9]), write(rows[:13]), write(changed),
-        write([*changed[:4], "4,x"]), nothing, write(changed),
-    )  # fmt: skip
-    assert text.count("waiting for a whole table: ") == 1
-    blocks = re.findall(r"(\d+) positions so far", text)
-    assert blocks == ["12", "8", "12", "12", "12"]
-
-
 # --- attitudes in words --------------------------------------------------------------------------
 
 
@@ -348,7 +286,7 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
     page = (ROOT / "docs/guides/sequential.md").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"(?:^ {4}.*\n)+", page.partition("## To try it")[2], re.MULTILINE)
-    commands, answer, watch, arrive, last = (
+    commands, answer, ways, arrive, last = (
         [line[4:] for line in block.replace("\\\n", " ").splitlines()] for block in blocks[:5]
     )
 
@@ -358,23 +296,14 @@ def test_the_page_can_be_followed_word_by_word(tmp_path, monkeypatch):
         return succeed(*line.split()[1:]).output
 
     assert_told_alike([follow(line) for line in commands][-1], "\n".join(answer))
+    assert ways[0] == f"watch -n 2 {commands[-1]}"
     assert "while read" in arrive[1]  # which takes its time
-    one = "sed -n {}p whole/positions.csv >> running/positions.csv"
-    arriving = [arrive[0], *(one.format(line) for line in range(2, 28))]
-
-    def sleep(_):
-        if not arriving:
-            raise KeyboardInterrupt
-        follow(arriving.pop(0))
-
-    monkeypatch.setattr(command.time, "sleep", sleep)
-    advices = follow(watch[0])
-    assert len(re.findall("so far", advices)) == 2 + 26  # without a table, without positions
-    blocks = advices.split("\n\n")
+    follow(arrive[0])
+    advices = [follow(commands[-1])]
+    for line in range(2, 28):
+        follow(f"sed -n {line}p whole/positions.csv >> running/positions.csv")
+        advices.append(follow(commands[-1]))
     # The edges so far leave one angle open, though there are more positions than parameters.
-    assert "not determined yet: nonorthogonality (alpha_yz)" in next(
-        block for block in blocks if block.startswith("whole: 14 positions so far")
-    )
-    enough = [block for block in blocks if "YOU CAN STOP" in block]
-    assert enough[0].startswith("whole: 16 positions so far")
+    assert "not determined yet: nonorthogonality (alpha_yz)" in advices[14]
+    assert next(i for i, said in enumerate(advices) if "YOU CAN STOP" in said) == 16
     assert "ACCEPTED" in follow(last[0])

@@ -1,0 +1,41 @@
+"""What takes the place of commands and keywords of earlier versions."""
+
+COMMANDS = {
+    "pole": "the tutorial 'The foot of a pole' (examples/pole) works it out with a calibration"
+}
+NO_DELIMITER = {"delimiter": "it is told from the rows"}
+KEYWORDS = {
+    "advise": {"watch": "`watch -n 2 accelstudy advise ...` of the shell asks again and again"},
+    "apply": NO_DELIMITER,
+    "data_sheet": NO_DELIMITER,
+    "diagnose": {"replicates": "nothing is simulated; model.yaml is a study that does it"},
+    "export": {
+        "level": "roll = atan2(-f_y, -f_z) and pitch = atan2(f_x, hypot(f_y, f_z)) of the "
+        "calibrated force in frd (guide 'On a device'); `accelstudy apply` gives them with their "
+        "sigmas"
+    },
+    "find_holds": {
+        **NO_DELIMITER,
+        "join": "holds in one attitude are positions each",
+        "sensor": "`columns` takes those of one sensor; import each into a folder of its own",
+    },
+    "find_positions": {
+        "mountings": "`attitudes` takes a CSV file of the attitudes that a mount allows"
+    },
+    "init": {"sensor": "set `noise` and `sensor` in config/config.yaml of the new folder"},
+    "plan": {
+        "reference": "`accelstudy import --reference-log` takes a calibrated sensor",
+        "robot_accuracy": "`robot_sigma` takes it",
+    },
+    "simulate": {"robot_accuracy": "`robot_sigma` takes it"},
+    "simulate_campaign": {
+        "gross": "`gross_errors` takes it",
+        "hold": "campaigns have no slopes within holds",
+        "no_time": "`interval` is none then",
+        "robot_sigma_mgon": "`robot_sigma` takes it with its unit, as 5mgon",
+        "samples_per_hold": "`n_samples` takes it",
+        "sigma_angle": "`robot_sigma` takes it",
+        "sigma_unknown": "`sigma_known` says it, as --no-sigma-known",
+    },
+}
+"""By the function of the command."""
