@@ -122,7 +122,7 @@ def _environment(markup: bool) -> Environment:
     )
     environment.filters.update(
         {name: getattr(wording, name) for name in WORDS},
-        angle=lambda mgon: wording.amount(mgon * units.MGON, "rad"),
+        angle=lambda mgon: wording.amount(None if mgon is None else mgon * units.MGON, "rad"),
         attitude=lambda gon: units.to_attitude(gon * units.GON).item(),
         axes=axes_note,
         badge=lambda verdict: BADGES[verdict][0],
