@@ -1,5 +1,4 @@
 # What users import from accelstudy, for type checkers and editors, and for `__init__.py`.
-from accelstudy.api.advice import SessionAdvice as SessionAdvice
 from accelstudy.api.catalogues import catalogue as catalogue
 from accelstudy.api.logs import Log as Log
 from accelstudy.api.simulations import Simulation as Simulation
@@ -12,6 +11,7 @@ from accelstudy.epochs.history import History as History
 from accelstudy.lots.output import Lot as Lot
 from accelstudy.planning.plan import Plan as Plan
 from accelstudy.proposal.design import Design as Design
+from accelstudy.sequential.advice import Advice as Advice
 from accelstudy.study.run import run_study as run_study
 from accelstudy.verbs.calibrations import apply as apply
 from accelstudy.verbs.calibrations import calibrate as calibrate

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from functools import cached_property
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import click
@@ -70,8 +71,8 @@ class Command(click.Command):
     verb : function, as `accelstudy.verbs.kinds.verb` makes it
     name : str, of the command; that of the verb if omitted
     run : function that does all of it, with the checked parameters of the verb, and all options
-    make : function that does the work in place of the verb, with its checked parameters, and with
-        further options
+    make : function, or its place as "module:name", that works in place of the verb, with its
+        checked parameters and further options
     writes : Kind of the folder that --out names; of a result that is a file, a context manager as
         `accelstudy.files.outputs.new_file`
     out : str, help of --out
@@ -88,7 +89,7 @@ class Command(click.Command):
         name: str = "",
         *,
         run: Callable[..., None] | None = None,
-        make: Callable[..., Any] | None = None,
+        make: Callable[..., Any] | str = "",
         writes: OutputKind | Place | None = None,
         out: str = "Folder to write to.",
         optional: bool = False,
@@ -179,7 +180,8 @@ class Command(click.Command):
         """Write the result to --out, and print what it says."""
         force = self.writes is not None and given.pop("force")
         with self._place(out, force, given) as part:
-            result = self.make(**given)
+            make = resolve_name(self.make) if isinstance(self.make, str) else self.make
+            result = make(**given)
             if status := getattr(result, "exit_status", 0):
                 result.tell(None)
                 raise click.exceptions.Exit(status)

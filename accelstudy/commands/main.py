@@ -24,20 +24,6 @@ from accelstudy.verbs import calibrations, campaigns, planning, retired, sensors
 from accelstudy.verbs.kinds import PATH
 
 
-def imported(**given: Any) -> Any:
-    """Campaign of a log, with the holds that its figure shows."""
-    from accelstudy.api.campaigns import Imported
-
-    return Imported.of(**given)
-
-
-def public_data(**given: Any) -> Any:
-    """Campaign of public data, or a table of them."""
-    from accelstudy.api.campaigns import Imported
-
-    return Imported.of_public(given["name"], Path(given["folder"]))
-
-
 def simulate_campaign(
     out: Path, truth: Path | None, force: bool, name: str | None, **given: Any
 ) -> None:
@@ -93,7 +79,7 @@ SECTIONS = {
         Command(
             campaigns.find_holds,
             "import",
-            make=imported,
+            make="accelstudy.api.campaigns:Imported.of",
             writes=outputs.CAMPAIGN,
             out="Folder of the campaign.",
             more="segmentation.png in the folder shows the holds with their numbers.",
@@ -115,7 +101,7 @@ SECTIONS = {
         ),
         Command(
             campaigns.public,
-            make=public_data,
+            make="accelstudy.api.campaigns:Imported.of_public",
             writes=outputs.CAMPAIGN,
             out="Folder of the campaign.",
             optional=True,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from accelstudy.adjustment.calibration import CalibrationProblem
-from accelstudy.approaches import Approach
+from accelstudy.approaches import Approach, get_approach
+from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
 from accelstudy.campaign.calibration.assessment import Assessment, assess, tilt_left
@@ -22,16 +24,25 @@ from accelstudy.campaign.calibration.fit import (
     fit_campaign,
     initial_values,
     sigma_to_show_above,
+    usual_approach,
 )
-from accelstudy.campaign.sensor_type import SensorType
+from accelstudy.campaign.calibration.sensor_calibration import sensor_of
+from accelstudy.campaign.sensor_type import SensorType, read_type
 from accelstudy.campaign.session import Campaign
 from accelstudy.design.estimability import is_blind
 from accelstudy.design.information import Information, position_rows
 from accelstudy.effects import HoldConditions
 from accelstudy.effects.hold_conditions import REFERENCE_TEMPERATURE
+from accelstudy.sensors.models import get_model
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.choice import Chooser, Knowledge, typical_sizes
-from accelstudy.sequential.prior import Prior
+from accelstudy.sequential.advice import Advice, NoiseTaken
+from accelstudy.sequential.choice import (
+    DEFAULTS,
+    Chooser,
+    Knowledge,
+    candidate_positions,
+    typical_sizes,
+)
 from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise, bound, known_variance
 from accelstudy.simulation.sessions import Noise
 
@@ -41,69 +52,83 @@ KNOWN_RATIO = 0.5
 """Ratio of sigma to the typical size of a parameter, up to which it counts as known at all."""
 CONDITIONS = {"time", "temperature", "vibration"}
 """Columns of the holds that change by themselves from position to position."""
+TYPES = (".yaml", ".yml")
+"""Endings of a file that describes a type of sensors."""
 INTERVAL = 60.0
 """s between two holds, until the session has two."""
 
 
 @dataclass(frozen=True)
-class NoiseTaken:
-    """Noise of a position by which the accuracy is judged, m/s².
+class Prior:
+    """Parameters that are known beforehand, with their accuracy.
 
     Attributes
     ----------
-    stated : float or None, by the campaign
-    seen : float or None, from the residuals; None without redundancy
-    taken : float or None, the one that is used; None as long as it is unknown
-    refuted : bool, whether the residuals contradict the stated noise
-    redundancy : int
+    mean : (u,) array, SI
+    information : Information, of all u parameters
     """
 
-    stated: float | None
-    seen: float | None
-    taken: float | None
-    refuted: bool
-    redundancy: int
+    mean: Array
+    information: Information
+
+    @classmethod
+    def of_covariance(cls, mean: ArrayLike, covariance: ArrayLike) -> Prior:
+        """Return the prior of an earlier calibration: values (u,) and covariance matrix (u, u).
+
+        Raises
+        ------
+        InputError
+            If the matrix is not positive definite.
+        """
+        return cls(np.asarray(mean, dtype=float), Information.of_covariance(covariance))
+
+    def augment(self, problem: CalibrationProblem) -> CalibrationProblem:
+        """The problem of sessions together with what is known; they may have no positions yet."""
+        of_model = slice(len(self.mean))
+        # Observed gravity, and 0 ± 1 of errors that angles share, are known beforehand, too.
+        weights, direct = np.diag(problem.weights), problem.direct.copy()
+        weights[of_model, of_model] = self.information.normal
+        direct[:, of_model] = self.mean
+        return replace(problem, initial=direct, direct=direct, weights=weights)
 
 
-@dataclass(frozen=True)
-class Advice:
-    """The whole advice.
+def read_prior(given: Path | None, wanted: SensorModel) -> Prior | SensorType | None:
+    """Prior knowledge by an earlier calibration or a type of sensors; None without either."""
+    if given is None:
+        return None
+    if given.suffix in TYPES:
+        return read_type(given, wanted)
+    earlier = sensor_of(given)
+    if earlier.model.parameter_names != wanted.parameter_names:
+        raise InputError(
+            f"{given}: calibrates {', '.join(earlier.model.parameter_names)}, but the model "
+            f"{wanted.name!r} has {', '.join(wanted.parameter_names)}"
+        )
+    if not np.isfinite(earlier.covariance).all():
+        raise InputError(f"{given}: does not say how well its parameters are known")
+    return Prior.of_covariance(earlier.parameters, earlier.covariance)
 
-    Attributes
-    ----------
-    positions : (n,) int array, numbers of the positions, without those that the campaign leaves out
-    p_last : float, of the last position by all others, adjusted for the number of positions, as in
-        the report of a calibration; NaN where they cannot test it
-    suspects : tuple of int, numbers of positions that contradict the others; they are used
-    state : str, of a calibration with these positions; empty if there is none yet
-    undetermined : tuple of str, parameters that the positions do not determine yet
-    vague : tuple of str, parameters known less well than the typical size in a cheap sensor
-    noise : NoiseTaken
-    rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
-    next : (3,) array, direction of gravity in the body frame in the position to take next
-    to_go : int or None, positions still needed; None if unknown or too many
-    foreseeable : bool, whether `to_go` can be known
-    enough : bool, whether the promise is kept, by a calibration that is not rejected
-    """
 
-    positions: NDArray[np.int_]
-    p_last: float
-    suspects: tuple[int, ...]
-    state: str
-    undetermined: tuple[str, ...]
-    vague: tuple[str, ...]
-    noise: NoiseTaken
-    rms: Array | None
-    next: Array
-    to_go: int | None
-    foreseeable: bool
-    enough: bool
-
-    @property
-    def repeats(self) -> int | None:
-        """Number of the last position, if it contradicts the others, so that it is taken again."""
-        last = int(self.positions[-1]) if len(self.positions) else None
-        return last if last in self.suspects else None
+def advise_session(
+    session: Campaign,
+    place: Path | None,
+    *,
+    tilt_accuracy: float,
+    tilt_range: float,
+    model: str,
+    approach: str | None,
+    prior: Path | None,
+    attitudes: str | None,
+    **limits: float | None,
+) -> Advice:
+    """Advise by the keywords of `accelstudy.advise`, checked; `place` is the folder, if any."""
+    by = get_approach(approach) if approach else usual_approach(session)
+    known, promise = get_model(model), Promise(tilt_accuracy, tilt_range)
+    directions = candidate_positions(attitudes or DEFAULTS.get(by.name, "grid"), **limits)
+    advice = advise(session, known, by, promise, directions, read_prior(prior, known))
+    of_type = prior if prior is not None and prior.suffix in TYPES else None
+    command = suggestions.calibrate(place or "CAMPAIGN", model, by.name, of_type)
+    return replace(advice, command=command) if advice.enough else advice
 
 
 def _check(campaign: Campaign, model: SensorModel, approach: Approach, known: bool) -> None:
@@ -188,10 +213,15 @@ def advise(
         to_go = chooser.positions_to_go(known, variance, rms, last)
     suspects = () if assessed is None else assessed.suspects
     advice = Advice(
+        name=campaign.name,
+        session=campaign,
+        model=model,
+        approach=approach,
+        promise=promise,
         positions=campaign.positions,
         p_last=np.nan if assessed is None else float(assessed.p_adjusted[-1]),
         suspects=tuple(sorted(int(campaign.positions[s.position]) for s in suspects)),
-        state="" if assessed is None else assessed.state,
+        calibration_state="" if assessed is None else assessed.state,
         undetermined=() if known.determined else _undetermined(campaign, model, approach, known),
         vague=_vague(model, known.information) if known.determined else (),
         noise=_noise_taken(known, campaign, trusted, noise.sigma_force),

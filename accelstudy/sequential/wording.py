@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +11,15 @@ from numpy.typing import NDArray
 from accelstudy import pages
 from accelstudy.basics.units import attitude_unit, to_attitude
 from accelstudy.basics.wording import comma_list, words
-from accelstudy.campaign.session import Campaign
 from accelstudy.effects import Effect
 from accelstudy.leveling.angles import roll_pitch
 from accelstudy.sensors.frames import FRD, Frame
 from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
-from accelstudy.sequential.advisor import Advice
-from accelstudy.sequential.promise import LEAST_REDUNDANCY, Promise
+from accelstudy.sequential.promise import LEAST_REDUNDANCY
+
+if TYPE_CHECKING:
+    from accelstudy.sequential.advice import Advice
 
 Array = NDArray[np.float64]
 
@@ -29,16 +31,13 @@ CHANGING = {"time": "times", "temperature": "temperatures", "vibration": "vibrat
 """Conditions other than the attitude on which effects depend."""
 
 
-def advice_lines(
-    advice: Advice, campaign: Campaign, model: SensorModel, promise: Promise
-) -> list[str]:
+def advice_lines(advice: Advice) -> list[str]:
     """Write the advice, most important last."""
+    campaign, model = advice.session, advice.model
     return pages.render_lines(
         SENTENCES,
         "lines",
         advice,
-        campaign,
-        promise,
         _by_effect(advice.undetermined, model),
         _by_effect(advice.vague, model),
         attitude(advice.next, FRD if campaign.log is None else campaign.log.axes),
@@ -46,9 +45,9 @@ def advice_lines(
     )
 
 
-def heading(advice: Advice, campaign: Campaign, model: SensorModel, approach: str) -> str:
+def heading(advice: Advice) -> str:
     """Heading of the advice."""
-    (line,) = pages.render_lines(SENTENCES, "heading", advice, campaign, model, approach)
+    (line,) = pages.render_lines(SENTENCES, "heading", advice)
     return line
 
 

@@ -24,7 +24,7 @@ from accelstudy.basics import bounds
 from accelstudy.basics.arguments import as_sequence, check_type, path_of, quantity, whole_number
 from accelstudy.basics.bounds import Range
 from accelstudy.basics.errors import OPTIONS, InputError, brief, key
-from accelstudy.basics.units import InputQuantity, unit_label
+from accelstudy.basics.units import InputQuantity
 from accelstudy.verbs.retired import KEYWORDS as RETIRED
 
 if TYPE_CHECKING:
@@ -41,19 +41,14 @@ class Kind(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.5
     ----------
     read : function of the name of a keyword and of what was given, which returns what the verb
         works with, and raises `InputError` if it is wrong
-    doc_type : str, its type in a docstring
     name : str, in the help of a command
     files : bool, whether it is a file, or may be one
     """
 
     def __init__(
-        self,
-        read: Callable[[str, Any], Any],
-        doc_type: str = "str",
-        name: str = "text",
-        files: bool = False,
+        self, read: Callable[[str, Any], Any], name: str = "text", files: bool = False
     ) -> None:
-        self.read, self.doc_type, self.name, self.files = read, doc_type, name, files
+        self.read, self.name, self.files = read, name, files
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
@@ -113,23 +108,21 @@ class FilePath(Kind):
 def kind_of_annotation(said: Any) -> Kind:
     """Kind that an annotation names; a `Range` is one of whole numbers."""
     if isinstance(said, Range):
-        return Kind(lambda name, value: whole_number(name, value, said), "int", "integer")
+        return Kind(lambda name, value: whole_number(name, value, said), "integer")
     if isinstance(said, InputQuantity):
-        unit = unit_label(said.unit)
-        words = "float or str" if unit == "1" else f"float in {unit}, or str with a unit"
-        return Kind(lambda name, value: quantity(name, value, said), words, "quantity")
+        return Kind(lambda name, value: quantity(name, value, said), "quantity")
     assert isinstance(said, Kind)
     return said
 
 
-def kind_of_types(expected: str, *types: type, **of: Any) -> Kind:
+def kind_of_types(expected: str, *types: type, name: str = "text") -> Kind:
     """Return the kind of values of some types."""
 
     def read(name: str, value: Any) -> Any:
         check_type(name, value, *types, expected=expected)
         return value
 
-    return Kind(read, **of)
+    return Kind(read, name)
 
 
 def _share(name: str, value: Any) -> float | None:
@@ -137,12 +130,6 @@ def _share(name: str, value: Any) -> float | None:
 
     check_type(name, value, int, float, str, expected="a probability, as 0.95 or 95%")
     return confidence_of(str(value).strip())
-
-
-def _share_only(name: str, value: Any) -> float:
-    if (share := _share(name, value)) is None:
-        raise InputError(f"{name}: a probability, such as 95%, not rms")
-    return share
 
 
 def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:
@@ -158,7 +145,7 @@ def numbers(example: str, separator: str = ",", count: int = 0) -> Kind:
             raise InputError(f"{name}: expected {example}, not {brief(value)}")
         return read
 
-    return Kind(read, "str, or several float", "numbers")
+    return Kind(read, "numbers")
 
 
 def pairs(example: str) -> Kind:
@@ -173,7 +160,7 @@ def pairs(example: str) -> Kind:
             raise InputError(f"{name}: expected {example} or the like, not {brief(value)}")
         return {key.strip(): said.strip() for key, said in pairs}
 
-    return Kind(read, "mapping or str", "columns")
+    return Kind(read, "columns")
 
 
 def si(unit: str, least: float, most: float) -> InputQuantity:
@@ -189,17 +176,15 @@ def angle(least: float, most: float) -> InputQuantity:
 Quantity = float | str
 """A number in SI, or a text with a unit."""
 TEXT = kind_of_types("a text", str)
-FLAG = kind_of_types("True or False", bool, doc_type="bool")
-COLUMN = kind_of_types(
-    "the name of a column or its number", str, int, doc_type="str or int", name="column"
-)
-PATH = FilePath(path_of, "path", "path", files=True)
-SHARE_OR_RMS = Kind(_share, "float or str", "share")
+FLAG = kind_of_types("True or False", bool)
+COLUMN = kind_of_types("the name of a column or its number", str, int, name="column")
+PATH = FilePath(path_of, "path", files=True)
+SHARE_OR_RMS = Kind(_share, "share")
 GRAVITY = si("m/s^2", bounds.GRAVITY.least, bounds.GRAVITY.most)
 File = Annotated[str | PathLike[str], PATH]
 Accuracy = Annotated[Quantity, angle(1e-9, math.pi / 2)]
 Tilt = Annotated[Quantity, angle(1e-3, math.pi / 2)]
-Share = Annotated[float | str, Kind(_share_only, "float or str", "share")]
+Share = Annotated[Quantity, si("1", 0.5, 0.999)]
 
 EFFECTS = Names("effect", "accelstudy.effects", "effect_names")
 APPROACHES = Names("approach", "accelstudy.approaches", "approach_names")
@@ -228,8 +213,7 @@ TypeFile = Annotated[
     "The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
 ]
 GivenCampaign = Annotated[
-    "Campaign | str | PathLike[str]",
-    Kind(lambda name, value: value, "Campaign or path", "path", True),
+    "Campaign | str | PathLike[str]", Kind(lambda name, value: value, "path", files=True)
 ]
 Force = Annotated[bool, FLAG, "Overwrite files of the same names, but never an input."]
 Seed = Annotated[int, bounds.SEED, "Seed of all random numbers."]
@@ -242,11 +226,7 @@ Columns = Annotated[
     "Columns of fx, fy, fz, temperature and vibration, by name, or by number from 0: "
     "fx=1,fy=2,fz=3.",
 ]
-Time = Annotated[
-    str | int | None,
-    COLUMN,
-    "Column of the time, by name or number.",
-]
+Time = Annotated[str | int | None, COLUMN, "Column of the time, by name or number."]
 TimeUnit = Annotated[
     str | None, TEXT, "Unit of the time: s, ms, us or ns. [default: as named, or s]"
 ]
@@ -285,6 +265,7 @@ class Keyword:
     ----------
     name : str
     kind : Kind
+    type : str, as a docstring has it
     many : bool, whether it takes several
     ends : bool, whether it takes two values of its kind
     default : of the signature; `inspect.Parameter.empty` if it must be given
@@ -294,6 +275,7 @@ class Keyword:
 
     name: str
     kind: Kind
+    type: str
     many: bool
     ends: bool
     default: Any
@@ -308,21 +290,21 @@ class Keyword:
         # result, which is not imported for a help text.
         hint = eval(said, getattr(inspect.unwrap(function), "__globals__", {}))
         kind, *meaning = _metadata(hint) or (FLAG if hint is bool else TEXT,)
-        many, ends = "Sequence" in said, said.startswith("tuple")
-        optional = default is None or "None" in said
-        found = kind_of_annotation(kind)
-        return cls(parameter.name, found, many, ends, default, optional, "".join(meaning))
+        return cls(
+            parameter.name,
+            kind_of_annotation(kind),
+            inspect.formatannotation(getattr(hint, "__origin__", hint)),
+            many="Sequence" in said,
+            ends=said.startswith("tuple"),
+            default=default,
+            optional=default is None or "None" in said,
+            meaning="".join(meaning),
+        )
 
     @property
     def option(self) -> str:
         """Option of the command; one that is repeated is called as a single one."""
         return f"--{(self.name.removesuffix('s') if self.many else self.name).replace('_', '-')}"
-
-    @property
-    def type(self) -> str:
-        """Type in words, as a docstring has it."""
-        word = self.kind.doc_type
-        return f"{word}, or several" if self.many else f"two of {word}" if self.ends else word
 
     def check(self, value: Any) -> Any:
         """Value as the verb works with it, quantities in SI; raises `InputError` if it is wrong."""

@@ -15,7 +15,7 @@ from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Names, Quantity, angle, verb
 
 if TYPE_CHECKING:
-    from accelstudy import Campaign, Design, Plan, SessionAdvice, Simulation
+    from accelstudy import Advice, Campaign, Design, Plan, Simulation
     from accelstudy.data_sheets.sheet import DataSheet
 
 Hold = Annotated[Quantity, QUANTITIES["hold"]]
@@ -206,7 +206,7 @@ def advise(
     pole_distance: Annotated[Quantity, angle(0.0, 2.0)] | None = None,
     max_roll: Annotated[Quantity, angle(0.0, 4.0)] | None = None,
     max_pitch: Annotated[Quantity, angle(0.0, 4.0)] | None = None,
-) -> SessionAdvice:
+) -> Advice:
     """Say in a session where to go next, and when to stop.
 
     The positions so far are calibrated and judged as `calibrate` does. The advice says what is not
@@ -246,9 +246,13 @@ def advise(
         accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon
     """
     given = {**locals()}
-    from accelstudy.api.advice import SessionAdvice
+    from accelstudy.api.inputs import as_campaign, campaign_path
+    from accelstudy.sequential.advisor import advise_session
+    from accelstudy.sequential.running import read_running
 
-    return SessionAdvice.of(**given)
+    place = campaign_path(given.pop("campaign"))
+    session = as_campaign(campaign) if place is None else read_running(place)
+    return advise_session(session, place, **given)
 
 
 @verb

@@ -190,7 +190,7 @@ def test_it_judges_as_the_calibration_does(begun, n, bumped):
     )
     calibrated = assess(fit_campaign(measured, get_model(MODEL), get_approach("gravity")))
     assert (
-        advice.state
+        advice.calibration_state
         == calibrated.state
         == ("rejected" if bumped else "accepted" if n > 11 else "cannot tell")
     )

@@ -9,7 +9,7 @@ from accelstudy.adjustment.calibration import CalibrationProblem
 from accelstudy.basics.errors import InputError
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model
-from accelstudy.sequential.prior import Prior
+from accelstudy.sequential.advisor import Prior
 from accelstudy.simulation.sessions import Noise, session
 
 VALUES = {"b_x": 0.05, "b_y": -0.02, "s_x": 2e-4, "s_z": 1e-3, "alpha_yz": 1e-3, "alpha_zx": -2e-3}

@@ -1,0 +1,170 @@
+"""What to do next in a session: the result of `accelstudy.advise`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from accelstudy.approaches import Approach
+from accelstudy.basics.levels import IMPLAUSIBLE, REJECTED
+from accelstudy.basics.progress import show, warn
+from accelstudy.basics.units import attitude_unit, to_attitude
+from accelstudy.campaign.calibration.document import write_json
+from accelstudy.campaign.session import Campaign
+from accelstudy.files.outputs import ADVICE
+from accelstudy.leveling.angles import angles_of
+from accelstudy.pages.result import Result
+from accelstudy.sensors.sensor import SensorModel
+from accelstudy.sequential import wording
+from accelstudy.sequential.promise import Promise
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NoiseTaken:
+    """Noise of a position by which the accuracy is judged, m/s².
+
+    Attributes
+    ----------
+    stated : float or None, by the campaign
+    seen : float or None, from the residuals; None without redundancy
+    taken : float or None, the one that is used; None as long as it is unknown
+    refuted : bool, whether the residuals contradict the stated noise
+    redundancy : int
+    """
+
+    stated: float | None
+    seen: float | None
+    taken: float | None
+    refuted: bool
+    redundancy: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Advice(Result):
+    """What to do next in a session.
+
+    Attributes
+    ----------
+    session : Campaign, so far
+    model, approach, promise : by which it is judged
+    positions : (n,) int array, numbers of the positions, without those that the campaign leaves out
+    p_last : float, of the last position by all others, adjusted for the number of positions, as in
+        the report of a calibration; NaN where they cannot test it
+    suspects : tuple of int, numbers of positions that contradict the others; they are used
+    calibration_state : str, state of a calibration with these positions; empty if there is none yet
+    undetermined : tuple of str, parameters that the positions do not determine yet
+    vague : tuple of str, parameters known less well than the typical size in a cheap sensor
+    noise : NoiseTaken
+    rms : (2,) array, rad, of roll and of pitch; None as long as it is not known
+    next : (3,) array, direction of gravity in the body frame in the position to take next
+    to_go : int or None, positions still needed; None if unknown or too many
+    foreseeable : bool, whether `to_go` can be known
+    enough : bool, whether the promise is kept, by a calibration that is not rejected
+    command : str, that calibrates the session if it is enough; else empty
+    """
+
+    kind = ADVICE
+
+    name: str
+    session: Campaign
+    model: SensorModel
+    approach: Approach
+    promise: Promise
+    positions: NDArray[np.int_]
+    p_last: float
+    suspects: tuple[int, ...]
+    calibration_state: str
+    undetermined: tuple[str, ...]
+    vague: tuple[str, ...]
+    noise: NoiseTaken
+    rms: Array | None
+    next: Array
+    to_go: int | None
+    foreseeable: bool
+    enough: bool
+    command: str = ""
+
+    @property
+    def repeats(self) -> int | None:
+        """Number of the last position, if it contradicts the others, so that it is taken again."""
+        last = int(self.positions[-1]) if len(self.positions) else None
+        return last if last in self.suspects else None
+
+    @property
+    def state(self) -> str:
+        """State in a word: enough, not yet, or rejected or implausible as the calibration."""
+        wrong = self.calibration_state in (REJECTED, IMPLAUSIBLE)
+        return "enough" if self.enough else self.calibration_state if wrong else "not yet"
+
+    @property
+    def verdict(self) -> str:
+        """How far it is to the accuracy that is wanted, in a sentence."""
+        return self.lines[-1]
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """The advice, most important last."""
+        return wording.advice_lines(self)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Content of advice.json, in SI."""
+        return {
+            "campaign": self.name,
+            "state": self.state,
+            "verdict": self.verdict,
+            "advice": self.lines,
+            "positions": self.positions,
+            "in_conflict": self.suspects,
+            "undetermined": self.undetermined,
+            "vague": self.vague,
+            "to_go": self.to_go,
+            "tilt": self.to_frame().reset_index().to_dict("records"),
+            "command": self.command,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return roll and pitch: those of the next position, their rms error now, and as wanted."""
+        rows = {
+            "next_rad": angles_of(-self.next),
+            "rms_rad": np.nan if self.rms is None else self.rms,
+            "wanted_rad": self.promise.accuracy,
+        }
+        return pd.DataFrame(rows, index=pd.Index(["roll", "pitch"], name="angle"))
+
+    def draw(self, ax: Axes) -> None:
+        """Draw roll and pitch of the positions so far, and of the next one."""
+        so_far, after = (
+            to_attitude(angles_of(forces)).T for forces in (self.session.forces, -self.next)
+        )
+        ax.plot(*so_far, "o", label="so far")
+        ax.plot(*after, "*", markersize=10, label="next")
+        ax.set(xlabel=f"roll / {attitude_unit()}", ylabel=f"pitch / {attitude_unit()}")
+        ax.legend()
+
+    def write(self, folder: Path, place: Path) -> None:
+        """Write advice.json."""
+        write_json(folder / ADVICE.marker, self.content)
+
+    def tell(self, place: Path | None) -> None:
+        """Print the advice, and what was odd in the table so far."""
+        for warning in self.session.warnings:
+            warn(warning)
+        show(self.summary())
+
+    def summary(self) -> str:
+        """Return the advice as text."""
+        more = [f"calibrate: {self.command}"] if self.command else []
+        heading = wording.heading(self)
+        return "\n".join([heading, *(f"  {line}" for line in (*self.lines, *more))])
