@@ -1,9 +1,7 @@
 # What users import from accelstudy, for type checkers and editors, and for `__init__.py`.
-from accelstudy.api.catalogues import catalogue as catalogue
-from accelstudy.api.logs import Log as Log
-from accelstudy.api.simulations import Simulation as Simulation
 from accelstudy.basics.errors import InputError as InputError
 from accelstudy.campaign.calibration.result import Calibration as Calibration
+from accelstudy.campaign.importing.log import Log as Log
 from accelstudy.campaign.session import Campaign as Campaign
 from accelstudy.diagnosis.report.output import Diagnosis as Diagnosis
 from accelstudy.epochs.comparison import Comparison as Comparison
@@ -12,6 +10,7 @@ from accelstudy.lots.output import Lot as Lot
 from accelstudy.planning.plan import Plan as Plan
 from accelstudy.proposal.design import Design as Design
 from accelstudy.sequential.advice import Advice as Advice
+from accelstudy.study.result import Simulation as Simulation
 from accelstudy.study.run import run_study as run_study
 from accelstudy.verbs.calibrations import apply as apply
 from accelstudy.verbs.calibrations import calibrate as calibrate
@@ -41,6 +40,7 @@ from accelstudy.verbs.studies import list_effects as list_effects
 from accelstudy.verbs.studies import list_schemes as list_schemes
 from accelstudy.verbs.studies import models as models
 from accelstudy.verbs.studies import scheme as scheme
+from accelstudy.verbs.tables import catalogue as catalogue
 
 __all__: list[str]
 __version__: str

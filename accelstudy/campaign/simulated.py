@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +176,25 @@ def simulate_campaign(settings: CampaignSettings) -> tuple[Campaign, dict[str, A
         gross.append(get_gross_error(spec).draw(campaign, rng["gross"]))
         campaign = gross[-1].act(campaign)
     return campaign, _truth(settings, sensor, hidden, noise_effects, gross)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedCampaign(Campaign):
+    """A campaign of which the truth is known.
+
+    Attributes
+    ----------
+    truth : mapping, the settings, and everything that was drawn
+    """
+
+    truth: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, *, name: str | None, **settings: Any) -> SimulatedCampaign:
+        """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
+        campaign, truth = simulate_campaign(CampaignSettings(name=name or "simulated", **settings))
+        values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
+        return cls(**values, truth=truth)
 
 
 def write_truth(truth: dict[str, Any], path: str | Path) -> None:

@@ -81,8 +81,8 @@ def tell_effects(table: pd.DataFrame) -> None:
     Parameters and typical sizes are in the units shown to people, settings in SI as specs have
     them.
     """
-    from accelstudy.api.catalogues import catalogue
     from accelstudy.basics.units import angle_note
+    from accelstudy.verbs.tables import catalogue
 
     if "equation" not in table:
         tell_table(table)
@@ -96,8 +96,8 @@ def tell_effects(table: pd.DataFrame) -> None:
 
 def _items(table: pd.DataFrame) -> Iterator[str]:
     """Lines on each row of a catalogue."""
-    from accelstudy.api.catalogues import plain_number
     from accelstudy.basics.units import display_unit, to_display
+    from accelstudy.verbs.tables import plain_number
 
     for name, row in table.iterrows():
         yield f"{name}: {row['equation']}"

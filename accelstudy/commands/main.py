@@ -79,7 +79,7 @@ SECTIONS = {
         Command(
             campaigns.find_holds,
             "import",
-            make="accelstudy.api.campaigns:Imported.of",
+            make="accelstudy.campaign.imported:Imported.of",
             writes=outputs.CAMPAIGN,
             out="Folder of the campaign.",
             more="segmentation.png in the folder shows the holds with their numbers.",
@@ -101,7 +101,7 @@ SECTIONS = {
         ),
         Command(
             campaigns.public,
-            make="accelstudy.api.campaigns:Imported.of_public",
+            make="accelstudy.campaign.imported:Imported.of_public",
             writes=outputs.CAMPAIGN,
             out="Folder of the campaign.",
             optional=True,

@@ -45,8 +45,8 @@ def calibrate(
     --------
         accelstudy calibrate my-campaign --out calibrated
     """
-    from accelstudy.api.inputs import campaign_path, fit_of
     from accelstudy.campaign.calibration.result import Calibration
+    from accelstudy.verbs.inputs import campaign_path, fit_of
 
     fit = fit_of(campaign, model, approach, prior)
     return Calibration(fit, source=campaign_path(campaign))
@@ -107,9 +107,9 @@ def check_sigmas(
     --------
         accelstudy check-sigmas my-campaign --replicates 500
     """
-    from accelstudy.api.inputs import fit_of
     from accelstudy.campaign.calibration.sigma_check import check_sigmas as check
     from accelstudy.campaign.calibration.wording import what_a_check_finds
+    from accelstudy.verbs.inputs import fit_of
 
     fit = fit_of(campaign, model, approach)
     table = check(fit, replicates, seed)
@@ -171,7 +171,7 @@ def apply(
         accelstudy apply calibrated/calibration.json calibration.csv --out leveled.csv
     """
     given: dict[str, Any] = {**locals()}
-    from accelstudy.api.logs import log_of
+    from accelstudy.campaign.importing.log import log_of
 
     given["log"] = read = log_of(log, given)
     result = leveled(**given)
@@ -182,9 +182,9 @@ def apply(
 
 def leveled(calibration: Any, log: Any, **given: Any) -> LeveledLog:
     """Level a log by the keywords of `apply`, checked."""
-    from accelstudy.api.logs import log_of
     from accelstudy.campaign.calibration.leveling import level
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
+    from accelstudy.campaign.importing.log import log_of
 
     read, sensor = log_of(log, given), sensor_of(calibration)
     return level(sensor, read.file, read.layout, given["sigma"], given["start"])
@@ -255,9 +255,9 @@ def diagnose(
     --------
         accelstudy diagnose my-campaign --out diagnosed
     """
-    from accelstudy.api.inputs import campaign_path, resolve
     from accelstudy.diagnosis import pipeline
     from accelstudy.diagnosis.report.output import Diagnosis
+    from accelstudy.verbs.inputs import campaign_path, resolve
 
     # The diagnosis, not the reader, looks for wrong units and axes.
     given = resolve(campaign, model, approach, prior, plausible=False)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from accelstudy import Campaign, Log
-    from accelstudy.api.campaigns import SimulatedCampaign
+    from accelstudy.campaign.simulated import SimulatedCampaign
 
 SIGMA = si("m/s^2", bounds.SIGMA_FORCE.least, bounds.SIGMA_FORCE.most)
 INTERVAL = si("s", bounds.INTERVAL.least, bounds.INTERVAL.most)
@@ -55,8 +55,8 @@ def read_log(
         If there is no such file, or a value is wrong.
     """
     given = {**locals()}
-    from accelstudy.api.logs import log_of
     from accelstudy.campaign.importing.formats import open_source
+    from accelstudy.campaign.importing.log import log_of
 
     read = log_of(log, given)
     open_source(read.file, read.layout.get("variable"))
@@ -160,7 +160,7 @@ def find_holds(
             calibrated/calibration.json
     """
     given = {**locals()}
-    from accelstudy.api.campaigns import Imported
+    from accelstudy.campaign.imported import Imported
 
     return Imported.of(**given).campaign
 
@@ -190,7 +190,7 @@ def public(
         accelstudy public
         accelstudy public xsens-mti --out xsens
     """
-    from accelstudy.api.campaigns import Imported
+    from accelstudy.campaign.imported import Imported
 
     found = Imported.of_public(name, Path(folder))
     return found.campaign if isinstance(found, Imported) else found
@@ -328,6 +328,6 @@ def simulate_campaign(
         accelstudy simulate-campaign --out blind --truth truth.yaml --effect "warm_up(tau=400)"
     """
     given = {**locals()}
-    from accelstudy.api.campaigns import SimulatedCampaign
+    from accelstudy.campaign.simulated import SimulatedCampaign
 
     return SimulatedCampaign.of(**given)

@@ -246,9 +246,9 @@ def advise(
         accelstudy advise my-campaign --tilt-accuracy 10mgon --tilt-range 30gon
     """
     given = {**locals()}
-    from accelstudy.api.inputs import as_campaign, campaign_path
     from accelstudy.sequential.advisor import advise_session
     from accelstudy.sequential.running import read_running
+    from accelstudy.verbs.inputs import as_campaign, campaign_path
 
     place = campaign_path(given.pop("campaign"))
     session = as_campaign(campaign) if place is None else read_running(place)
@@ -293,7 +293,7 @@ def simulate(
         If a name or a value is wrong, or the positions do not determine any of the models.
     """
     given = {**locals()}
-    from accelstudy.api.simulations import Simulation
+    from accelstudy.study.result import Simulation
 
     return Simulation.of(**given)
 
@@ -334,8 +334,8 @@ def data_sheet(
         accelstudy data-sheet log.csv --rate 100 --columns fx=0,fy=1,fz=2 --out my-sensor.yaml
     """
     given = {**locals()}
-    from accelstudy.api.campaigns import settings_of
     from accelstudy.basics.progress import stage
+    from accelstudy.campaign.imported import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 
     path = path_of("source", given.pop("source"))

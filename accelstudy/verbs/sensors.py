@@ -155,8 +155,8 @@ def lot(
     --------
         accelstudy lot sensor-1 sensor-2 sensor-3 --out lot
     """
-    from accelstudy.api.inputs import as_campaign, chosen
     from accelstudy.lots.output import Lot
+    from accelstudy.verbs.inputs import as_campaign, chosen
 
     given = [folder for one in as_sequence(campaigns) for folder in folders_of(one)]
     check_once(given, "sensor")

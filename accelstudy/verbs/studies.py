@@ -30,7 +30,7 @@ def models() -> pd.DataFrame:
     --------
         accelstudy models
     """
-    from accelstudy.api.catalogues import catalogue
+    from accelstudy.verbs.tables import catalogue
 
     return catalogue("models")
 
@@ -67,11 +67,11 @@ def list_effects(
         accelstudy effects
         accelstudy effects --campaign my-campaign
     """
-    from accelstudy.api import catalogues
+    from accelstudy.verbs import tables
 
     if campaign is None and scheme is None:
-        return catalogues.catalogue("effects")
-    return catalogues.visible_effects(campaign, scheme, model, approach)
+        return tables.catalogue("effects")
+    return tables.visible_effects(campaign, scheme, model, approach)
 
 
 @verb
@@ -97,7 +97,7 @@ def list_schemes(
     --------
         accelstudy schemes --approach robot fibonacci-24 mclaren-24
     """
-    from accelstudy.api.catalogues import scheme_table
+    from accelstudy.verbs.tables import scheme_table
 
     return scheme_table(names, model, approach)
 
@@ -123,7 +123,7 @@ def scheme(name: kinds.SchemeName) -> pd.DataFrame:
     --------
         accelstudy scheme fibonacci-24
     """
-    from accelstudy.api.catalogues import directions
+    from accelstudy.verbs.tables import directions
 
     return directions(name)
 
@@ -201,7 +201,7 @@ def cells(configs: Sequence[str | PathLike[str]]) -> pd.DataFrame:
     --------
         accelstudy cells config/config.yaml
     """
-    from accelstudy.api.catalogues import cell_table
+    from accelstudy.verbs.tables import cell_table
 
     return cell_table(configs)
 

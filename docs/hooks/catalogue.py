@@ -7,7 +7,6 @@ import re
 from markdown_text import code, page, plain, table
 
 import accelstudy
-from accelstudy.api.catalogues import plain_number as number
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.units import display_unit, to_attitude, to_display, unit_label
 from accelstudy.campaign.gross_errors import get_gross_error, gross_error_names
@@ -18,6 +17,7 @@ from accelstudy.effects import get_effect
 from accelstudy.noise_effects import get_noise_effect, noise_effect_names
 from accelstudy.schemes import get_scheme, scheme_families, scheme_names
 from accelstudy.sensors.models import MODELS, PRESETS, get_model
+from accelstudy.verbs.tables import plain_number as number
 
 
 def _unit(unit):

@@ -8,10 +8,10 @@ from places import DATA, needs_data
 from stand_ins import drawn
 
 import accelstudy as acs
-from accelstudy.api.campaigns import files_of
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
+from accelstudy.campaign.imported import files_of
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.importing.public import import_settings, public_file

@@ -201,10 +201,10 @@ def test_a_defect_is_not_taken_for_bad_input(monkeypatch):
     def broken(name):
         raise ValueError("a defect")
 
-    monkeypatch.setattr("accelstudy.api.catalogues.get_scheme", broken)
+    monkeypatch.setattr("accelstudy.verbs.tables.get_scheme", broken)
     assert isinstance(call("scheme", "faces-6").exception, ValueError)
     monkeypatch.setattr(
-        "accelstudy.api.catalogues.get_scheme",
+        "accelstudy.verbs.tables.get_scheme",
         lambda name: (_ for _ in ()).throw(InputError("bad")),
     )
     assert call("scheme", "faces-6").stderr == "error: bad\n"

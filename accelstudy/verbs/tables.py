@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from accelstudy.api.inputs import resolve
 from accelstudy.approaches import approach_names, get_approach
 from accelstudy.basics.arguments import as_sequence
 from accelstudy.basics.errors import InputError, UnknownNameError
@@ -32,6 +31,7 @@ from accelstudy.sensors.models import MODELS, compose, get_model
 from accelstudy.simulation.hold_plan import PROVIDES, check_needs_no_plan
 from accelstudy.simulation.sessions import Noise
 from accelstudy.study.config import read_study
+from accelstudy.verbs.inputs import resolve
 
 Row = dict[str, object]
 

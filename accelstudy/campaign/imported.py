@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from accelstudy.api.logs import Log, keys_of, log_of
 from accelstudy.basics.arguments import as_sequence, path_of
 from accelstudy.basics.errors import InputError, key
 from accelstudy.basics.names import matches, natural
 from accelstudy.basics.progress import say, show, warn
 from accelstudy.basics.wording import plural
 from accelstudy.campaign.importing.bags import BAG_OF_FOLDER
+from accelstudy.campaign.importing.log import Log, keys_of, log_of
 from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.importing.public import import_settings, public_data, public_file
 from accelstudy.campaign.importing.settings import ImportSettings, parse_settings, read_settings
 from accelstudy.campaign.reference_log import ReferenceLog, open_reference
 from accelstudy.campaign.session import Campaign
-from accelstudy.campaign.simulated import CampaignSettings
-from accelstudy.campaign.simulated import simulate_campaign as simulate
 
 if TYPE_CHECKING:
     from accelstudy.campaign.importing.detection import Holds
@@ -136,25 +134,3 @@ def _reference(given: Mapping[str, Any]) -> ReferenceLog | None:
     for name in (name for name in OTHERS[2:-1] if given[name] is not None):
         raise InputError(f"{key(name)}: goes with {of_log} and {of_calibration}")
     return None
-
-
-# --- simulated ----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SimulatedCampaign(Campaign):
-    """A campaign of which the truth is known.
-
-    Attributes
-    ----------
-    truth : mapping, the settings, and everything that was drawn
-    """
-
-    truth: Mapping[str, Any] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, *, name: str | None, **settings: Any) -> SimulatedCampaign:
-        """Simulate a campaign by the keywords of `simulate_campaign`, checked."""
-        campaign, truth = simulate(CampaignSettings(name=name or "simulated", **settings))
-        values = {one.name: getattr(campaign, one.name) for one in fields(campaign)}
-        return cls(**values, truth=truth)
