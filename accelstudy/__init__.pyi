@@ -3,6 +3,7 @@ from accelstudy.basics.errors import InputError as InputError
 from accelstudy.campaign.calibration.result import Calibration as Calibration
 from accelstudy.campaign.importing.log import Log as Log
 from accelstudy.campaign.session import Campaign as Campaign
+from accelstudy.data_sheets.sheet import DataSheet as DataSheet
 from accelstudy.diagnosis.report.output import Diagnosis as Diagnosis
 from accelstudy.epochs.comparison import Comparison as Comparison
 from accelstudy.epochs.history import History as History

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import yaml
 
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import STANDARD_GRAVITY, recorded_unit, to_recorded
-from accelstudy.files.outputs import new_file
+from accelstudy.pages.result import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 QUANTITIES: dict[str, tuple[str, str]] = {
     "velocity_random_walk": ("m/s^2/sqrt(Hz)", "white noise: the mean of τ s has the sd N/√τ"),
@@ -47,8 +51,8 @@ FLICKER = math.sqrt(2 * math.log(2) / math.pi)
 """Floor of the Allan deviation in parts of the bias instability B, 0.664 (IEEE Std 952)."""
 
 
-@dataclass(frozen=True)
-class DataSheet:
+@dataclass(frozen=True, eq=False, repr=False)
+class DataSheet(Result):
     """What is known of a sensor before its calibration; None if a quantity is unknown.
 
     Quantities are in SI; `QUANTITIES` explains them. White noise is given as its part of the Allan
@@ -134,29 +138,44 @@ class DataSheet:
         more = ["# Unknown; add what the manufacturer states:", *rest] if rest else []
         return lines + "\n".join(more) + "\n"
 
-    def save(self, path: str | PathLike[str], *, force: bool = False) -> None:
-        """Write a YAML file for `plan`, as `accelstudy data-sheet` does.
+    @property
+    def state(self) -> str:
+        """Found: where no noise is known, there is no data sheet."""
+        return "found"
 
-        Parameters
-        ----------
-        path : path
-        force : bool, whether to replace a file that is there
-        """
-        with new_file(Path(path), force=force) as file:
-            self.write(file, Path(path))
+    @property
+    def verdict(self) -> str:
+        """How large the noise of a mean is, a line for each duration."""
+        means = {"a position": 1.0}
+        if self.position_sigma is None:
+            means = {f"{seconds:g} s": seconds for seconds in (1.0, 10.0, 100.0)}
+        return "\n".join(
+            f"sigma of the mean of {what}: {1e3 * self.sigma_mean(seconds):.3g} mm/s²"
+            for what, seconds in means.items()
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the known quantities in SI, with their units and sources."""
+        import pandas as pd
+
+        known = self.known_quantities
+        rows = [(getattr(self, k), QUANTITIES[k][0], self.sources.get(k, "")) for k in known]
+        index = pd.Index(known, name="quantity")
+        return pd.DataFrame(rows, index, columns=["value", "unit", "source"])
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the noise of a mean over its duration."""
+        seconds = [10 ** (exponent / 10) for exponent in range(-10, 41)]
+        ax.loglog(seconds, [1e3 * self.sigma_mean(each) for each in seconds])
+        ax.set(xlabel="duration of a hold / s", ylabel="sigma of its mean / (mm/s²)")
 
     def write(self, file: Path, place: Path) -> None:
-        """Write a file that becomes `place`."""
+        """Write a YAML file for `plan`, which becomes `place`."""
         file.write_text(self.as_yaml, encoding="utf-8")
 
-    def tell(self, place: Path) -> None:
-        """Print what `accelstudy data-sheet` does: the noise of a mean."""
-        if self.position_sigma is not None:
-            show(f"sigma of the mean of a position: {1e3 * self.position_sigma:.3g} mm/s²")
-        for duration in (1.0, 10.0, 100.0) if self.position_sigma is None else ():
-            show(
-                f"sigma of the mean of {duration:g} s: {1e3 * self.sigma_mean(duration):.3g} mm/s²"
-            )
+    def tell(self, place: Path | None) -> None:
+        """Print the noise of a mean."""
+        show(self.verdict)
         say(f"data sheet: {place}")
 
     def sigma_mean(self, seconds: float, session: float | None = None) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from accelstudy.basics.arguments import path_of
 from accelstudy.basics.progress import say, show
 from accelstudy.drawing.style import FULL, MM, STYLE
-from accelstudy.files.outputs import OutputKind, result_folder
+from accelstudy.files.outputs import OutputKind, new_file, result_folder
 from accelstudy.pages.notebook import notebook_html
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class Result(ABC):
 
     name: str
     kind: ClassVar[OutputKind]
+    """Of the folder that is written; a result that is a file has none."""
     exit_status = 0
     """Of the command; where it is not 0, there is nothing to write."""
     size = FULL, 62.0
@@ -92,7 +93,7 @@ class Result(ABC):
 
         Parameters
         ----------
-        folder : path, made if it is not there
+        folder : path, made if it is not there; that of the file, if the result is one
         force : bool, whether to overwrite files of the same names
 
         Raises
@@ -100,8 +101,9 @@ class Result(ABC):
         InputError
             If the folder has such files, or cannot be written; nothing is written then.
         """
-        place = path_of("folder", folder)
-        with result_folder(place, self.kind, force=force) as part:
+        place, kind = path_of("folder", folder), getattr(self, "kind", None)
+        opened = result_folder(place, kind, (), force) if kind else new_file(place, (), force)
+        with opened as part:
             self.write(part, place)
 
     def summary(self) -> str:

@@ -15,8 +15,7 @@ from accelstudy.verbs import kinds
 from accelstudy.verbs.kinds import Names, Quantity, angle, verb
 
 if TYPE_CHECKING:
-    from accelstudy import Advice, Campaign, Design, Plan, Simulation
-    from accelstudy.data_sheets.sheet import DataSheet
+    from accelstudy import Advice, Campaign, DataSheet, Design, Plan, Simulation
 
 Hold = Annotated[Quantity, QUANTITIES["hold"]]
 Sigma = Annotated[Quantity, QUANTITIES["sigma"]]

@@ -172,6 +172,8 @@ class HoldColumns:
         self._computed: dict[str | float, Array] = {}
 
     def __getattr__(self, name: str) -> Array:
+        if name.startswith("_"):  # asked for by what makes a copy, before that has its columns
+            raise AttributeError(name)
         if name not in self._computed:
             values = self._hold.column(name)
             self._computed[name] = values.reshape(len(values), *[1] * self._axes)
