@@ -78,7 +78,6 @@ class Command(click.Command):
     out : str, help of --out
     optional : bool, whether nothing is written without --out
     tell : function that prints what the verb returns, if that does not tell itself
-    more : str, what its help says of `options` and of files, beside the docstring
     options : further options, which come after that of --out
     sections : mapping of a title of the help to names of options, in the order of the help
     """
@@ -94,7 +93,6 @@ class Command(click.Command):
         out: str = "Folder to write to.",
         optional: bool = False,
         tell: Callable[[Any], None] = tell_value,
-        more: str = "",
         options: Iterable[click.Option] = (),
         sections: Mapping[str, str] | None = None,
     ) -> None:
@@ -106,7 +104,7 @@ class Command(click.Command):
         super().__init__(
             name or str(verb.__name__).replace("_", "-"),
             callback=self._act,
-            help="\n\n".join(filter(None, [self._spelled(kinds.summary(verb)), more])),
+            help=self._spelled(kinds.summary(verb)),
             epilog="\n".join(["\b", "Example:", *(f"  {line}" for line in kinds.examples(verb))]),
         )
         del self.params  # the list of all commands does without them

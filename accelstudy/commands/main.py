@@ -81,8 +81,6 @@ SECTIONS = {
             "import",
             make="accelstudy.campaign.imported:Imported.of",
             writes=outputs.CAMPAIGN,
-            out="Folder of the campaign.",
-            more="segmentation.png in the folder shows the holds with their numbers.",
             options=[
                 click.Option(
                     ["--figure/--no-figure"], default=True, help="Draw the log with its holds."
@@ -103,7 +101,6 @@ SECTIONS = {
             campaigns.public,
             make="accelstudy.campaign.imported:Imported.of_public",
             writes=outputs.CAMPAIGN,
-            out="Folder of the campaign.",
             optional=True,
             tell=listings.tell_public,
         ),
@@ -111,8 +108,6 @@ SECTIONS = {
             campaigns.simulate_campaign,
             run=simulate_campaign,
             writes=outputs.CAMPAIGN,
-            out="Folder of the campaign.",
-            more="The truth goes to --truth and nowhere else.",
             options=[click.Option(["--truth"], type=PATH, help="YAML file for the truth.")],
             sections={
                 "What is written": "out truth name seed",
@@ -141,7 +136,6 @@ SECTIONS = {
         Command(
             planning.plan,
             writes=outputs.PLAN,
-            out="Folder for the table, the figure and a study.",
             optional=True,
             sections={
                 "What is asked": "tilt_accuracy tilt_range sensor sigma history equipment "

@@ -102,6 +102,8 @@ def find_holds(
     robot: it tells roll and pitch of each hold. Its times are of the same clock as those of the
     log.
 
+    The command draws segmentation.png, which shows the holds with their numbers.
+
     Parameters
     ----------
     log : Log or path or DataFrame, or several paths
@@ -269,7 +271,8 @@ def simulate_campaign(
     """Simulate a campaign with effects of your choice.
 
     It can have noise effects and gross errors, too; `accelstudy effects` lists them. What is not
-    given is drawn at random, from the seed.
+    given is drawn at random, from the seed. The truth is `truth` of the campaign; the command
+    writes it to --truth and nowhere else.
 
     Parameters
     ----------
