@@ -79,7 +79,7 @@ SECTIONS = {
         Command(
             campaigns.find_holds,
             "import",
-            make="accelstudy.campaign.imported:Imported.of",
+            make="accelstudy.campaign.log_import:LogImport.of",
             writes=outputs.CAMPAIGN,
             options=[
                 click.Option(
@@ -99,7 +99,7 @@ SECTIONS = {
         ),
         Command(
             campaigns.public,
-            make="accelstudy.campaign.imported:Imported.of_public",
+            make="accelstudy.campaign.log_import:LogImport.of_public",
             writes=outputs.CAMPAIGN,
             optional=True,
             tell=listings.tell_public,

@@ -162,9 +162,9 @@ def find_holds(
             calibrated/calibration.json
     """
     given = {**locals()}
-    from accelstudy.campaign.imported import Imported
+    from accelstudy.campaign.log_import import LogImport
 
-    return Imported.of(**given).campaign
+    return LogImport.of(**given).campaign
 
 
 @verb
@@ -192,10 +192,10 @@ def public(
         accelstudy public
         accelstudy public xsens-mti --out xsens
     """
-    from accelstudy.campaign.imported import Imported
+    from accelstudy.campaign.log_import import LogImport
 
-    found = Imported.of_public(name, Path(folder))
-    return found.campaign if isinstance(found, Imported) else found
+    found = LogImport.of_public(name, Path(folder))
+    return found.campaign if isinstance(found, LogImport) else found
 
 
 @verb

@@ -212,7 +212,7 @@ TypeFile = Annotated[
     PATH,
     "The type.yaml of a lot: how its sensors scatter, as what is known of this one.",
 ]
-GivenCampaign = Annotated[
+CampaignOrPath = Annotated[
     "Campaign | str | PathLike[str]", Kind(lambda name, value: value, "path", files=True)
 ]
 Force = Annotated[bool, FLAG, "Overwrite files of the same names, but never an input."]

@@ -334,7 +334,7 @@ def data_sheet(
     """
     given = {**locals()}
     from accelstudy.basics.progress import stage
-    from accelstudy.campaign.imported import settings_of
+    from accelstudy.campaign.log_import import settings_of
     from accelstudy.data_sheets.measured import sheet_of_campaign, sheet_of_log
 
     path = path_of("source", given.pop("source"))

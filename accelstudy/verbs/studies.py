@@ -38,7 +38,7 @@ def models() -> pd.DataFrame:
 @verb
 def list_effects(
     *,
-    campaign: kinds.GivenCampaign | None = None,
+    campaign: kinds.CampaignOrPath | None = None,
     scheme: kinds.SchemeName | None = None,
     model: kinds.ModelName = "bias-scale-nonorthogonality",
     approach: kinds.UsualApproach = None,

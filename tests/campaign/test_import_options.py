@@ -11,11 +11,11 @@ import accelstudy as acs
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.format import read_campaign
 from accelstudy.campaign.header import LogLayout
-from accelstudy.campaign.imported import files_of
 from accelstudy.campaign.importing import segmentation_figure
 from accelstudy.campaign.importing.logs import import_log, write_imported
 from accelstudy.campaign.importing.public import import_settings, public_file
 from accelstudy.campaign.importing.settings import parse_settings
+from accelstudy.campaign.log_import import files_of
 from accelstudy.leveling.angles import specific_force
 from accelstudy.sensors.frames import parse_frame
 

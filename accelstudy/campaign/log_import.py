@@ -1,4 +1,4 @@
-"""Campaigns that are found in logs, or simulated, for the public functions."""
+"""Campaigns that are made of logs and of public data, for the public functions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OTHERS = ("reference_log", "reference", "reference_columns", "reference_offset",
 
 
 @dataclass(frozen=True)
-class Imported:
+class LogImport:
     """A campaign, and the holds that it was made of, which a figure shows.
 
     Attributes
@@ -47,7 +47,7 @@ class Imported:
     figure: bool = True
 
     @classmethod
-    def of(cls, log: Any, figure: bool = True, **given: Any) -> Imported:
+    def of(cls, log: Any, figure: bool = True, **given: Any) -> LogImport:
         """Import a log by the keywords of `find_holds`, checked."""
         settings = settings_of(given)
         reference = _reference(given)
@@ -60,7 +60,7 @@ class Imported:
         return cls(*import_log(files, settings, reference), figure)
 
     @classmethod
-    def of_public(cls, name: str | None, folder: Path) -> Imported | pd.DataFrame:
+    def of_public(cls, name: str | None, folder: Path) -> LogImport | pd.DataFrame:
         """Import public data, or list what there is."""
         if name is not None:
             settings = import_settings(name)
