@@ -57,7 +57,7 @@ def run(speeds):
 
 def _plain(cell):
     """Statistics without linear theory."""
-    return statistics(cell, Replicates.plain(simulate(cell, 1).simulated))
+    return statistics(cell, map(Replicates.without_theory, simulate(cell, 1)))
 
 
 def _needed(found, count):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -223,14 +221,3 @@ class Block:
             converged=result.converged,
             correlation_sum=(q / (sigma[:, :, None] * sigma[:, None, :])).sum(axis=0),
         )
-
-    @classmethod
-    def concatenate(cls, parts: Iterable[Block]) -> Block:
-        """Join blocks that follow each other."""
-        parts = list(parts)
-        whole: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in ("estimates", "sigma_priori", "omega", "iterations", "converged")
-        }
-        correlation_sum = np.sum([part.correlation_sum for part in parts], axis=0)
-        return replace(parts[0], **whole, correlation_sum=correlation_sum)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -81,6 +81,16 @@ class Observations:
             angles=None if angles is None else angles[chosen],
             gravity=gravity[chosen] if gravity.ndim else gravity,
         )
+
+    @staticmethod
+    def concatenate(parts: Sequence[Observations]) -> Observations:
+        """Join sessions of one set-up, each with its gravity."""
+
+        def joined(name: str) -> Array:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        angles = None if parts[0].angles is None else joined("angles")
+        return replace(parts[0], forces=joined("forces"), angles=angles, gravity=joined("gravity"))
 
     def first(self, replicates: int) -> Observations:
         """Return the first `replicates` sessions; all if there are fewer."""

@@ -102,7 +102,7 @@ def parquet_writer(
             temporary,
             schema.with_metadata(metadata),
             write_page_checksum=True,
-            compression="zstd",
+            compression="lz4",
             use_dictionary=[name for name in schema.names if name not in (*counting, *floats)],
             column_encoding=dict.fromkeys(counting, "DELTA_BINARY_PACKED"),
             use_byte_stream_split=list(measured),

@@ -57,7 +57,7 @@ def controlled_quantiles(
     """
     p, count = levels, len(own)
     wide = np.minimum(p, 1 - p) / 2
-    plain, low, high = np.quantile(own, [p, p - wide, p + wide])
+    plain, low, high = _quantiles(own, p, wide)
     slope = (high - low) / (2 * wide)
     # Too few values have no density: their error is unknown.
     variance = p * (1 - p) / count * (slope**2 if count >= MIN_REPLICATES else np.nan)
@@ -65,7 +65,7 @@ def controlled_quantiles(
         return Estimates(plain, np.sqrt(variance), np.ones(len(p)), plain)
     failed = len(theory) - count
     paired = theory[converged] if failed else theory
-    linear, low, high = np.quantile(theory, [p, p - wide, p + wide])
+    linear, low, high = _quantiles(theory, p, wide)
     some = slice(DIFFERENCE_REPLICATES)
     sd = _sd_near(own[some] - paired[some], paired[some], p, wide)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -95,6 +95,14 @@ def share_below(value: float, own: Array, quantiles: Estimates) -> float:
     """
     shift = np.interp(value, quantiles.value, quantiles.value - quantiles.plain)
     return float(np.mean(own < value - shift))
+
+
+def _quantiles(x: Array, p: Array, wide: Array) -> Array:
+    """Quantiles at p, p − wide and p + wide, (3, k); a sort is faster than `numpy.quantile`."""
+    ordered, place = np.sort(x), (len(x) - 1) * np.array([p, p - wide, p + wide])
+    below = place.astype(int)
+    low, high = ordered[below], ordered[np.minimum(below + 1, len(x) - 1)]
+    return np.asarray(low + (place - below) * (high - low))
 
 
 def _sd_near(differences: Array, theory: Array, p: Array, wide: Array) -> Array:

@@ -49,14 +49,12 @@ def simulated_tables(
     ----------
     cells : sequence of Cell
     seed : int, of the study
-    keep : function that gets each cell that is estimable with its replicates
+    keep : function that gets each cell with its replicates as they are simulated
     """
 
     def results() -> Iterator[CellStatistics]:
         for number, cell in enumerate(cells, 1):
-            found = simulated_statistics(cell, seed)
-            if found.replicates is not None:
-                keep(cell, found.replicates)
+            found = simulated_statistics(cell, seed, keep=keep)
             failed = found.simulated - found.converged
             said = f"{found.simulated} replicates, {failed} not converged"
             said = cell.estimability.reason or said
@@ -235,8 +233,7 @@ def _closed_forms(cell: Cell) -> dict[str, float]:
 
 def _correlations(statistics: CellStatistics) -> dict[str, Any]:
     """Mean correlation from Σ_xx beside the empirical one over the calibrations."""
-    simulated = None if statistics.replicates is None else statistics.replicates.simulated
-    names = [] if simulated is None else [*statistics.cell.parameter_units]
+    names = [] if statistics.correlation is None else [*statistics.cell.parameter_units]
     u, empirical = len(names), statistics["correlation"]
     i, j = np.tril_indices(u, -1)
     one = 1.0 if np.isfinite(empirical.plain).any() else np.nan
@@ -250,9 +247,7 @@ def _correlations(statistics: CellStatistics) -> dict[str, Any]:
         "cell": statistics.cell.name,
         "parameter_1": np.repeat(np.array(names, str), u),
         "parameter_2": np.tile(np.array(names, str), u),
-        "adjustment": []
-        if simulated is None
-        else simulated.correlation_sum.ravel() / (statistics.converged or np.nan),
+        "adjustment": [] if statistics.correlation is None else statistics.correlation.ravel(),
         "empirical": whole(np.clip(empirical.value, -1, 1), one),
         "empirical_se": whole(empirical.error, 0.0 * one),
         "empirical_gain": whole(empirical.gain, np.nan),
@@ -269,7 +264,7 @@ def _leveling(statistics: CellStatistics) -> dict[str, Any]:
     for name in TILTS:
         bound = statistics.quantile(TILT, name, 0.95).scaled(1 / MGON)
         columns |= _columns(f"{name}_rms_q95_mgon", bound, f"{name}_rms_q95", plain=True)
-    rows = 0 if statistics.replicates is None else 1
+    rows = 0 if statistics.correlation is None else 1
     return {**columns, "n_converged": np.full(rows, statistics.converged)}
 
 

@@ -37,13 +37,14 @@ def make_cells(*grids, **keys):
 
 
 def simulated(cell, seed=1):
-    """All replicates of a cell."""
-    return simulate(cell, seed).simulated
+    """The replicates of a cell that has at most 10 000."""
+    (part,) = simulate(cell, seed)
+    return part.simulated
 
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, Replicates.plain(simulated(cell, seed)))
+    return statistics(cell, map(Replicates.without_theory, simulate(cell, seed)))
 
 
 def simulate_cells(folder, cells, seed=1):

@@ -8,7 +8,7 @@ from scipy import stats
 from study_helpers import grid, make_cells, plain, run_study
 from usual import STANDARD_ERRORS
 
-from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, controlled
+from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, Sample, controlled
 from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles, share_below
 from accelstudy.study.statistics import TILT, simulated_statistics
 
@@ -46,6 +46,11 @@ def numbers(kind, x):
     return kinds.get(kind, x)
 
 
+def estimated(statistic, x, y, known, *converged):
+    """The estimate of numbers (R, k) of calibrations and of linear theory."""
+    return controlled(statistic, Sample.of(x.T), Sample.of(y.T), np.asarray(known), *converged)
+
+
 def samples(n, apart, kind, seeds=OFTEN):
     """Estimates of x = y + apart · ε for many samples: (values, errors, gains)."""
     statistic, known = KNOWN[kind]
@@ -54,7 +59,7 @@ def samples(n, apart, kind, seeds=OFTEN):
         rng = np.random.default_rng(seed)
         y = rng.standard_normal((n, 3)) @ ROOT.T * SIGMA
         x = y + apart * SIGMA * rng.standard_normal((n, 3))
-        found.append(controlled(statistic, numbers(kind, x), numbers(kind, y), known))
+        found.append(estimated(statistic, numbers(kind, x), numbers(kind, y), known))
     return (
         np.array([getattr(each, name) for each in found]) for name in ("value", "error", "gain")
     )
@@ -87,11 +92,20 @@ def test_every_statistic_is_as_far_off_as_it_states(kind, n, apart):
         assert np.median(gains) > 0.1 / apart**2
 
 
+def test_samples_that_follow_each_other_add_up():
+    x = 1e6 + np.random.default_rng(1).standard_normal((3, 1000))
+    whole, together = Sample.of(x), Sample.of(x[:, :300]) + Sample.of(x[:, 300:])
+    assert together.count == 1000
+    np.testing.assert_allclose(together.mean, whole.mean, rtol=1e-14)
+    np.testing.assert_allclose(together.products, whole.products, atol=1e-6)
+    np.testing.assert_allclose(together.sd, x.std(axis=1, ddof=1), rtol=1e-9)
+
+
 def test_a_mean_is_that_of_the_regression_on_linear_theory():
     rng = np.random.default_rng(2)
     y = rng.standard_normal((400, 1))
     x = 0.8 * y + 0.1 * rng.standard_normal((400, 1)) + 0.3
-    found = controlled(MEAN, x, y, np.zeros(1))
+    found = estimated(MEAN, x, y, np.zeros(1))
     slope = np.cov(x[:, 0], y[:, 0])[0, 1] / y.var(ddof=1)
     assert found.value[0] == pytest.approx((x - slope * y).mean(), rel=1e-9)
     assert found.error[0] == pytest.approx((x - slope * y).std(ddof=1) / 20, rel=0.01)
@@ -102,11 +116,11 @@ def test_what_linear_theory_does_not_know_stays_plain():
     rng = np.random.default_rng(3)
     x = 1 + 0.1 * rng.standard_normal((50, 2))
     for theory, known in ((x, [np.nan, np.nan]), (np.ones((50, 2)), [1.0, 1.0])):
-        found = controlled(MEAN, x, theory, np.array(known))
+        found = estimated(MEAN, x, theory, known)
         assert (found.gain == 1).all()
         np.testing.assert_allclose(found.value, x.mean(axis=0))
         np.testing.assert_allclose(found.error, x.std(axis=0, ddof=1) / np.sqrt(50))
-    assert (controlled(MEAN, x[:19], x[:19], np.ones(2)).gain == 1).all()
+    assert (estimated(MEAN, x[:19], x[:19], np.ones(2)).gain == 1).all()
 
 
 @pytest.mark.parametrize("statistic", [MEAN, SD])
@@ -120,7 +134,7 @@ def test_failures_that_hang_on_the_noise_are_no_bias(statistic):
         y = rng.standard_normal((500, 1))
         converged = y[:, 0] < 1.5
         x = y[converged] + 0.01 * rng.standard_normal((converged.sum(), 1))
-        found = controlled(statistic, x, y, np.array([known]), converged)
+        found = estimated(statistic, x, y, [known], converged)
         values.append(found.value[0])
         errors.append(found.error[0])
         assert found.gain[0] > 0.95

@@ -144,11 +144,11 @@ def files(folder):
 def test_nothing_is_left_of_an_interrupted_job(monkeypatch, tmp_path):
     calls = []
 
-    def broken(cell, *which):
+    def broken(cell, *which, **more):
         calls.append(cell.name)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return simulated_statistics(cell, *which)
+        return simulated_statistics(cell, *which, **more)
 
     monkeypatch.setattr(module, "simulated_statistics", broken)
     with pytest.raises(KeyboardInterrupt):
@@ -202,4 +202,4 @@ def test_sigmas_that_no_weights_span_are_said():
 
 def test_a_job_asks_for_the_memory_of_its_largest_cell():
     cells = make_cells(grid(replicates=20_000), grid(schemes="rings-24", replicates=10)).values()
-    assert memory([*cells]) == 1000 + round(120e-6 * 20_000 * 9)
+    assert memory([*cells]) == 1000 + round(60e-6 * 20_000 * 9)
