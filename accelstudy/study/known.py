@@ -96,15 +96,6 @@ class KnownValues:
             "tilt": (self.tilts.quantile(levels), self.tilts.relative_error(levels)),
         }
 
-    def effect_ratio_quantiles(self, other: KnownValues, effect: str, levels: Array) -> Array:
-        """Quantiles of the sigma of an effect over that of another, independent cell, (k,)."""
-        pair = (self, other)
-        if not all(each._determines_factor and each.theory.misfit <= CENTRAL for each in pair):
-            return np.full(len(levels), np.nan)
-        sigma, other_sigma = (e.theory.sigma[e.cell.columns_of(effect)].mean() for e in pair)
-        freedom = self.theory.redundancy, other.theory.redundancy
-        return np.asarray(sigma / other_sigma * np.sqrt(scipy.special.fdtri(*freedom, levels)))
-
     @property
     def _determines_factor(self) -> bool:
         """Whether the distribution of σ̂0² is known."""

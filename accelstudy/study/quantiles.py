@@ -84,19 +84,6 @@ def controlled_quantiles(
         return Estimates(value, np.sqrt(left), variance / left, plain)
 
 
-def share_below(value: float, own: Array, quantiles: Estimates) -> float:
-    """Share of the replicates that is below a value, corrected like the quantiles next to it.
-
-    Parameters
-    ----------
-    value : float
-    own : (c,) array, the number in each replicate
-    quantiles : Estimates of its quantiles, in order
-    """
-    shift = np.interp(value, quantiles.value, quantiles.value - quantiles.plain)
-    return float(np.mean(own < value - shift))
-
-
 def _quantiles(x: Array, p: Array, wide: Array) -> Array:
     """Quantiles at p, p − wide and p + wide, (3, k); a sort is faster than `numpy.quantile`."""
     ordered, place = np.sort(x), (len(x) - 1) * np.array([p, p - wide, p + wide])

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from accelstudy.study.cell import Cell
 from accelstudy.study.claims.quantities import ClaimData
 from accelstudy.study.claims.verdicts import judge
 from accelstudy.study.config import Study, read_study
-from accelstudy.study.replicates import Replicates, estimates_table
 from accelstudy.study.sensitivity import sensitivity_table, shapley_table
 from accelstudy.study.tables import simulated_tables
 
@@ -40,18 +38,11 @@ def run_study(*configurations: str | Path) -> dict[str, pd.DataFrame]:
 
 def study_tables(study: Study) -> dict[str, pd.DataFrame]:
     """Run a checked study in memory; see `run_study`."""
-    estimates: list[pd.DataFrame] = []
-
-    def keep(cell: Cell, replicates: Replicates) -> None:
-        settings = study.sensitivity
-        if study.paper and settings and cell.name == settings.cell(cell.approach, cell.scheme):
-            estimates.append(estimates_table(cell, replicates).to_pandas())
-
-    tables = simulated_tables(study.cells, study.seed, keep)
+    tables = simulated_tables(study.cells, study.seed)
     if study.sensitivity is not None:
         tables["sensitivity"] = sensitivity_table(study, tables["summary"])
         tables["shapley"] = shapley_table(study, tables["summary"], tables["correlations"])
     if study.paper:
-        evidence = ClaimData(study, tables, pd.concat(estimates))
-        tables |= {"claims": judge(evidence), "claims_by_scheme": evidence.by_scheme}
+        data = ClaimData(study, tables)
+        tables |= {"claims": judge(data), "claims_by_scheme": data.by_scheme}
     return tables

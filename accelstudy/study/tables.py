@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.shares import Z95, sigmas_95, wilson
 from accelstudy.basics.units import GON, MGON, recorded_unit, to_recorded
-from accelstudy.design import closed_forms
-from accelstudy.effects import get_effect
 from accelstudy.files.tables import parquet_writer, read_table, write_table
 from accelstudy.study.cell import Cell
 from accelstudy.study.estimate import UNKNOWN, Estimates
@@ -41,7 +39,7 @@ TABLES = ("cells", "summary", "correlations", "leveling", "quantiles")
 def simulated_tables(
     cells: Sequence[Cell],
     seed: int,
-    keep: Callable[[Cell, Replicates], object],
+    keep: Callable[[Cell, Replicates], object] | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Simulate cells one after the other; return each of `TABLES`.
 
@@ -144,7 +142,7 @@ def _columns(
 def _summary(statistics: CellStatistics) -> dict[str, Any]:
     """Statistics of each parameter; NaN where there are none."""
     cell, n, theory = statistics.cell, statistics.converged, statistics.cell.estimability
-    units, exact = cell.parameter_units.values(), _closed_forms(cell)
+    units = cell.parameter_units.values()
     factors = np.array([float(to_recorded(1.0, unit)) for unit in units])
     bias, sd, priori, posteriori = (
         statistics[name].scaled(factors)
@@ -166,7 +164,6 @@ def _summary(statistics: CellStatistics) -> dict[str, Any]:
         "bias_ci95_low": bias.value - half,
         "bias_ci95_high": bias.value + half,
         "sd_linear": theory.sigma * factors,
-        "sd_closed_form": [exact.get(name, np.nan) for name in cell.parameter_units] * factors,
         "first_error": first_error * factors,
         "first_sd_posteriori": first_sigma * factors,
         "sd_ratio": ratio.value,
@@ -205,29 +202,6 @@ def coverage_columns(inside: Estimates, n: int) -> dict[str, Any]:
         **_columns("coverage_95", Estimates(value, np.where(better, error, alone), gain, plain)),
         "coverage_95_low": np.where(better, np.maximum(value - Z95 * error, 0.0), low),
         "coverage_95_high": np.where(better, np.minimum(value + Z95 * error, 1.0), high),
-    }
-
-
-def _closed_forms(cell: Cell) -> dict[str, float]:
-    """Closed form of each parameter's sd in SI; empty where none applies."""
-    directions = cell.positions.directions
-    if (
-        set(cell.effects) not in closed_forms.COVERED_EFFECTS
-        or cell.noise.sigma_gravity > 0
-        or not closed_forms.has_octahedral_moments(directions)
-    ):
-        return {}
-    sigma = closed_forms.gravity_sigma(directions, cell.noise.sigma_force, cell.gravity)
-    if cell.conditions.uses_angles:
-        if cell.noise.sigma_angle > 0:
-            return {}
-        ratio = closed_forms.perfect_robot_ratio(directions)
-        sigma = {effect: value * ratio[effect] for effect, value in sigma.items()}
-    return {
-        parameter.name: sigma[effect]
-        for effect in cell.effects
-        for parameter in get_effect(effect).parameters
-        if np.isfinite(sigma[effect])
     }
 
 

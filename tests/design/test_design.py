@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
+from closed_forms import gravity_sigma, has_octahedral_moments, perfect_robot_ratio
 from scheme_helpers import KNOWN
 from usual import BOTH, GRAVITY, NINE, PAPER, ROBOT, TWELVE
 
 from accelstudy.adjustment import calibrate
 from accelstudy.basics.units import MGON
-from accelstudy.design.closed_forms import (
-    gravity_sigma,
-    has_octahedral_moments,
-    perfect_robot_ratio,
-)
 from accelstudy.design.estimability import estimability
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import get_model

@@ -88,7 +88,7 @@ def test_a_claim_is_judged():
     pairs = [("b_x", "s_x", -0.01), ("b_x", "b_y", 0.5), ("s_x", "s_y", 0.25)]
     correlations = pd.DataFrame(pairs, columns=["parameter_1", "parameter_2", "adjustment"])
     cell = STUDY.sensitivity.cell("gravity")
-    data = ClaimData(STUDY, {"correlations": correlations.assign(cell=cell)}, None)
+    data = ClaimData(STUDY, {"correlations": correlations.assign(cell=cell)})
     claim = judge_claim(yaml.safe_load(CLAIM.replace("\n  ", "\n")), data)
     assert (claim["claim"], claim["ours"]) == ("bias-and-scale", 0.01)
     assert claim["verdict"] == "reproduced"

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from page_helpers import text_of
 from study_helpers import NINE, PROVENANCE, grid, make_study, run_study
-from usual import PAPER_TRUTH
+from usual import PAPER_TRUTH, STANDARD_ERRORS
 
 from accelstudy.basics.units import MGON
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.sensors.models import get_model
 from accelstudy.study.claims.page import claims_markdown, claims_page
-from accelstudy.study.claims.quantities import ClaimData, claim_table
+from accelstudy.study.claims.quantities import ClaimData, claim_table, single_reductions
 from accelstudy.study.claims.verdicts import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -27,6 +27,7 @@ from accelstudy.study.claims.verdicts import (
     judge_claims,
 )
 from accelstudy.study.sensitivity import shapley_table
+from accelstudy.study.tables import with_derived
 
 REPLICATES = 1000
 BASE_SAMPLES, RESAMPLES = 256, 20
@@ -66,11 +67,11 @@ def tables(folder):
 @pytest.fixture(scope="module")
 def data(tables):
     """Function that gives the data where the study, its tables or `by_scheme` are others."""
-    usual = ClaimData(make_study(**KEYS), tables, tables["estimates"])
+    usual = ClaimData(make_study(**KEYS), tables)
 
     def of(by_scheme=usual.by_scheme, noise=(), **changed):
         study = make_study(**KEYS, noise=dict(noise))
-        other = ClaimData(study, {**tables, **changed}, usual.estimates)
+        other = ClaimData(study, {**tables, **changed})
         vars(other)["by_scheme"] = by_scheme
         return other
 
@@ -154,10 +155,30 @@ def test_a_scheme_without_redundancy_has_no_reduction(tables, data):
     summary = tables["summary"].copy()
     summary.loc[summary["scheme"] == "rings-24", "sd_posteriori_mean"] = np.nan
     usual = data()
-    other = ClaimData(usual.study, {**tables, "summary": summary}, usual.estimates)
+    other = ClaimData(usual.study, {**tables, "summary": summary})
     reductions = other.by_scheme[other.by_scheme["claim"].str.startswith("reduction")]
     assert set(reductions["scheme"]) == {"mclaren-24"}
     assert "of 1 schemes" in claim_of("reduction-bias", other)["sentence"]
+
+
+def test_single_simulations_are_those_of_the_estimates(tables, data):
+    """Ratios of the sds a posteriori of pairs of calibrations, by their order statistics."""
+    estimates = with_derived(tables["estimates"])
+    chosen = estimates["parameter"].isin(["b_x", "b_y", "b_z"])
+    for scheme in ("mclaren-24", "rings-24"):
+        sds = [
+            estimates[chosen & (estimates["cell"] == f"{NINE}/{scheme}/{approach}")]
+            .groupby("replicate")["sigma_posteriori"].mean()
+            for approach in ("gravity", "robot")
+        ]  # fmt: skip
+        reduction = 100 * (1 - sds[1] / sds[0])
+        said = single_reductions(data(), "bias", scheme, 50)
+        n = len(reduction)
+        for share, value in ((0.025, "single_low"), (0.5, "median"), (0.975, "single_high")):
+            below = np.mean(reduction < said[value])
+            assert abs(below - share) < STANDARD_ERRORS * np.sqrt(share * (1 - share) / n)
+        below = np.mean(reduction < 50)
+        assert abs(said["percentile"] / 100 - below) < STANDARD_ERRORS * 0.5 / np.sqrt(n)
 
 
 # --- for people ----------------------------------------------------------------------------------
@@ -178,16 +199,18 @@ def test_every_claim_is_on_the_page_and_in_the_markdown(judged, data):
 
 
 def test_claims_as_the_workflow_judges_them(tables, folder, judged, data, tmp_path):
-    """From files to files, with estimates of other cells in them."""
+    """From files to files."""
     outputs = {
         "claims": tmp_path / "claims.parquet",
         "by_scheme": tmp_path / "by_scheme.parquet",
         "html": tmp_path / "claims.html",
     }
     judge_claims(
-        make_study(**KEYS), sorted(folder.rglob("estimates.parquet")),
-        {name: folder / f"{name}.parquet" for name in TABLES}, outputs, PROVENANCE,
-    )  # fmt: skip
+        make_study(**KEYS),
+        {name: folder / f"{name}.parquet" for name in TABLES},
+        outputs,
+        PROVENANCE,
+    )
     claims = read_table(outputs["claims"])
     pd.testing.assert_frame_equal(claims.set_index("claim"), judged, check_dtype=False)
     assert len(read_table(outputs["by_scheme"])) == len(data().by_scheme)

@@ -5,11 +5,15 @@ Limits of single statistics are 4.5 standard errors.
 
 import numpy as np
 import pytest
+from closed_forms import gravity_sigma, perfect_robot_ratio
 from scipy.special import gammaln
 from scipy.stats import binom
 from study_helpers import NINE, grid, run_study
 from usual import STANDARD_ERRORS
 
+from accelstudy.basics.units import MGON
+from accelstudy.effects import get_effect
+from accelstudy.schemes import get_scheme
 from accelstudy.study.estimate import Estimates
 from accelstudy.study.tables import coverage_columns
 
@@ -49,14 +53,25 @@ def mean_of_chi(r):
 
 
 def test_sds_are_those_of_the_closed_forms(summary):
-    known = summary[summary["sd_closed_form"].notna()]
-    # Gravity in all octahedral schemes, and the perfect robot.
-    assert known["cell"].nunique() >= 8
-    assert f"{MCLAREN}/robot/robot_sigma_mgon=0" in set(known["cell"])
-    deviation = known["sd_empirical"] / known["sd_closed_form"] - 1
-    assert deviation.abs().max() < STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
-    # The true parameters, up to 0.5 % of g, are all that linear theory has in addition.
-    np.testing.assert_allclose(known["sd_linear"], known["sd_closed_form"], rtol=0.01)
+    """Of gravity in octahedral schemes, and of the perfect robot."""
+    limit = STANDARD_ERRORS / np.sqrt(2 * (REPLICATES - 1))
+    for scheme in SCHEMES[:4]:
+        directions = get_scheme(scheme).directions
+        sigma = gravity_sigma(directions, 0.002)
+        factors = {"": sigma}
+        if scheme == "mclaren-24":
+            ratio = perfect_robot_ratio(directions)
+            factors["robot_sigma_mgon=0"] = {name: sigma[name] * ratio[name] for name in sigma}
+        for more, expected in factors.items():
+            approach = f"robot/{more}" if more else "gravity"
+            rows = of(summary, f"{NINE}/{scheme}/{approach}")
+            units = {"bias": 1e3, "scale": 1e6, "nonorthogonality": 1 / MGON}
+            for effect, unit in units.items():
+                names = [parameter.name for parameter in get_effect(effect).parameters]
+                sds = rows.loc[names, ["sd_empirical", "sd_linear"]]
+                assert (sds["sd_empirical"] / (expected[effect] * unit) - 1).abs().max() < limit
+                # The true parameters, up to 0.5 % of g, are all that linear theory adds.
+                np.testing.assert_allclose(sds["sd_linear"], expected[effect] * unit, rtol=0.01)
 
 
 def test_sds_are_those_of_linear_theory(summary):
@@ -158,8 +173,7 @@ def test_a_cell_that_is_not_estimable_is_reported_with_the_reason(study):
     rows = of(study["summary"], name)
     assert [*rows.index[~rows["estimable"]]] == ["alpha_yz", "alpha_zy", "alpha_zx"]
     assert set(rows["reason"]) == {cell["reason"]}
-    numbers = rows.filter(regex="^(bias|sd|coverage)")
-    assert numbers.drop(columns="sd_closed_form").isna().all().all()
+    assert rows.filter(regex="^(bias|sd|coverage)").isna().all().all()
     for table in ("leveling", "correlations", "estimates"):
         assert name not in set(study[table]["cell"])
 

@@ -32,7 +32,6 @@ rule sensitivity:
 
 rule claims:
     input:
-        estimates=expand(f"{RESULTS}/estimates/{{set_up}}.parquet", set_up=JUDGED),
         cells=f"{RESULTS}/cells.parquet",
         summary=f"{RESULTS}/summary.parquet",
         correlations=f"{RESULTS}/correlations.parquet",

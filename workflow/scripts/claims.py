@@ -1,4 +1,4 @@
-from accelstudy.jobs import job, lists
+from accelstudy.jobs import job
 from accelstudy.study.claims.verdicts import TABLES, judge_claims
 from accelstudy.study.config import Study
 
@@ -6,7 +6,6 @@ with job(snakemake) as provenance:
     study = Study.model_validate(snakemake.config)
     judge_claims(
         study,
-        lists(snakemake.input)["estimates"],
         {name: snakemake.input[name] for name in TABLES},
         dict(snakemake.output.items()),
         provenance,

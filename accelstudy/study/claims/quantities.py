@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 import yaml
 from numpy.typing import NDArray
+from scipy import special
 
 from accelstudy.basics.shares import Z95
 from accelstudy.basics.units import GON, MGON
@@ -23,10 +24,7 @@ from accelstudy.effects import get_effect
 from accelstudy.leveling.angles import angles_of, specific_force
 from accelstudy.leveling.sensitivity import leveling_sensitivity
 from accelstudy.leveling.shares import order_changes
-from accelstudy.study.cell import Cell
 from accelstudy.study.config import APPROACHES, SensitivityConfig, Study
-from accelstudy.study.known import KnownValues
-from accelstudy.study.quantiles import controlled_quantiles, share_below
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]
@@ -34,11 +32,6 @@ Numbers = dict[str, Any]
 DRAWS = 200_000
 TILT = 50.0
 """Largest roll and pitch, in gon, of the attitudes over which shares are judged."""
-ESTIMATED = ["cell", "converged", "sigma_priori", "omega", "linear_omega", "redundancy"]
-"""Columns of the estimates that are used."""
-LEVELS = np.array([0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975])
-"""Probabilities of quantiles of single simulations: the first and the last are the ends of the
-central 95 %, and the median is in the middle."""
 
 
 @cache
@@ -56,12 +49,10 @@ class ClaimData:
     ----------
     study : Study, with `sensitivity`
     tables : mapping of name to DataFrame: cells, summary, correlations, sensitivity and shapley
-    estimates : DataFrame, the estimates of the cells that the claims use, at least `ESTIMATED`
     """
 
     study: Study
     tables: Mapping[str, pd.DataFrame]
-    estimates: pd.DataFrame
 
     @property
     def settings(self) -> SensitivityConfig:
@@ -81,26 +72,6 @@ class ClaimData:
         """Rows of a table that are of one cell."""
         rows = self.tables[table]
         return rows[rows["cell"] == self.settings.cell(approach, scheme)]
-
-    @cached_property
-    def sigmas(self) -> dict[str, tuple[Cell, Array]]:
-        """Cells by their names, each with sigmas a posteriori of its calibrations that converged.
-
-        They are (2, c, u) arrays, of the calibrations and by linear theory of the same noise.
-        """
-        cells, sigmas = {cell.name: cell for cell in self.study.cells}, {}
-        converged = self.estimates[self.estimates["converged"]]
-        for name, rows in converged.groupby("cell", observed=True):
-            cell = cells[str(name)]
-            omega, linear, priori = (
-                rows[column].to_numpy().reshape(-1, cell.n_unknowns)
-                for column in ("omega", "linear_omega", "sigma_priori")
-            )
-            theory, freedom = cell.linear_theory, rows["redundancy"].iloc[0] or np.nan
-            by_theory = np.nan if theory is None else theory.sigma
-            both = np.sqrt(omega / freedom) * priori, np.sqrt(linear / freedom) * by_theory
-            sigmas[cell.name] = cell, np.stack(both)
-        return sigmas
 
     @cached_property
     def by_scheme(self) -> pd.DataFrame:
@@ -259,17 +230,22 @@ def reduction(data: ClaimData, effect: str) -> Numbers:
 
 
 def single_reductions(data: ClaimData, effect: str, scheme: str, paper: float) -> Numbers:
-    """Reductions, %, of the sd of an effect in single simulations, which are paired by number."""
-    pair = [data.sigmas[data.settings.cell(each, scheme)] for each in APPROACHES]
-    gravity, robot = (sigmas[..., cell.columns_of(effect)].mean(axis=2) for cell, sigmas in pair)
-    n = min(gravity.shape[1], robot.shape[1])
-    ratio, linear = robot[:, :n] / gravity[:, :n]
-    below, above = (KnownValues.of(cell) for cell, _ in pair)
-    known = above.effect_ratio_quantiles(below, effect, LEVELS) if above and below else None
-    quantiles = controlled_quantiles(LEVELS, ratio, linear, known)
-    share = share_below(1 - paper / 100, ratio, quantiles)
-    ends = _ends(100 * (1 - quantiles.value[[-1, len(LEVELS) // 2, 0]]))
-    return {**ends, "percentile": float(100 * (1 - share))}
+    """Reductions, %, of the sd of an effect in single simulations.
+
+    The sd a posteriori of one calibration is its mean times σ̂0 over the mean of σ̂0, and the ratio
+    of two independent σ̂0² of r degrees of freedom each has the F distribution.
+    """
+    freedom, sds = [], []
+    for approach in APPROACHES:
+        r = float(data.rows("cells", approach, scheme)["redundancy"].iloc[0])
+        mean = np.exp(special.gammaln((r + 1) / 2) - special.gammaln(r / 2)) * np.sqrt(2 / r)
+        freedom.append(r)
+        sds.append(mean_sd(data, effect, approach, scheme)["sd"].mean() / mean)
+    below, above = freedom
+    ratio = sds[1] / sds[0]
+    ends = 100 * (1 - ratio * np.sqrt(special.fdtri(above, below, [0.975, 0.5, 0.025])))
+    percentile = 100 * special.fdtrc(above, below, ((1 - paper / 100) / ratio) ** 2)
+    return {**_ends(ends), "percentile": float(percentile)}
 
 
 def _ends(values: Iterable[float]) -> Numbers:

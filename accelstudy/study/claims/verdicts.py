@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +14,18 @@ from accelstudy.files.outputs import whole_file
 from accelstudy.files.tables import read_table, write_table
 from accelstudy.study.claims import quantities
 from accelstudy.study.claims.page import claims_page
-from accelstudy.study.claims.quantities import ESTIMATED, ClaimData, Numbers, claim_table
+from accelstudy.study.claims.quantities import ClaimData, Numbers, claim_table
 from accelstudy.study.config import Study
 
 REPRODUCED, NOT_REPRODUCED, SLIP = "reproduced", "not reproduced", "slip in the paper"
 
 TABLES = ("cells", "summary", "correlations", "sensitivity", "shapley")
-"""What the claims are judged by, beside estimates."""
+"""What the claims are judged by."""
 SINGLE = ("single_low", "single_high", "percentile")
 
 
 def judge_claims(
     study: Study,
-    estimates: Sequence[str | Path],
     tables: Mapping[str, str | Path],
     outputs: Mapping[str, str],
     provenance: Mapping[str, Any],
@@ -36,13 +35,11 @@ def judge_claims(
     Parameters
     ----------
     study : Study, with `sensitivity`
-    estimates : files with the estimates of the cells that the claims use
     tables : paths of the tables of `TABLES`, by their names
     outputs : paths of `claims`, `by_scheme` and `html`
     provenance : see `accelstudy.files.tables.origin`
     """
-    read = {name: read_table(tables[name]) for name in TABLES}
-    data = ClaimData(study, read, read_table(estimates, ESTIMATED))
+    data = ClaimData(study, {name: read_table(tables[name]) for name in TABLES})
     claims = judge(data)
     write_table(outputs["claims"], claims, provenance)
     write_table(outputs["by_scheme"], data.by_scheme, provenance)

@@ -26,7 +26,7 @@ from accelstudy.study.statistics import TILTS
 
 ENDS = {"low": 0.025, "q95": 0.95, "high": 0.975}
 """Probabilities at the ends of the central 95 %, and of what 95 % stay below."""
-IN_UNITS = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear", "sd_closed_form")
+IN_UNITS = ("truth", "bias", "sd_empirical", "sd_posteriori_mean", "sd_linear")
 SHARES = ("sd_ratio", "coverage_95")
 """Columns of the summary in the unit of a parameter, and without one. The ends of an interval have
 the name of the number and `_low` and `_high`."""

@@ -40,7 +40,6 @@ QUANTITIES = {
     "sd_empirical": "empirical sd",
     "sd_posteriori_mean": "sd a posteriori (central 95 %)",
     "sd_linear": "linear theory",
-    "sd_closed_form": "closed form",
     "sd_ratio": "ratio of the sds (95 % interval)",
     "coverage_95": "coverage (95 % interval)",
 }

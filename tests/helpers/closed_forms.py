@@ -1,4 +1,4 @@
-"""Closed forms of linear theory, with which the Monte Carlo is compared.
+"""Closed forms of linear theory, with which the adjustment and the Monte Carlo are compared.
 
 They are valid for the models of bias, scale and non-orthogonality in schemes with octahedral
 moments: over the n directions ⟨x⟩ = ⟨xy⟩ = 0 and all third moments vanish, ⟨x⁴⟩ is the same for
@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from accelstudy.basics.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
-
-COVERED_EFFECTS = ({"bias", "scale"}, {"bias", "scale", "nonorthogonality"})
-"""Compositions of effects to which the closed forms apply."""
 
 
 def has_octahedral_moments(directions: Array) -> bool:
