@@ -21,7 +21,7 @@ import pandas as pd
 
 from accelstudy.study.cell import Cell
 from accelstudy.study.config import read_study
-from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import statistics
 from accelstudy.study.tables import tables_of
 
@@ -56,7 +56,7 @@ def estimates(
     """All estimates of a cell with their standard errors, as a study tabulates them."""
     cell = replace(cell, replicates=replicates, compiled=compiled)
     made = simulate(cell, seed)
-    made = map(Replicates.without_theory, made) if plain else made
+    made = (part._replace(linear=None) for part in made) if plain else made
     tables = tables_of([statistics(cell, made)])
     return pd.concat(_rows(tables), ignore_index=True).assign(cell=cell.name)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from accelstudy.study.config import read_study
 from accelstudy.study.estimate import MIN_REPLICATES
-from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import TILT, simulated_statistics, statistics
 from problem import APPROACHES, SCHEME
 from timing import short, table
@@ -57,7 +57,7 @@ def run(speeds):
 
 def _plain(cell):
     """Statistics without linear theory."""
-    return statistics(cell, map(Replicates.without_theory, simulate(cell, 1)))
+    return statistics(cell, (part._replace(linear=None) for part in simulate(cell, 1)))
 
 
 def _needed(found, count):

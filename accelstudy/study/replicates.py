@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
@@ -56,32 +56,13 @@ class Replicates(NamedTuple):
     ----------
     first : int, number of the first one
     simulated : Block, the calibrations
-    linear : Block, those of linear theory of the same noise; NaN if there is no linear theory, as
+    linear : Block, those of linear theory of the same noise; None if there is no linear theory, as
         the session without noise has no calibration
     """
 
     first: int
     simulated: Block
-    linear: Block
-
-    @classmethod
-    def of(cls, first: int, simulated: Block, sigma: Array, linear: Array) -> Replicates:
-        """Put beside calibrations the sigmas (u,), and estimates and Ω (R, u + 1), of theory."""
-        beside = replace(
-            simulated,
-            estimates=linear[:, :-1],
-            sigma_priori=np.broadcast_to(sigma, simulated.estimates.shape),
-            omega=linear[:, -1],
-            converged=np.ones(len(linear), bool),
-        )
-        return cls(first, simulated, beside)
-
-    def without_theory(self) -> Replicates:
-        """Return the same calibrations without linear theory."""
-        count, u = self.simulated.estimates.shape
-        return self.of(
-            self.first, self.simulated, np.full(u, np.nan), np.full((count, u + 1), np.nan)
-        )
+    linear: Block | None
 
 
 def simulate(cell: Cell, seed: int) -> Iterator[Replicates]:
@@ -93,7 +74,6 @@ def simulate(cell: Cell, seed: int) -> Iterator[Replicates]:
     seed : int, of the study
     """
     calibrate, theory = calibrator(cell), cell.linear_theory
-    sigma = np.full(cell.n_unknowns, np.nan) if theory is None else theory.sigma
     drawn = cell.ideal.draw_blocks(
         cell.noise,
         cell.replicates,
@@ -103,30 +83,43 @@ def simulate(cell: Cell, seed: int) -> Iterator[Replicates]:
         angles=cell.conditions.uses_angles,
     )
     for first in range(0, cell.replicates, CHUNK):
-        observed, linear = [], []
-        for errors, block in islice(drawn, CHUNK // BLOCK):
-            observed.append(block)
-            linear.append(_by_theory(cell, theory, errors))
+        errors, observed = zip(*islice(drawn, CHUNK // BLOCK), strict=True)
         together = Observations.concatenate(observed)
         simulated = calibrate(cell.estimated_model, cell.conditions, together)
-        yield Replicates.of(first, simulated, sigma, np.concatenate(linear))
+        linear = None if theory is None else _by_theory(theory, cell, errors, simulated)
+        yield Replicates(first, simulated, linear)
 
 
-def _by_theory(cell: Cell, theory: LinearTheory | None, errors: Errors) -> Array:
-    """Estimates and Ω of linear theory, (R, u + 1); NaN without one."""
-    if theory is None:
-        return np.full((len(errors.force), cell.n_unknowns + 1), np.nan)
-    noise = errors.force
-    if cell.conditions.uses_angles and errors.angle is not None:
-        noise = np.concatenate([noise, errors.angle], axis=-1)
-    shift, omega = theory.errors(noise, errors.gravity)
-    return np.column_stack([theory.reference + shift, omega])
+def _by_theory(
+    theory: LinearTheory, cell: Cell, errors: Iterable[Errors], simulated: Block
+) -> Block:
+    """Calibrations by linear theory of the errors of blocks."""
+    estimates, omegas = [], []
+    for block in errors:
+        noise = [block.force]
+        if cell.conditions.uses_angles and block.angle is not None:
+            noise.append(block.angle)
+        shift, omega = theory.errors(np.concatenate(noise, axis=-1), block.gravity)
+        estimates.append(theory.reference + shift)
+        omegas.append(omega)
+    return replace(
+        simulated,
+        estimates=np.concatenate(estimates),
+        sigma_priori=np.broadcast_to(theory.sigma, simulated.estimates.shape),
+        omega=np.concatenate(omegas),
+        converged=np.ones(len(simulated.omega), bool),
+    )
 
 
 def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
     """Rows of `ESTIMATES` of some replicates of a cell."""
     first, simulated, linear = replicates
     count, u = simulated.estimates.shape
+    estimates, omega = (
+        (np.full((count, u), np.nan), np.full(count, np.nan))
+        if linear is None
+        else (linear.estimates, linear.omega)
+    )
 
     def coded(names: Collection[str]) -> pa.DictionaryArray:
         different = [*dict.fromkeys(names)]
@@ -140,10 +133,10 @@ def estimates_table(cell: Cell, replicates: Replicates) -> pa.Table:
         "unit": coded(cell.parameter_units.values()),
         "truth": np.tile(cell.true_values, count),
         "estimate": simulated.estimates.ravel(),
-        "linear_estimate": linear.estimates.ravel(),
+        "linear_estimate": estimates.ravel(),
         "sigma_priori": simulated.sigma_priori.ravel(),
         "omega": np.repeat(simulated.omega, u),
-        "linear_omega": np.repeat(linear.omega, u),
+        "linear_omega": np.repeat(omega, u),
         "redundancy": np.full(count * u, simulated.redundancy),
         "iterations": np.repeat(simulated.iterations, u),
         "converged": np.repeat(simulated.converged, u),

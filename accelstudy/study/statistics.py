@@ -24,9 +24,10 @@ from accelstudy.study.estimate import (
     Sample,
     Statistic,
     controlled,
+    controlled_quantiles,
+    usual_levels,
 )
 from accelstudy.study.known import KnownValues
-from accelstudy.study.quantiles import controlled_quantiles, usual_levels
 from accelstudy.study.replicates import Replicates, simulate
 
 Array = NDArray[np.float64]
@@ -112,12 +113,13 @@ def statistics(
     good, correlations = [], np.zeros((cell.n_unknowns, cell.n_unknowns))
     for part in replicates:
         own.add(_numbers(cell, part.simulated, rows))
-        theory.add(_numbers(cell, part.linear, rows))
+        if part.linear is not None:
+            theory.add(_numbers(cell, part.linear, rows))
         good.append(part.simulated.converged)
         correlations += part.simulated.correlation_sum
     converged = np.concatenate(good)
     count = own.sample.count
-    known = None if theory.lacking("error") else KnownValues.of(cell)
+    known = KnownValues.of(cell) if theory.parts else None
     control = "linear" if known is not None and len(converged) >= MIN_REPLICATES else "none"
     counts = len(converged), count, control, correlations / (count or np.nan)
     if not count:
@@ -128,19 +130,21 @@ def statistics(
     for name, (statistic, number) in STATISTICS.items():
         if name != "correlation" or count > cell.n_unknowns:
             chosen, by = rows[number], expected.get(name, np.nan)
-            pair = own.sample[chosen], theory.sample[chosen]
-            estimates[name] = controlled(statistic, *pair, by, converged)
+            control_sample = None if known is None else theory.sample[chosen]
+            estimates[name] = controlled(
+                statistic, own.sample[chosen], control_sample, by, converged
+            )
     quantiles = {}
     nothing = np.full((max(len(TILTS), cell.n_unknowns), len(at)), np.nan)
     by_theory = {} if known is None else known.quantiles(at)
     for quantity, number in QUANTITIES.items():
-        if own.lacking(number):  # sigmas a posteriori need redundancy
+        if np.isnan(own.sample.mean[rows[number]]).any():  # sds a posteriori need redundancy
             continue
         values, errors = by_theory.get(quantity, (nothing, nothing))
         for i, name in enumerate(TILTS if quantity == TILT else cell.parameter_units):
-            both = own.all_of(number, i), theory.all_of(number, i)
+            beside = None if known is None else theory.all_of(number, i)
             quantiles[quantity, name] = controlled_quantiles(
-                at, *both, values[i], converged, errors[i]
+                at, own.all_of(number, i), beside, values[i], converged, errors[i]
             )
     one = own.sample.first[:, 0]
     first = one[rows["error"]], one[rows["sigma_posteriori"]]
@@ -199,10 +203,6 @@ class _Numbers:
         """One of the numbers of a name, of all replicates."""
         row = self.rows[name].start + i - self.start
         return np.concatenate([part[row] for part in self.parts])
-
-    def lacking(self, name: str) -> bool:
-        """Whether a number of a name is missing in a replicate."""
-        return bool(np.isnan(self.sample.mean[self.rows[name]]).any())
 
 
 def simulated_statistics(

@@ -4,7 +4,7 @@ from accelstudy.files.tables import read_table, write_table
 from accelstudy.study import tables as of_cells
 from accelstudy.study.cell import fanned_out
 from accelstudy.study.config import parse_study
-from accelstudy.study.replicates import Replicates, simulate
+from accelstudy.study.replicates import simulate
 from accelstudy.study.statistics import statistics
 from accelstudy.study.tables import TABLES, collect
 
@@ -44,7 +44,7 @@ def simulated(cell, seed=1):
 
 def plain(cell, seed):
     """Statistics of a cell without linear theory."""
-    return statistics(cell, map(Replicates.without_theory, simulate(cell, seed)))
+    return statistics(cell, (part._replace(linear=None) for part in simulate(cell, seed)))
 
 
 def simulate_cells(folder, cells, seed=1):

@@ -8,8 +8,17 @@ from scipy import stats
 from study_helpers import grid, make_cells, plain, run_study
 from usual import STANDARD_ERRORS
 
-from accelstudy.study.estimate import CORRELATION, MEAN, RATIO, ROOT_MEAN, SD, Sample, controlled
-from accelstudy.study.quantiles import PROBABILITIES, controlled_quantiles
+from accelstudy.study.estimate import (
+    CORRELATION,
+    MEAN,
+    PROBABILITIES,
+    RATIO,
+    ROOT_MEAN,
+    SD,
+    Sample,
+    controlled,
+    controlled_quantiles,
+)
 from accelstudy.study.statistics import TILT, simulated_statistics
 
 OFTEN = 200
