@@ -39,7 +39,6 @@ SKIPPED = {
     "accelstudy public [a-z].*": "downloads; the part `logs` does the same",
     "accelstudy plan": "stands in the part `plans`",
     "accelstudy claims": "stands in the parts `paper` and `smoke`",
-    "watch": "waits; the part `advise` goes through the session",
     "tail .*running/positions.csv": "waits; the part `advise` goes through the session",
     r".*(zsh|fish)_source": "is for another shell",
 }
