@@ -13,8 +13,8 @@ design of its own as well.
 import logging
 import sys
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import Pool
 
 import numpy as np
 from scipy.stats import binomtest
@@ -168,8 +168,8 @@ def share(answers):
 def main(lots, seed):
     """Print the table."""
     jobs = [(number, i, seed) for i in range(lots) for number in range(len(KINDS))]
-    with Pool(2) as pool:
-        answers = pool.map(judged, jobs, chunksize=1)
+    with ProcessPoolExecutor(2) as pool:
+        answers = [*pool.map(judged, jobs)]
     rows = []
     for number, kind in enumerate(KINDS):
         of_kind = [one for one in answers if one["kind"] == number]

@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -243,6 +244,10 @@ def _processes(cores: int, n: int) -> Iterator[Mapped]:
     try:
         yield partial(pool.map, chunksize=min(4, -(-n // cores)))
         pool.shutdown()
+    except BrokenProcessPool:
+        raise InputError(
+            "a process of the lot was killed, most likely because memory ran out; use fewer `cores`"
+        ) from None
     finally:
         os.close(writes)
         pool.shutdown(cancel_futures=True)
@@ -250,8 +255,13 @@ def _processes(cores: int, n: int) -> Iterator[Mapped]:
 
 
 def _work(reads: int, writes: int) -> None:
-    """Let a worker end with the process that it works for, which alone answers to Ctrl-C."""
+    """Let a worker end with the process that it works for, which alone answers to Ctrl-C.
+
+    Handlers that the program has for SIGTERM are no matter of a worker: it would outlive the signal
+    by which the pool ends it.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.close(writes)
 
     def wait() -> None:

@@ -48,6 +48,38 @@ def test_no_worker_stays_and_none_says_a_word(name):
     assert said == ("interrupted\n" if number == signal.SIGINT else "")
 
 
+PROGRAM = """
+import os, signal, time
+from accelstudy.lots.lot import _processes
+signal.signal(signal.SIGTERM, lambda *_: os.write(1, b"handled\\n"))
+def job(campaign):
+    if campaign == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(1000 if campaign == "endless" else 0)
+    return campaign
+for _ in range(30):
+    with _processes(3, 5) as mapped:
+        assert list(mapped(job, range(5))) == [0, 1, 2, 3, 4]
+try:
+    with _processes(3, 3) as mapped:
+        list(mapped(job, ["endless", "endless", "killed"]))
+except ValueError as error:
+    print(error, flush=True)
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+
+
+def test_a_worker_does_not_answer_to_signals_as_the_program_does():
+    """The pool ends however often it is used, and where the system kills a worker, in one line."""
+    program = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True,
+                             timeout=ENOUGH)  # fmt: skip
+    assert program.stdout.splitlines() == [
+        "a process of the lot was killed, most likely because memory ran out; use fewer `cores`",
+        "handled",
+    ]
+    assert not program.stderr
+
+
 def test_there_are_no_more_processes_than_campaigns():
     before = set(active_children())
     with _processes(200, 3) as mapped:
