@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +41,7 @@ STATISTIC_TOLERANCE = 1e-9
 """Relative difference below which two statistics are equal, and the first one is taken."""
 
 
-@dataclass(frozen=True)
-class Test:
+class Test(NamedTuple):
     """Whether differences are no larger than their covariance matrix says.
 
     Attributes

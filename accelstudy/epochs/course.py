@@ -29,6 +29,7 @@ from scipy import linalg, optimize, stats
 
 from accelstudy.adjustment.quality import POWER, noncentrality
 from accelstudy.adjustment.random_effects import RandomEffects
+from accelstudy.basics.shares import sigmas_95
 from accelstudy.epochs.congruence import LEVEL, dof_of_squares, f_tail
 
 Array = NDArray[np.float64]
@@ -47,7 +48,7 @@ class Rate(NamedTuple):
     @property
     def sigmas_95(self) -> float:
         """Number of sigmas on either side that hold 95 %."""
-        return float(stats.t.isf(0.025, self.dof))
+        return sigmas_95(self.dof)
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -12,19 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import optimize
 
-from accelstudy.basics.units import shown_unit, to_display
-from accelstudy.drawing.style import COLUMN, INK, new_figure
+from accelstudy.basics.units import GON, MGON
 from accelstudy.epochs.course import YEAR
 
 if TYPE_CHECKING:
-    from accelstudy.epochs.history import History
+    from accelstudy.epochs.results import History
 
 Array = NDArray[np.float64]
 
@@ -34,10 +32,6 @@ MAX_YEARS = 10.0
 """Years after the last calibration up to which a date is given."""
 SHOWN_YEARS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 """Years at which errors are told."""
-WRONG = "#C2247A"
-"""Colour of the accuracy that must not be exceeded."""
-LINE_POINTS = 50
-"""Number of points of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +67,27 @@ class Interval:
         """Years until the error exceeds the accuracy; 0 if it does at once, at most `MAX_YEARS`."""
         if self.error(0.0) > self.accuracy:
             return 0.0
-        steps = np.linspace(0.0, MAX_YEARS, 201)
-        too_large = [t for t in steps if self.error(t) > self.accuracy]
-        if not too_large:
+
+        def beyond(years: float) -> float:
+            return self.error(years) - self.accuracy
+
+        steps = np.linspace(0.0, MAX_YEARS, 201).tolist()
+        first = next((t for t in steps if beyond(t) > 0), None)
+        if first is None:
             return MAX_YEARS
-        first = too_large[0]
-        return float(
-            optimize.brentq(lambda t: self.error(t) - self.accuracy, first - steps[1], first)
-        )
+        return float(optimize.brentq(beyond, first - steps[1], first))
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What history.json says of it."""
+        return {
+            "years": self.years,
+            "until": self.until.date().isoformat(),
+            "accuracy_mgon": self.accuracy / MGON,
+            "max_tilt_gon": self.tilt_range / GON,
+            "confidence": self.confidence,
+            "errors": [{"years": t, "mgon": self.error(t) / MGON} for t in SHOWN_YEARS],
+        }
 
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
@@ -125,28 +132,3 @@ def _normal(rng: np.random.Generator, covariance: Array) -> Array:
     # The symmetric root, as the signs of eigenvectors depend on the processor.
     root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
     return np.asarray(rng.standard_normal((DRAWS, len(size))) @ root * size)
-
-
-def interval_figure(interval: Interval) -> Figure:
-    """Draw the tilt error that is not exceeded, over the time since the last calibration."""
-    figure = new_figure(COLUMN, 55)
-    ax = figure.subplots()
-    last = min(MAX_YEARS, max(1.0, 1.5 * interval.years))
-    years = np.linspace(0.0, last, LINE_POINTS)
-    error = to_display([interval.error(t) for t in years], "rad")
-    ax.plot(years, error, color=INK)
-    ax.axhline(float(error[0]), color=INK, linewidth=0.8, linestyle=":")
-    ax.annotate("a new calibration", (last, float(error[0])), (0, 2), textcoords="offset points",
-                ha="right", fontsize=7)  # fmt: skip
-    accuracy = float(to_display(interval.accuracy, "rad"))
-    ax.axhline(accuracy, color=WRONG, linewidth=0.8)
-    ax.annotate("accuracy", (0, accuracy), (2, 2), textcoords="offset points", fontsize=7,
-                color=WRONG)  # fmt: skip
-    ax.set(
-        xlabel="years since the last calibration",
-        ylabel=f"tilt error / {shown_unit('rad')}",
-        xlim=(0, last),
-        ylim=(0, 1.1 * max(float(error.max()), accuracy)),
-    )
-    ax.set_title(f"Not exceeded with {100 * interval.confidence:g} %")
-    return figure

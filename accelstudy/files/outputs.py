@@ -70,6 +70,7 @@ CAMPAIGN = OutputKind(
 COMPARISON = OutputKind(
     "comparison of calibrations", "comparison.json", ("report.html",), ("figures",)
 )
+# history.parquet is of folders of 0.3.
 HISTORY = OutputKind("history", "history.json", ("history.parquet", "report.html"), ("figures",))
 LOT = OutputKind("lot", "lot.json", ("type.yaml", "report.html"), ("figures", "each"))
 _PLAN_FILES = ("plan.md", "positions.yaml", "study.yaml", "plan.svg", "plan.png")

@@ -53,7 +53,7 @@ def compare(
         accelstudy compare spring/calibration.json autumn/calibration.json --out both
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.comparison import Comparison
+    from accelstudy.epochs.results import Comparison
 
     pair = sensor_of(first, "first"), sensor_of(second, "second")
     return Comparison(*pair, float(tilt_range))  # in SI by `verb`
@@ -77,7 +77,7 @@ def history(
     With `tilt_accuracy` it says how long the last calibration is good enough, and what a new one
     would gain.
 
-    The folder of results gets report.html, history.json, history.parquet and a figure.
+    The folder of results gets report.html, history.json and a figure.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def history(
             years
     """
     from accelstudy.campaign.calibration.sensor_calibration import sensor_of
-    from accelstudy.epochs.history import History, dates_of
+    from accelstudy.epochs.results import History, dates_of
 
     calibrations = as_sequence(calibrations)
     check_once(calibrations, "calibration")

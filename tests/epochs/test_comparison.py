@@ -13,7 +13,7 @@ from accelstudy.basics.units import GON
 from accelstudy.basics.units import STANDARD_GRAVITY as G
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
-from accelstudy.epochs.comparison import Comparison
+from accelstudy.epochs.results import Comparison
 from accelstudy.leveling.angles import angles_of, wrap_angle
 from accelstudy.leveling.error import cap_forces
 

@@ -10,8 +10,8 @@ from session_helpers import document
 from accelstudy.basics.units import GON, MGON
 from accelstudy.campaign.calibration.sensor_calibration import calibration_of
 from accelstudy.epochs.course import YEAR
-from accelstudy.epochs.history import History
 from accelstudy.epochs.interval import MAX_YEARS, Interval
+from accelstudy.epochs.results import History
 
 G = 9.80665
 N = 40

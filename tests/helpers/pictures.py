@@ -49,7 +49,7 @@ OF_STUDIES = {
 """Pictures of the pages of a study."""
 DRAWN = {
     "plan": ("the command in docs/guides/plan.md", "accelstudy/planning/figure.py"),
-    "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/history.py"),
+    "history": ("the commands in docs/guides/history.md", "accelstudy/epochs/results.py"),
     "designs-efficiency": ("make positions", "studies/positions/efficiency.py"),
     "sequential": ("make positions", "studies/positions/stopping.py"),
     "residuals": ("make campaigns", "accelstudy/campaign/calibration/figures.py"),

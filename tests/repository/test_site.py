@@ -99,7 +99,6 @@ def test_each_key_and_column_of_a_calibration_is_described(tmp_path):
         "positions.parquet": list(pd.read_parquet(tmp_path / "one/positions.parquet")),
         "calibration.h": ANY,
         "calibration.params": ANY,
-        "history.parquet": list(pd.read_parquet(tmp_path / "three/history.parquet")),
         "advice.json": list(advice.content),
         "simulation.json": list(simulation),
         "campaigns.parquet": list(CAMPAIGN_COLUMNS),
