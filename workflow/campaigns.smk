@@ -25,8 +25,6 @@ PUBLIC = {
     if task.kind == "public"
 }
 
-TOGETHER = [] if BATCH.lot is None else [f"{RESULTS}/lot"]
-
 
 wildcard_constraints:
     campaign=r"[^/]+",
@@ -54,7 +52,6 @@ rule campaigns:
     default_target: True
     input:
         OUTPUTS,
-        TOGETHER,
     message:
         f"All results of the batch {BATCH.batch}"
 
@@ -113,23 +110,3 @@ rule overview:
         "Summarise the campaigns"
     script:
         "scripts/overview.py"
-
-
-# One job for all: each pass over the sensors needs what the pass before found.
-rule lot:
-    input:
-        expand(f"{RESULTS}/campaigns/{{campaign}}", campaign=TASKS),
-    output:
-        directory(f"{RESULTS}/lot"),
-    log:
-        f"{RESULTS}/logs/lot.log",
-    conda:
-        "envs/accelstudy.yaml"
-    threads: workflow.cores or 1
-    params:
-        angle_unit=angle_unit(),
-        version=VERSION,
-    message:
-        "Evaluate all campaigns together"
-    script:
-        "scripts/lot.py"

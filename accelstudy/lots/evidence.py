@@ -19,8 +19,8 @@ from accelstudy.diagnosis.evidence.noise_tests import LEVEL as LEVEL_OF_NOISE
 from accelstudy.diagnosis.evidence.sets import weigh_sets
 from accelstudy.diagnosis.evidence.size import Evidence, Level
 from accelstudy.diagnosis.rules import RULES
+from accelstudy.diagnosis.space.frame import SessionFit
 from accelstudy.lots.noise import NoisePrior
-from accelstudy.lots.sizes import ShapeEquations
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -46,12 +46,13 @@ class SensorEvidence:
     pairs : dict of two names in order to the log odds of both together
     classes : tuple of tuple of str, names that mean the same in this campaign
     specs : dict of effect to its best setting
-    shown : dict of effect to what its shapes would show in the residuals
+    shapes : dict of lasting effects that show to their shapes
     tested : dict of what is tested to its log odds and, behind that, those in noise alone, (1 + s,)
     residuals : (m,) array, m/s², of the means of the positions, equally uncertain
     redundancy : int, of these
-    square : float, ‖z‖² of them in units of the noise: of the type where it is known
     variance : float, (m/s²)², of a position mean, by the noise of the lot and the residuals
+    unit : float, variance of unit weight; 1 by the noise of the lot
+    frame : SessionFit, the campaign; None where it does not determine the model
     """
 
     campaign: str
@@ -60,12 +61,13 @@ class SensorEvidence:
     pairs: dict[tuple[str, str], float] = field(default_factory=dict)
     classes: tuple[tuple[str, ...], ...] = ()
     specs: dict[str, str] = field(default_factory=dict)
-    shown: dict[str, ShapeEquations] = field(default_factory=dict)
+    shapes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     tested: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     residuals: Array = field(default_factory=lambda: np.zeros(0))
     redundancy: int = 0
-    square: float = 0.0
     variance: float = 1.0
+    unit: float = 1.0
+    frame: SessionFit | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +142,6 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         if one:
             pairs[one, other] = pair.log_density - nothing
     of_unit_weight = max(evidence.variance(square), MIN_VARIANCE)
-    variance = of_unit_weight if noise is None else 1.0
     observed = [detection.densities[name] - nothing for name in problem.field.names]
     odds = np.vstack([observed, _by_chance(problem, chance, noise)]).astype(np.float32)
     return SensorEvidence(
@@ -152,8 +153,8 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         specs={
             name: best.effect.spec for name, best in singles.best.items() if best.effect is not None
         },
-        shown={
-            name: ShapeEquations.of(problem.frame, effects, variance)
+        shapes={
+            name: tuple(effect.spec for effect in effects)
             for name, shapes in problem.examined.candidates.items()
             if (effects := [h.effect for h in shapes if h.effect is not None])
             and not effects[0].sudden
@@ -161,8 +162,9 @@ def _weighed(sensor: Sensor) -> SensorEvidence:
         tested=dict(zip(problem.field.names, odds.T, strict=True)),
         residuals=z * problem.base.sigma,
         redundancy=residuals.redundancy,
-        square=square / variance,
         variance=problem.base.sigma**2 * of_unit_weight,
+        unit=of_unit_weight if noise is None else 1.0,
+        frame=problem.frame,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -16,15 +16,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from accelstudy.approaches import Approach, get_approach
+from accelstudy.approaches import Approach
 from accelstudy.basics import suggestions
 from accelstudy.basics.errors import InputError
 from accelstudy.basics.names import path_name
 from accelstudy.basics.progress import say, show
 from accelstudy.basics.units import GON, MGON, shown_unit, to_display
 from accelstudy.basics.wording import comma_list, probability
-from accelstudy.campaign.batch.config import BatchConfig
-from accelstudy.campaign.batch.run import campaign_of
 from accelstudy.campaign.calibration.assessment import tilt_left
 from accelstudy.campaign.calibration.document import json_content, write_json
 from accelstudy.campaign.calibration.figures import SUSPECT
@@ -49,7 +47,7 @@ from accelstudy.drawing.style import (
     say_empty,
     symbol,
 )
-from accelstudy.files.outputs import LOT, result_folder
+from accelstudy.files.outputs import LOT
 from accelstudy.leveling.error import (
     ATTITUDES,
     MAX_TILT_GON,
@@ -59,12 +57,11 @@ from accelstudy.leveling.error import (
 )
 from accelstudy.lots.evidence import name_words
 from accelstudy.lots.lot import LotDiagnosis, weigh_lot
-from accelstudy.lots.parameters import TypeParameter
 from accelstudy.lots.passes import LEVEL, LotEffect
-from accelstudy.lots.type_file import write_type
+from accelstudy.lots.type_file import TypeParameter, write_type
 from accelstudy.pages import render_lines, write_page
 from accelstudy.pages.result import Result
-from accelstudy.sensors.models import compose, get_model
+from accelstudy.sensors.models import compose
 from accelstudy.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
@@ -73,9 +70,6 @@ EACH = "each"
 """Folder of the calibrations of the sensors."""
 MIN_SENSORS = 2
 """Sensors of the smallest lot."""
-EFFECT_KEYS = ("names", "posterior", "share", "share_ci95")
-PARAMETER_KEYS = ("name", "mean", "scatter", "scatter_ci95", "sigma", "unit")
-"""What lot.json has of an effect, and of its parameters."""
 
 
 class Lot(Result):
@@ -86,7 +80,6 @@ class Lot(Result):
     diagnosis : accelstudy.lots.lot.LotDiagnosis, all that is missing
     model : SensorModel, that was diagnosed, without what was found
     fits : calibrations of the sensors with the model of the type, or why there is none
-    approach : Approach, of the first campaign
     left_out : mapping of campaigns that are not in the lot to why
     """
 
@@ -97,11 +90,9 @@ class Lot(Result):
         diagnosis: LotDiagnosis,
         model: SensorModel,
         fits: Sequence[CampaignFit | InputError],
-        approach: Approach,
         left_out: Mapping[str, str],
     ) -> None:
-        self.diagnosis, self.model, self.fits = diagnosis, model, fits
-        self.approach, self.left_out = approach, left_out
+        self.diagnosis, self.model, self.fits, self.left_out = diagnosis, model, fits, left_out
         self.name = f"{len(diagnosis.sensors)} sensors"
 
     @classmethod
@@ -112,24 +103,22 @@ class Lot(Result):
         approach: Approach | None = None,
         seed: int = 1,
         cores: int = 1,
-        left_out: Mapping[str, str] | None = None,
     ) -> Lot:
         """Say what the model of sensors of one type lacks, and calibrate each of them.
 
         Parameters
         ----------
         campaigns, model, approach, seed, cores : as in `weigh_lot`; campaigns of one name get their
-            numbers behind it, and those of one log count once
-        left_out : mapping of campaigns that could not be read to what is wrong with them; what
-            cannot be judged by itself, as it leaves no redundancy, is left out as well
+            numbers behind it, and those of one log count once; what cannot be judged by itself, as
+            it leaves no redundancy, is left out
 
         Raises
         ------
         InputError
             If fewer than two campaigns can be judged.
         """
-        usable, without, first = list[Campaign](), dict(left_out or {}), dict[bytes, str]()
-        names = own_names([campaign.name for campaign in campaigns], without)
+        usable, without, first = list[Campaign](), dict[str, str](), dict[bytes, str]()
+        names = own_names([campaign.name for campaign in campaigns])
         for given, name in zip(campaigns, names, strict=True):
             campaign = replace(given, name=name)
             # Noise never repeats: the same numbers are the same log, whatever its folder.
@@ -153,7 +142,7 @@ class Lot(Result):
                 fits.append(fit_campaign(sensor.campaign, diagnosis.model_of(i), sensor.approach))
             except InputError as error:
                 fits.append(error)
-        return cls(diagnosis, model, fits, diagnosis.sensors[0].approach, without)
+        return cls(diagnosis, model, fits, without)
 
     @cached_property
     def fitted(self) -> dict[int, CampaignFit]:
@@ -255,23 +244,14 @@ class Lot(Result):
             "sensors": len(d.sensors),
             "anything": {"p_value": d.p_value, "missing": d.missing, "level": LEVEL},
             "effects": [
-                {
-                    **{key: getattr(found, key) for key in EFFECT_KEYS},
-                    "parameters": [
-                        {key: getattr(one, key) for key in PARAMETER_KEYS}
-                        for one in self._sizes(found)
-                    ],
-                }
+                {**found._asdict(), "parameters": [one.content for one in self._sizes(found)]}
                 for found in d.effects
             ],
             "explained": d.explained,
             "close": d.close,
             "alternatives": [{"names": n, "posterior": p} for n, p in d.alternatives],
             "odd": [
-                {
-                    **one._asdict(),
-                    "reason": f"it shows {_either(one.names)}, and the others do not",
-                }
+                {**one._asdict(), "reason": f"it shows {_either(one.names)}, and the others do not"}
                 for one in d.odd
             ],
             "each": [
@@ -279,11 +259,8 @@ class Lot(Result):
                 for one, fit in zip(d.each, self.fits, strict=True)
             ],
             "left_out": [{"campaign": name, "reason": why} for name, why in self.left_out.items()],
-            "tilt": None
-            if tilt is None
-            else {
-                "roll_mgon": float(tilt[0] / MGON),
-                "pitch_mgon": float(tilt[1] / MGON),
+            "tilt": None if tilt is None else {
+                "roll_mgon": tilt[0] / MGON, "pitch_mgon": tilt[1] / MGON,
                 "max_tilt_gon": MAX_TILT_GON,
             },
             "verdict": " ".join(self.sentences),
@@ -293,13 +270,10 @@ class Lot(Result):
     @property
     def effects(self) -> pd.DataFrame:
         """Parameters that the model lacks: mean and scatter over the sensors that have them."""
-        rows = [
-            {"effect": " or ".join(one["names"]), "share": one["share"], **size}
-            for one in self.content["effects"]
-            for size in one["parameters"]
-        ]
+        rows = pd.json_normalize(self.content["effects"], "parameters", ["names", "share"])
         columns = ["effect", "share", "name", "mean", "scatter", "sigma", "unit"]
-        return pd.DataFrame(rows, columns=columns)
+        rows = rows.reindex(columns=["names", *columns[1:]])
+        return rows.assign(names=rows["names"].str.join(" or ")).set_axis(columns, axis=1)
 
     def to_frame(self) -> pd.DataFrame:
         """Return for each sensor which effects its model lacks, and their posterior probability."""
@@ -321,8 +295,8 @@ class Lot(Result):
             write_json(its_own / "calibration.json", Calibration(fit).content)
         steps = []
         if write_type(self, folder):
-            of_type = place / TYPE_FILE
-            command = suggestions.calibrate("CAMPAIGN", of_type, self.approach.name, of_type)
+            of_type, approach = place / TYPE_FILE, self.diagnosis.sensors[0].approach
+            command = suggestions.calibrate("CAMPAIGN", of_type, approach.name, of_type)
             steps.append(("Calibrate the next sensor of the type, with what these tell", command))
         write_page(
             folder / "report.html",
@@ -362,41 +336,13 @@ class Lot(Result):
         return figure
 
 
-def run_lot(
-    batch: BatchConfig, folders: Sequence[str | Path], out: str | Path, cores: int = 1
-) -> Lot:
-    """Evaluate all campaigns of a batch together; those that cannot be read are named.
-
-    Parameters
-    ----------
-    batch : BatchConfig, with `lot`
-    folders : paths, written by `run_task`, in the order of its tasks
-    out : path of the folder to write
-    cores : int, processes that work at once
-    """
-    settings = batch.lot
-    assert settings is not None
-    campaigns, unread = [], {}
-    for task, folder in zip(batch.tasks(), folders, strict=True):
-        try:
-            campaigns.append(campaign_of(task, folder))
-        except InputError as error:
-            unread[task.name] = str(error)
-    model = get_model(settings.model or batch.model)
-    approach = None if settings.approach is None else get_approach(settings.approach)
-    with result_folder(out, LOT) as new:
-        lot = Lot.of(campaigns, model, approach, settings.seed, cores, unread)
-        lot.write(new, Path(out))
-    return lot
-
-
-def own_names(given: Sequence[str], others: Collection[str]) -> list[str]:
+def own_names(given: Sequence[str]) -> list[str]:
     """Return names of campaigns, no two alike: of equal ones each gets a number behind it."""
     names: list[str] = []
     for number, name in enumerate(given, start=1):
-        if given.count(name) > 1 or name in others:
+        if given.count(name) > 1:
             numbered = (f"{name} ({k})" for k in count(number))
-            name = next(one for one in numbered if one not in {*given, *others, *names})
+            name = next(one for one in numbered if one not in {*given, *names})
         names.append(name)
     return names
 

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, reduce
+from operator import add
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -22,12 +23,12 @@ from accelstudy.lots.evidence import COMMON, Sensor, SensorEvidence, lot_classes
 from accelstudy.lots.mean import mean_sensor
 from accelstudy.lots.mixture import LotTest, Mixture
 from accelstudy.lots.sizes import (
+    Equations,
     Names,
     PooledEffect,
     TypeSizes,
     TypicalSet,
     most_likely,
-    sensor_equations,
     weigh_pooled,
 )
 from accelstudy.sensors.sensor import SensorModel
@@ -129,22 +130,24 @@ class Pass:
         mapped : maps a function over the sensors
         """
         n, said, anything = len(sensors), list[SensorEvidence](), LotTest({})
-        # What noise alone would say is most of what a sensor gives, and is not kept. What its
-        # shapes show is only gathered here, so that memory hardly follows the number of sensors.
+        # What noise alone would say is most of what a sensor gives, and is not kept.
         for one in track(mapped(Sensor.evidence, sensors), "evidence of the sensors", n):
             anything.add(one.tested)
             said.append(replace(one, tested={}))
-        now = cls(tuple(sensors), tuple(replace(one, shown={}) for one in said), anything)
-        usual = [i for i in now.usual if sensors[i].model]
-        those, their = [sensors[i] for i in usual], [said[i] for i in usual]
-        mean = _evidence_of_mean(those, their, whole, sensors[0].seed - 1 if sensors[0].seed else n)
-        now = replace(now, mean=mean, pooled=weigh_pooled(their))
+        # Nor are the fits, so that memory hardly follows the number of sensors.
+        now = cls(tuple(sensors), tuple(replace(one, frame=None) for one in said), anything)
+        usual = [i for i in now.usual if said[i].frame]
+        their = [said[i] for i in usual]
+        seed = sensors[0].seed - 1 if sensors[0].seed else n
+        mean = _evidence_of_mean([sensors[i] for i in usual], their, whole, seed)
+        now = replace(now, mean=mean, pooled=_pooled(their))
         asked = now.strongest()
         specs = {name: now.shapes[name] for names in asked for name in names}
         if len(usual) < 2 or not specs:
             return now
-        told = mapped(partial(sensor_equations, specs=[*specs.values()]), sensors)
-        return replace(now, sizes=TypeSizes.of([*told], specs, asked, usual))
+        each = [Equations.of(one.frame, specs.values()) for one in said]
+        redundancy = sum(one.redundancy for one in their)
+        return replace(now, sizes=TypeSizes.of(each, specs, asked, usual, redundancy))
 
     @cached_property
     def classes(self) -> dict[str, tuple[str, ...]]:
@@ -379,6 +382,23 @@ class Pass:
             if (spec := one.specs.get(name)) is not None:
                 counted[spec] = counted.get(spec, 0.0) + weight
         return max(counted, key=lambda spec: counted[spec], default=None)
+
+
+def _pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
+    """Weigh each effect that most sensors show by all campaigns as one.
+
+    Its shapes are those of the first campaign that shows it.
+    """
+    first: dict[str, Sequence[str]] = {}
+    for each in used:
+        first = {**each.shapes, **first}
+    counts = {name: sum(name in each.shapes for each in used) for name in sorted(first)}
+    shapes = {name: first[name] for name, count in counts.items() if 2 * count > len(used)}
+    if not shapes:
+        return {}
+    specs = [spec for one in shapes.values() for spec in one]
+    pooled = reduce(add, (Equations.of(each.frame, specs, each.unit) for each in used))
+    return weigh_pooled(pooled, sum(each.redundancy for each in used), shapes)
 
 
 def _evidence_of_mean(

@@ -16,9 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property, reduce
+from itertools import combinations, pairwise
+from operator import add
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +28,12 @@ from accelstudy.basics.errors import InputError
 from accelstudy.diagnosis.evidence.size import SIZE_WEIGHTS, SIZES, Evidence, Level, log_mean
 from accelstudy.diagnosis.rules import RULES
 from accelstudy.diagnosis.space.frame import SessionFit
-from accelstudy.effects import Effect, get_effect
-
-if TYPE_CHECKING:
-    from accelstudy.lots.evidence import Sensor, SensorEvidence
+from accelstudy.effects import get_effect
 
 Array = NDArray[np.float64]
 Names = tuple[str, ...]
 """Names of some effects, in order."""
 
-MAX_LOG_DIFFERENCE = 0.3
-"""Largest difference of the logarithms of settings that are nearly the same."""
 SCATTERS = (0.0, 0.25, 1.0)
 """τ, scatter of the parameters of a type in parts of their size; beyond, each sensor has its own
 size."""
@@ -51,169 +47,108 @@ LIKELIHOOD_TOLERANCE = 1e-3
 """Change of the log likelihood below which the search ends."""
 
 
-# --- what one campaign says of parameters -------------------------------------------------------
+# --- what campaigns say of parameters -----------------------------------------------------------
 
 
 class Equations(NamedTuple):
-    """Normal equations of the parameters of effects, by the residuals z of a campaign.
+    """Normal equations of the parameters of effects side by side, by the residuals z of a campaign.
 
     Attributes
     ----------
-    normal : (..., k, k) array, DᵀD of the derivatives D of z by the parameters
-    right : (..., k) array, Dᵀz
-    squares : (..., k) array, of what D would be if no parameter of the model were estimated
+    normal : (k, k) array, DᵀD of the derivatives D of z by the parameters
+    right : (k,) array, Dᵀz
+    squares : (k,) array, of what D would be if no parameter of the model were estimated
+    square : float, ‖z‖²
     """
 
     normal: Array
     right: Array
     squares: Array
+    square: float
 
     @classmethod
-    def of(cls, frame: SessionFit, columns: Array) -> Equations:
-        """Equations of derivatives (m, s, k), whitened, before the model is estimated."""
-        residuals = frame.residuals
-        d = residuals.project(columns.reshape(len(columns), -1)).reshape(columns.shape)
-        return cls(
-            np.einsum("msk,msl->skl", d, d),
-            np.einsum("msk,m->sk", d, residuals.z),
-            np.sum(columns**2, axis=0),
-        )
+    def of(cls, frame: SessionFit | None, specs: Iterable[str], variance: float = 1.0) -> Equations:
+        """Equations of effects by a campaign; zeros where it cannot show one.
 
-    @classmethod
-    def pooled(cls, each: Iterable[Equations]) -> Equations:
-        """Equations of all campaigns as one."""
-        normal, right, squares = (np.sum(parts, axis=0) for parts in zip(*each, strict=True))
-        return cls(normal, right, squares)
+        Parameters
+        ----------
+        frame : SessionFit, of the campaign; None for one that shows nothing
+        specs : the effects
+        variance : float, of unit weight
+        """
+        effects = [get_effect(spec) for spec in specs]
+        k = [len(effect.parameters) for effect in effects]
+        if frame is None:
+            return cls(np.zeros((sum(k), sum(k))), np.zeros(sum(k)), np.zeros(sum(k)), 0.0)
+        residuals, columns = frame.residuals, []
+        for effect, count in zip(effects, k, strict=True):
+            try:
+                columns.append(frame.rows(effect))
+            except InputError:  # a column is absent
+                columns.append(np.zeros((len(residuals.z), count)))
+        rows, z = np.concatenate(columns, axis=1), residuals.z
+        d = residuals.project(rows)
+        normal, right, squares = d.T @ d, d.T @ z, np.sum(rows**2, axis=0)
+        return cls(normal / variance, right / variance, squares / variance, float(z @ z) / variance)
 
-    def visible(self) -> tuple[Array, Array]:
-        """Combinations of the parameters that show, and how much each of them does.
+    def __add__(self, other: tuple[Any, ...]) -> Equations:
+        """Equations of both campaigns as one."""
+        return Equations(*(a + b for a, b in zip(self, other, strict=True)))
+
+    def visible(self, block: slice) -> tuple[Array, Array]:
+        """Combinations of some of the parameters that show, and how much each of them does.
 
         Returns
         -------
         directions : (k, l) array
         values : (l,) array, of the normal matrix in these directions
         """
-        scale = np.sqrt(np.where(self.squares > 0, self.squares, 1.0))
-        values, vectors = np.linalg.eigh(self.normal / np.outer(scale, scale))
+        scale = np.sqrt(np.where(self.squares > 0, self.squares, 1.0))[block]
+        values, vectors = np.linalg.eigh(self.normal[block, block] / np.outer(scale, scale))
         seen = values > RULES.visible**2
         return vectors[:, seen] / scale[:, None], values[seen]
 
 
-class ShapeEquations(NamedTuple):
-    """The shapes of an effect in the residuals of a campaign.
-
-    Attributes
-    ----------
-    specs : tuple of str, the effect in each of its shapes
-    settings : (s, q) array, those of the shapes
-    each : Equations, (s, ...) arrays, in units of the noise
-    """
-
-    specs: tuple[str, ...]
-    settings: Array
-    each: Equations
-
-    @classmethod
-    def of(cls, frame: SessionFit, effects: Sequence[Effect], variance: float) -> ShapeEquations:
-        """Equations of shapes of an effect, by a campaign with this variance of unit weight."""
-        columns = frame.residuals.whiten(frame.signatures(effects))
-        each = Equations.of(frame, columns.reshape(len(columns), len(effects), -1))
-        return cls(
-            tuple(effect.spec for effect in effects),
-            np.array([[*effect.settings.values()] for effect in effects], dtype=float),
-            Equations(*(part / variance for part in each)),
-        )
-
-    def nearest(self, settings: Array) -> Equations | None:
-        """Return the equations of the shape with these settings, or nearly so."""
-        best = 0
-        if settings.size:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                apart = np.max(abs(np.nan_to_num(np.log(self.settings / settings))), axis=1)
-            best = int(np.argmin(apart))
-            if apart[best] >= MAX_LOG_DIFFERENCE:
-                return None
-        return Equations(*(part[best] for part in self.each))
-
-
-class SensorEquations(NamedTuple):
-    """Normal equations of a sensor for the parameters of some effects, side by side.
-
-    Attributes
-    ----------
-    equations : Equations
-    square : float, ‖z‖²
-    redundancy : int
-    """
-
-    equations: Equations
-    square: float = 0.0
-    redundancy: int = 0
-
-
-def sensor_equations(sensor: Sensor, specs: Sequence[str]) -> SensorEquations:
-    """Set up the equations of a sensor for some effects; zeros where it cannot show one."""
-    effects = [get_effect(spec) for spec in specs]
-    if sensor.model is None:
-        k = sum(len(effect.parameters) for effect in effects)
-        return SensorEquations(Equations(np.zeros((k, k)), np.zeros(k), np.zeros(k)))
-    frame = SessionFit.of(sensor.fit().solution)
-    residuals, columns = frame.residuals, []
-    for effect in effects:
-        try:
-            columns.append(frame.rows(effect))
-        except InputError:  # a column is absent
-            columns.append(np.zeros((len(residuals.z), len(effect.parameters))))
-    side_by_side = Equations.of(frame, np.concatenate(columns, axis=1)[:, None])
-    equations = Equations(*(part[0] for part in side_by_side))
-    return SensorEquations(equations, float(residuals.z @ residuals.z), residuals.redundancy)
-
-
-# --- one size of all sensors --------------------------------------------------------------------
+def blocks(specs: Iterable[str]) -> list[slice]:
+    """Places of the parameters of effects side by side."""
+    ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs)]).tolist()
+    return [slice(first, end) for first, end in pairwise(ends)]
 
 
 class PooledEffect(NamedTuple):
-    """An effect in all campaigns together.
-
-    Attributes
-    ----------
-    odds : float, log odds that it is equally large in all sensors, against nothing
-    spec : str, its most probable shape
-    """
+    """Log odds that an effect is equally large in all sensors, and its most probable shape."""
 
     odds: float
     spec: str
 
 
-def weigh_pooled(used: Sequence[SensorEvidence]) -> dict[str, PooledEffect]:
-    """Weigh each effect by all campaigns as one: the normal equations of residuals are added.
-
-    Settings of an effect are those of the first campaign that shows it, or nearly so.
+def weigh_pooled(
+    pooled: Equations, redundancy: int, shapes: Mapping[str, Sequence[str]]
+) -> dict[str, PooledEffect]:
+    """Weigh effects by all campaigns as one, whose normal equations are added.
 
     Parameters
     ----------
-    used : of the sensors that count
+    pooled : Equations, of all shapes side by side
+    redundancy : int, of all campaigns
+    shapes : mapping of effects to their shapes
     """
-    redundancy = sum(each.redundancy for each in used)
     evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), redundancy)
-    square = sum(each.square for each in used)
-    nothing = float(evidence.noise_density(square)[0])
-    joint = {}
-    for name in sorted({name for each in used for name in each.shown}):
-        shown, logs = [each.shown[name] for each in used if name in each.shown], {}
-        for spec, settings in zip(shown[0].specs, shown[0].settings, strict=True):
-            near = [one for shapes in shown if (one := shapes.nearest(settings)) is not None]
-            if 2 * len(near) <= len(used):
-                continue
-            pooled = Equations.pooled(near)
-            directions, values = pooled.visible()
+    nothing = float(evidence.noise_density(pooled.square)[0])
+    places = iter(blocks(spec for specs in shapes.values() for spec in specs))
+    weighed = {}
+    for name, specs in shapes.items():
+        logs = {}
+        for spec, block in zip(specs, places, strict=False):
+            directions, values = pooled.visible(block)
             if dim := len(values):
-                part = float(np.sum((pooled.right @ directions) ** 2 / values))
-                logs[spec] = float(evidence.spaces_density(np.array([part]), [dim], square)[0])
+                part = np.sum((pooled.right[block] @ directions) ** 2 / values)
+                density = evidence.spaces_density(np.array([part]), [dim], pooled.square)
+                logs[spec] = float(density[0])
         if logs:
             odds = float(log_mean(np.array([*logs.values()]))) - nothing
-            joint[name] = PooledEffect(odds, max(logs, key=lambda spec: logs[spec]))
-    return joint
+            weighed[name] = PooledEffect(odds, max(logs, key=lambda spec: logs[spec]))
+    return weighed
 
 
 # --- sizes of a type ----------------------------------------------------------------------------
@@ -265,10 +200,11 @@ class TypeSizes:
     @classmethod
     def of(
         cls,
-        each: Sequence[SensorEquations],
+        each: Sequence[Equations],
         specs: Mapping[str, str],
         asked: Sequence[Names],
         usual: Sequence[int],
+        redundancy: int,
     ) -> TypeSizes:
         """Gather the equations of sensors.
 
@@ -278,28 +214,20 @@ class TypeSizes:
         ----------
         each : what the sensors tell of `specs`, side by side
         specs, asked, usual : as above
+        redundancy : int, of the usual sensors
         """
-        normal, right, _ = map(np.array, zip(*(one.equations for one in each), strict=True))
-        pooled = Equations.pooled(one.equations for one in each)
-        ends = np.cumsum([0, *(len(get_effect(spec).parameters) for spec in specs.values())])
-        turned, columns, place = [], dict[str, NDArray[np.int_]](), 0
-        for name, first, end in zip(specs, ends[:-1], ends[1:], strict=True):
-            block = slice(first, end)
-            shown = Equations(
-                pooled.normal[block, block], pooled.right[block], pooled.squares[block]
-            )
-            directions, values = shown.visible()
+        pooled, turned, columns, place = reduce(add, each), [], dict[str, NDArray[np.int_]](), 0
+        for name, block in zip(specs, blocks(specs.values()), strict=True):
+            directions, values = pooled.visible(block)
             # In these directions and units the sensors together tell as much of each.
-            turned.append(np.zeros((ends[-1], len(values))))
+            turned.append(np.zeros((len(pooled.right), len(values))))
             turned[-1][block] = directions / np.sqrt(values / len(each))
             columns[name] = place + np.arange(len(values))
             place += len(values)
         turn = np.concatenate(turned, axis=1)
+        normal, right = (np.array([getattr(one, k) for one in each]) for k in ("normal", "right"))
         raw = cls(specs, asked, turn.T @ normal @ turn, right @ turn, columns, np.array([*usual]))
-        counted = [each[i] for i in usual]
-        variance = raw.only(usual)._variance(
-            sum(one.square for one in counted), sum(one.redundancy for one in counted)
-        )
+        variance = raw.only(usual)._variance(sum(each[i].square for i in usual), redundancy)
         return replace(raw, normal=raw.normal / variance, right=raw.right / variance)
 
     def only(self, places: Sequence[int]) -> TypeSizes:

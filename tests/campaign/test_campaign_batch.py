@@ -75,9 +75,7 @@ BATCH = {
                    "approach": "gravity", "gravity": {"value_mps2": 9.8}},
                   {"log": "log.parquet", "name": "session", "import": {"rate_hz": 100},
                    "gravity": {"value_mps2": 9.81}}],
-    "lot": {"approach": "gravity", "seed": 3},
 }  # fmt: skip
-WITHOUT_LOT = {key: value for key, value in BATCH.items() if key != "lot"}
 NAMES = ["plain", "spoilt", "aided", "six", "session"]
 
 
@@ -208,7 +206,7 @@ def changed(made, tmp_path_factory):
     campaigns = folder / "campaigns"
     shutil.copyfile(campaigns / "plain/positions.csv", campaigns / "spoilt/positions.csv")
     (campaigns / "plain/campaign.yaml").unlink()
-    return folder / "results" / "bench", succeed(folder, WITHOUT_LOT)
+    return folder / "results" / "bench", succeed(folder, BATCH)
 
 
 def test_only_what_changed_runs_again(changed, made):
@@ -226,7 +224,7 @@ def test_only_what_changed_runs_again(changed, made):
     folder = results.parents[1]
     shutil.copytree(folder / "campaigns/spoilt", folder / "campaigns/another one")
     entries = [*BATCH["campaigns"][:3], {**BATCH["campaigns"][3], "model": "bias-scale"}]
-    plan = succeed(folder, {**WITHOUT_LOT, "campaigns": entries}, "--dry-run")
+    plan = succeed(folder, {**BATCH, "campaigns": entries}, "--dry-run")
     assert set(re.findall("Calibrate (\\S+)", plan)) == {"another-one", "session"}
 
 
@@ -235,18 +233,6 @@ def test_a_campaign_that_got_worse_leaves_nothing_old(changed):
     one_line(text, "not calibrated: plain: campaigns/plain/campaign.yaml: no such file")
     remaining = {path.name for path in (results / "campaigns/plain").iterdir()}
     assert remaining <= {"status.json", ".snakemake_timestamp"}
-
-
-def test_the_campaigns_of_a_type_are_evaluated_together(made):
-    """What cannot be read, or is there twice, is named and not in the lot."""
-    results, printed = made / "results/bench", (made / "printed.txt").read_text(encoding="utf-8")
-    assert jobs(printed) == {"calibrate": 5, "overview": 1, "lot": 1}
-    lot = json.loads((results / "lot/lot.json").read_text(encoding="utf-8"))
-    one_line(printed, f"{lot['verdict']} results/bench/lot/report.html")
-    assert [one["campaign"] for one in lot["each"]] == ["plain", "aided", "session"]
-    assert [one["campaign"] for one in lot["left_out"]] == ["spoilt", "six"]
-    page = (results / "lot/report.html").read_text(encoding="utf-8")
-    assert "Which campaigns are not in the lot?" in page
 
 
 # --- configuration -------------------------------------------------------------------------------

@@ -13,15 +13,14 @@ from accelstudy.approaches import get_approach
 from accelstudy.campaign.format import read_campaign, write_campaign
 from accelstudy.lots.evidence import Sensor
 from accelstudy.lots.output import own_names
-from accelstudy.lots.parameters import TypeParameter
-from accelstudy.lots.sizes import sensor_equations
+from accelstudy.lots.sizes import Equations
+from accelstudy.lots.type_file import TypeParameter
 
 STANDARD_ERRORS = 3.3
 
 
 def test_names_of_campaigns_are_their_own():
-    given = ["a", "a", "a (2)", "b"]
-    assert own_names(given, ["b"]) == ["a (1)", "a (3)", "a (2)", "b (4)"]
+    assert own_names(["a", "a", "a (2)", "b"]) == ["a (1)", "a (3)", "a (2)", "b"]
 
 
 def test_a_campaign_that_does_not_determine_the_model_says_nothing():
@@ -29,7 +28,7 @@ def test_a_campaign_that_does_not_determine_the_model_says_nothing():
     sensor = Sensor(campaign, None, get_approach("gravity"))
     silent = sensor.evidence()
     assert (silent.odds, silent.tested) == ({}, {})
-    none = sensor_equations(sensor, ("thermal_bias",)).equations
+    none = Equations.of(silent.frame, ("thermal_bias",))
     assert none.normal.shape == (3, 3)
     assert not none.normal.any()
 

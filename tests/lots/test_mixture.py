@@ -26,8 +26,6 @@ from accelstudy.lots.passes import LEVEL, Pass
 from accelstudy.lots.sizes import (
     SCATTERS,
     Equations,
-    SensorEquations,
-    ShapeEquations,
     TypeSizes,
     most_likely,
     weigh_pooled,
@@ -89,10 +87,13 @@ def type_of(rng, sizes, like=0.0, first=0.0):
     d[..., 1] = first * d[..., 0] + np.sqrt(1 - first**2) * d[..., 1]
     d[..., 2] = like * d[..., 1] + np.sqrt(1 - like**2) * d[..., 2]
     z = np.einsum("nmk,nk->nm", d, sizes) + rng.standard_normal((len(sizes), ROWS))
-    each = [Equations(a.T @ a, a.T @ b, np.sum(a**2, axis=0)) for a, b in zip(d, z, strict=True)]
-    told = [SensorEquations(e, float(b @ b), ROWS) for e, b in zip(each, z, strict=True)]
-    sets = [s for r in (1, 2) for s in combinations(NAMES, r)]
-    return d, z, TypeSizes.of(told, dict(zip(NAMES, NAMES, strict=True)), sets, range(len(sizes)))
+    each = [
+        Equations(a.T @ a, a.T @ b, np.sum(a**2, axis=0), float(b @ b))
+        for a, b in zip(d, z, strict=True)
+    ]
+    sets, n = [s for r in (1, 2) for s in combinations(NAMES, r)], len(sizes)
+    specs = dict(zip(NAMES, NAMES, strict=True))
+    return d, z, TypeSizes.of(each, specs, sets, range(n), n * ROWS)
 
 
 def two_effects(rng, like=0.0, first=0.0):
@@ -168,18 +169,14 @@ def test_shares_and_sensors_are_so_as_often_as_is_said():
 def test_an_effect_of_one_size_is_weighed_by_all_campaigns_as_one():
     """The evidence is that of one campaign with all residuals, by least squares."""
     derivatives, z, _ = type_of(np.random.default_rng(8), np.full((4, 3), 0.3))
-    sensors = []
-    for d, one in zip(derivatives, z, strict=True):
-        each = Equations((d.T @ d)[None], (d.T @ one)[None], np.sum(d**2, axis=0)[None])
-        shown = {"effect": ShapeEquations(("effect",), np.zeros((1, 0)), each)}
-        sensors.append(SensorEvidence("c", shown=shown, redundancy=ROWS, square=float(one @ one)))
-    joint = weigh_pooled(sensors)["effect"]
     d, one = derivatives.reshape(-1, 3), z.ravel()
+    pooled = Equations(d.T @ d, d.T @ one, np.sum(d**2, axis=0), float(one @ one))
+    joint = weigh_pooled(pooled, 4 * ROWS, {"effect": ["thermal_bias"]})["effect"]
     fitted = d @ np.linalg.lstsq(d, one, rcond=None)[0]
     evidence = Evidence(Level((1.0,), (RULES.freedom_given,), known=True), 4 * ROWS)
     part = evidence.spaces_density(np.array([fitted @ fitted]), [3], one @ one)[0]
     assert joint.odds == pytest.approx(part - evidence.noise_density(one @ one)[0], rel=1e-6)
-    assert joint.spec == "effect"
+    assert joint.spec == "thermal_bias"
 
 
 def test_odds_are_the_integral_over_the_sizes_of_the_type():

@@ -51,7 +51,7 @@ def type_of(sensors, folder):
     lot = SimpleNamespace(
         usual=range(len(sensors)), sensors=named, each=(), effects=(), model=MODEL,
     )  # fmt: skip
-    assert write_type(Lot(lot, MODEL, fits, get_approach("gravity"), {}), folder)
+    assert write_type(Lot(lot, MODEL, fits, {}), folder)
     return folder / "type.yaml"
 
 

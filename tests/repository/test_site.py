@@ -19,7 +19,6 @@ from places import ROOT
 from study_helpers import grid, make_study, run_study
 
 import accelstudy
-from accelstudy.approaches import get_approach
 from accelstudy.campaign.batch.overview import CAMPAIGN_COLUMNS, PARAMETER_COLUMNS
 from accelstudy.campaign.calibration.document import json_text
 from accelstudy.lots.evidence import SensorEvidence
@@ -134,7 +133,7 @@ def _lot():
     sensors = (SimpleNamespace(noise=None),) * len(each)
     one, model = Pass(sensors, tuple(each), anything), get_model("bias-scale")
     lot = LotDiagnosis((one, one), model, tuple(one.found))
-    return Lot(lot, model, [None] * 3, get_approach("robot"), {}).content
+    return Lot(lot, model, [None] * 3, {}).content
 
 
 def test_the_reference_says_what_the_kinds_of_keywords_mean(monkeypatch):

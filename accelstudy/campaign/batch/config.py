@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -92,18 +92,10 @@ class CampaignEntry(Entry):
     model: KnownModel
 
 
-class LotSettings(ConfigSection):
-    """How the campaigns of a batch are evaluated together, as those of sensors of one type."""
-
-    model: KnownModel | None = Field(None, description="model; by default that of the batch")
-    approach: Approach | None = Field(
-        None, description="approach; by default robot where a campaign has the robot's angles"
-    )
-    seed: int = Field(1, ge=0, description="seed of the draws")
-
-
 class BatchConfig(Configuration):
     """Campaigns that are calibrated and summarised together."""
+
+    retired: ClassVar = {"lot": "`accelstudy lot` takes the folders of the campaigns"}
 
     batch: PathName = Field(description="name; results go to results/<batch>/")
     model: KnownModel = Field("bias-scale-nonorthogonality", description="model of all campaigns")
@@ -115,9 +107,6 @@ class BatchConfig(Configuration):
         description="folder with public files, in any subfolder; missing ones are downloaded to it",
     )
     campaigns: list[Entry] = Field(min_length=1)
-    lot: LotSettings | None = Field(
-        None, description="evaluates all campaigns together, as sensors of one type"
-    )
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 from accelstudy.approaches import get_approach
@@ -88,19 +87,6 @@ def _calibrate(
         (folder / name).unlink(missing_ok=True)
     shutil.rmtree(folder / "figures", ignore_errors=True)
     return wrong
-
-
-def campaign_of(task: CampaignEntry, folder: str | Path) -> Campaign:
-    """Campaign of a task by the name of the task; `folder` is that of `run_task`.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or could not be imported.
-    """
-    imported = Path(folder) / "campaign"
-    campaign = _read(task) if task.settings is None else read_campaign(imported)
-    return replace(campaign, name=task.name)
 
 
 def _read(task: CampaignEntry) -> Campaign:
