@@ -67,13 +67,12 @@ class Adjustment:
     ----------
     parameters : (R, u) array
     residuals : (R, n, o) array, v
-    cofactors : (R, u, u) array, Q_xx
+    cofactors : (R, u, u) array, Q_xx; covariance a priori, as σ0² = 1
     omega : (R,) array, Ω = vᵀ Q⁻¹ v
     redundancy : int, r = conditions − unknowns
     converged : (R,) bool array
     iterations : (R,) int array
     singular : (R,) bool array, the normal matrix had no full rank
-    variance_priori : float, σ0²; cofactors times σ0² are variances
     """
 
     parameters: Array
@@ -84,7 +83,6 @@ class Adjustment:
     converged: NDArray[np.bool_]
     iterations: NDArray[np.int_]
     singular: NDArray[np.bool_]
-    variance_priori: float = 1.0
 
     @property
     def variance_posteriori(self) -> Array:
@@ -94,11 +92,6 @@ class Adjustment:
         return self.omega / self.redundancy
 
     @property
-    def covariance_priori(self) -> Array:
-        """Σ_xx = σ0² Q_xx, (R, u, u)."""
-        return self.variance_priori * self.cofactors
-
-    @property
     def covariance_posteriori(self) -> Array:
         """Σ_xx = σ̂0² Q_xx, (R, u, u)."""
         return self.variance_posteriori[:, None, None] * self.cofactors
@@ -106,7 +99,7 @@ class Adjustment:
     @property
     def sigma_priori(self) -> Array:
         """Standard deviations a priori, (R, u)."""
-        return np.sqrt(np.diagonal(self.covariance_priori, axis1=1, axis2=2))
+        return np.sqrt(np.diagonal(self.cofactors, axis1=1, axis2=2))
 
     @property
     def sigma_posteriori(self) -> Array:
@@ -119,7 +112,7 @@ class Adjustment:
         arrays: dict[str, Any] = {
             field.name: np.concatenate([getattr(part, field.name) for part in parts])
             for field in fields(cls)
-            if field.name not in ("redundancy", "variance_priori")
+            if field.name != "redundancy"
         }
         return replace(parts[0], **arrays)
 

@@ -48,11 +48,7 @@ class RandomEffects:
     @cached_property
     def covariance(self) -> Array:
         """Covariance matrix of the parameters, (u, u), with the scatter."""
-        return self.covariance_with(self.scatter)
-
-    def covariance_with(self, scatter: float) -> Array:
-        """Covariance matrix of the parameters, (u, u), with a given scatter."""
-        normal = (self.design.T / (self.variances + scatter**2)) @ self.design
+        normal = (self.design.T / (self.variances + self.scatter**2)) @ self.design
         return np.asarray(np.linalg.inv(normal))
 
     def combination(self, scatter: float) -> Array:

@@ -56,7 +56,7 @@ def test_york_line_is_the_published_one():
     assert result.omega[0] == pytest.approx(YORK_OMEGA, abs=2e-9)
     np.testing.assert_allclose(result.sigma_priori[0], [0.29497074, 0.05798501], rtol=2e-8)
     np.testing.assert_allclose(result.sigma_posteriori[0], [0.35924652, 0.07062027], rtol=2e-8)
-    assert result.covariance_priori[0, 0, 1] == pytest.approx(-0.01647254, abs=1e-8)
+    assert result.cofactors[0, 0, 1] == pytest.approx(-0.01647254, abs=1e-8)
     assert result.variance_posteriori[0] == pytest.approx(YORK_OMEGA / 8, rel=1e-9)
 
 

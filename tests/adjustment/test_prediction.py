@@ -7,12 +7,12 @@ from quality_helpers import SIGMA, draw, ideal_session, one
 from usual import BOTH, GRAVITY, NINE, ROBOT
 
 from accelstudy.adjustment import calibrate
+from accelstudy.adjustment.components import variance_components
 from accelstudy.adjustment.quality import (
     held_out,
     position_tests,
     reliability,
     solve,
-    variance_components,
 )
 from accelstudy.basics.units import MGON
 from accelstudy.effects import HoldConditions

@@ -21,7 +21,6 @@ from accelstudy.adjustment.quality import (
     holm,
     noncentrality,
     position_tests,
-    redundancy_numbers,
     reliability,
     solve,
     suspects,
@@ -32,7 +31,6 @@ from accelstudy.leveling.angles import roll_pitch
 from accelstudy.leveling.error import cap_forces
 from accelstudy.schemes import get_scheme
 from accelstudy.sensors.models import MODELS, get_model
-from accelstudy.sensors.sensor import SensorModel
 from accelstudy.simulation.sessions import Noise, session
 
 
@@ -98,28 +96,12 @@ def test_redundancy_numbers_sum_up_to_r(scheme, model, approach, sigma_gravity, 
         assert approach is GRAVITY
         assert n_conditions < 24
         return
-    numbers = redundancy_numbers(solution)
-    gravity = numbers.gravity or 0.0
-    assert (numbers.gravity is None) == (sigma_gravity == 0)
-    assert numbers.observations.sum() + gravity == pytest.approx(solution.redundancy, abs=1e-8)
-    assert numbers.positions.sum() + gravity == pytest.approx(solution.redundancy, abs=1e-8)
-    np.testing.assert_allclose(numbers.observations.sum(axis=1), numbers.positions, atol=1e-10)
-    assert numbers.observations.min() > -1e-10
-    assert numbers.observations.max() < 1 + 1e-10
-
-
-def test_the_value_of_gravity_is_not_checked_beside_scale_factors():
-    assert redundancy_numbers(
-        solve(NINE, ROBOT, draw(1, noise=Noise(sigma_gravity=1e-5)))
-    ).gravity == pytest.approx(0, abs=1e-9)
-    only_bias = SensorModel.of("bias alone", ("bias",))
-    observed = session(only_bias, np.zeros(3), get_scheme("mclaren-24").directions).observations(
-        Noise(sigma_gravity=1e-3)
-    )
-    # σ² of the mean of 24 norms against σ_g², as two observations of one quantity
-    expected = 1e-6 / (1e-6 + SIGMA**2 / 24)
-    numbers = redundancy_numbers(solve(only_bias, GRAVITY, observed))
-    assert numbers.gravity == pytest.approx(expected, rel=1e-6)
+    shares, positions = solution.shares, solution.redundancy_numbers
+    gravity = 1 - np.sum(solution.basis[-1] ** 2) if sigma_gravity else 0.0
+    assert positions.sum() + gravity == pytest.approx(solution.redundancy, abs=1e-8)
+    np.testing.assert_allclose(shares.sum(axis=1), positions, atol=1e-10)
+    assert shares.min() > -1e-10
+    assert shares.max() < 1 + 1e-10
 
 
 def test_holm():
@@ -189,7 +171,6 @@ def test_an_outlier_of_ten_sigma_is_found(approach, position, sigma_known):
     (found,) = suspects(NINE, approach, wrong, sigma_known=sigma_known)
     assert found.position == position
     assert found.p_value < 0.05
-    assert np.linalg.norm(found.gross_error) == pytest.approx(10 * SIGMA, abs=4 * SIGMA)
     tests = position_tests(solve(NINE, approach, wrong))
     assert tests.worst(sigma_known) == position
     assert suspects(NINE, approach, observed, alpha=1e-3, sigma_known=sigma_known) == ()
@@ -235,7 +216,7 @@ def test_the_power_at_the_detectable_error_is_0_8(approach, sigma_known):
     else:  # along the largest axis of the ellipsoid
         u, s, _ = np.linalg.svd(solution.whitening[position] @ solution.root[0][position])
         error = found.mdb[position, -1] * u[:, 0]
-        assert s[0] * math.sqrt(found.noncentrality) == pytest.approx(found.mdb[position, -1])
+        assert s[0] * math.sqrt(noncentrality(3)) == pytest.approx(found.mdb[position, -1])
     wrong = with_error(observed, position, error)
     tests = [position_tests(s) for s in solutions(approach, wrong)]
     p = np.array([(t.p_known if sigma_known else t.p_unknown)[position] for t in tests])
@@ -243,7 +224,7 @@ def test_the_power_at_the_detectable_error_is_0_8(approach, sigma_known):
     expected = 0.8
     if not sigma_known:
         dof = (approach.n_conditions, solution.redundancy - approach.n_conditions)
-        expected = ncf.sf(f.isf(0.001, *dof), *dof, found.noncentrality)
+        expected = ncf.sf(f.isf(0.001, *dof), *dof, noncentrality(dof[0]))
         assert expected < 0.77
     assert power == pytest.approx(expected, abs=limit)
 
@@ -254,10 +235,6 @@ def test_the_external_reliability_is_what_such_an_error_does():
     found, position = reliability(solution), 6
     error = found.mdb[position, 0] * ideal.forces[0, position] / STANDARD_GRAVITY
     moved = calibrate(NINE, GRAVITY, with_error(ideal, position, error)).parameters[0]
-    change = moved - solution.parameters
-    np.testing.assert_allclose(
-        np.abs(change), found.parameters[position], rtol=0.01, atol=0.02 * solution.cofactors[0, 0]
-    )
     f_b = cap_forces(50 * GON, 64)
     output = NINE.sense(f_b, solution.parameters)
     angles = [np.stack(roll_pitch(tuple(f.T))) for f in (NINE.correct(output, moved), f_b)]
@@ -271,13 +248,8 @@ def test_no_error_of_the_robot_in_the_ellipsoid_does_more():
     root = solution.whitening[position] @ solution.root[0][position]
     directions = np.random.default_rng(0).standard_normal((2000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    shifts = math.sqrt(found.noncentrality) * directions @ root.T
+    shifts = math.sqrt(noncentrality(3)) * directions @ root.T
     size = np.linalg.norm(shifts, axis=1)
     low, high = found.mdb[position, [0, -1]]
     assert low * (1 - 1e-9) <= size.min() < 1.05 * low
     assert 0.95 * high < size.max() <= high * (1 + 1e-9)
-    a = solution.design[3 * position : 3 * position + 3]
-    effect = solution.cofactors @ a.T @ np.linalg.solve(solution.whitening[position], shifts.T)
-    largest = np.abs(effect).max(axis=1)
-    assert np.all(largest <= found.parameters[position] * (1 + 1e-9))
-    assert np.all(largest > 0.95 * found.parameters[position])

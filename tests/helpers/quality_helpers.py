@@ -45,7 +45,7 @@ def one(observed, i):
 def solutions(approach, observed):
     """All sessions, calibrated together and linearised one by one."""
     together = calibrate(NINE, approach, observed)
-    arrays = [a.name for a in fields(together) if a.name not in ("redundancy", "variance_priori")]
+    arrays = [a.name for a in fields(together) if a.name != "redundancy"]
     for i in range(len(observed.forces)):
         part = replace(together, **{name: getattr(together, name)[i : i + 1] for name in arrays})
         yield solve(NINE, approach, one(observed, i), part)

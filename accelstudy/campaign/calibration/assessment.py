@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment import quality
-from accelstudy.adjustment.quality import VarianceComponents, variance_components
+from accelstudy.adjustment.components import VarianceComponents, variance_components
 from accelstudy.basics.levels import ACCEPTED, IMPLAUSIBLE, REJECTED, UNCHECKED
 from accelstudy.basics.units import GON
 from accelstudy.campaign.calibration.fit import CampaignFit, campaign_noise
@@ -60,7 +60,7 @@ class Assessment:
     ----------
     fit : CampaignFit
     solution : quality.Solution, linearised at the estimates
-    redundancy, tests, reliability : of the positions
+    tests, reliability : of the positions
     suspects : positions in conflict with the others, removed one at a time
     held_out : prediction of each position from the others; None where those do not determine the
         model
@@ -72,7 +72,6 @@ class Assessment:
 
     fit: CampaignFit
     solution: quality.Solution
-    redundancy: quality.Redundancy
     tests: quality.PositionTests
     reliability: quality.Reliability
     suspects: tuple[quality.Suspect, ...]
@@ -129,7 +128,6 @@ def assess(fit: CampaignFit, without_gross_error: bool = False) -> Assessment:
     return Assessment(
         fit=fit,
         solution=solution,
-        redundancy=quality.redundancy_numbers(solution),
         tests=quality.position_tests(solution),
         reliability=quality.reliability(solution),
         suspects=quality.suspects(*session, alpha=OUTLIER_LEVEL, sigma_known=fit.trusts_sigma),

@@ -156,7 +156,7 @@ def assessed_positions(assessment: Assessment) -> pd.DataFrame:
         {
             "position": fit.campaign.positions,
             "norm_residual_mps2": fit.norm_residuals,
-            "redundancy": assessment.redundancy.positions,
+            "redundancy": assessment.solution.redundancy_numbers,
             "statistic": tests.statistic,
             "dof": tests.dof,
             "p_value": tests.p_known if fit.trusts_sigma else tests.p_unknown,

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accelstudy.adjustment.observations import Observations
-from accelstudy.adjustment.quality.solution import Solution, solve
+from accelstudy.adjustment.quality import Solution, solve
 from accelstudy.approaches import Approach
 from accelstudy.sensors.sensor import SensorModel
 
@@ -41,13 +41,11 @@ class VarianceComponents:
     ----------
     factors : (2,) array, on σ² of the forces and of the angles; 1 if the a-priori values are right
     sigma : (2,) array, standard deviations of the factors, √(2 S⁻¹), at the estimate
-    redundancy : (2,) array, shares of the groups in r
     converged : bool
     """
 
     factors: Array
     sigma: Array
-    redundancy: Array
     converged: bool
 
 
@@ -149,8 +147,8 @@ def _estimate(solution: Solution, groups: Array, factors: Array) -> VarianceComp
         factors = target
         sigma = np.sqrt(np.diag(covariance))
         if np.all(np.abs(step) <= STEP_TOLERANCE * sigma):
-            return VarianceComponents(factors, sigma, factors * trace, True)
-    return VarianceComponents(factors, sigma, factors * trace, False)
+            return VarianceComponents(factors, sigma, True)
+    return VarianceComponents(factors, sigma, False)
 
 
 def _normal(left: Array, right: Array) -> Array:
